@@ -1,0 +1,19 @@
+# Every third-party library, with the oldest version that is tried; all come from Debian 12.
+find_package(Boost 1.81 REQUIRED)
+find_package(Threads REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(spdlog 1.10 REQUIRED)
+find_package(draco 1.5 REQUIRED)
+find_package(OpenMesh REQUIRED)  # Debian 12 ships 9.0; its package config states no version
+find_package(meshoptimizer 0.18 REQUIRED)
+find_package(hwy 1.0 REQUIRED)
+find_package(CLI11 2.1 REQUIRED)
+find_package(prometheus-cpp REQUIRED)  # 1.0; likewise
+find_package(TinyGLTF 2.7 REQUIRED)
+if(SPECTRA_BUILD_TESTS)
+  find_package(GTest 1.12 REQUIRED)
+  find_package(rapidcheck REQUIRED)
+endif()
+if(SPECTRA_BUILD_BENCHMARKS)
+  find_package(benchmark 1.7 REQUIRED)
+endif()

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fusion/colour/palette.hpp"
+#include "fusion/error.hpp"
+#include "fusion/settings.hpp"
+#include "fusion/statistics/temperature_statistics.hpp"
+#include "fusion/vertex_types.hpp"
+
+namespace spectra::fusion {
+
+/// A closed interval of temperatures, degC.
+struct TemperatureInterval {
+  double low = 0;
+  double high = 0;
+};
+
+class Kernel;
+
+/// Settings made ready for one scene: everything that does not depend on the vertex is computed once. Immutable and
+/// cheap to copy; any number of threads may fuse with it at once.
+class FusionPlan {
+ public:
+  /// Resolves automatic values against the scene and builds the kernel. Computes a histogram only when the method
+  /// needs one. Fails with Inconsistent when values that became known contradict each other (low > high).
+  static Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene);
+
+  /// The same with a palette table of the caller's instead of the one the settings name.
+  static Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene,
+                                    const PaletteTable& palette);
+
+  /// Fused colours of vertices; all three spans have the same length. Total: no input makes undefined behaviour.
+  /// The answer for a vertex depends on that vertex alone, so any split and any thread count give the same bytes.
+  void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
+            std::span<Rgb8> fused) const noexcept;
+
+  const FusionSettings& settings() const { return *settings_; }
+
+  /// The active range in degC; both 0 when the scene has no temperature.
+  double range_minimum() const { return range_minimum_; }
+  double range_maximum() const { return range_maximum_; }
+
+  /// Every parameter with the value in force: automatic temperatures resolved to numbers.
+  const ParameterValues& params_in_force() const { return *params_in_force_; }
+
+  /// The temperatures that the method shows otherwise than by the visible colour, ascending and disjoint, within the
+  /// data's extremes; empty for a method that treats all temperatures alike.
+  const std::vector<TemperatureInterval>& highlighted() const { return *highlighted_; }
+
+ private:
+  FusionPlan() = default;
+  std::shared_ptr<const Kernel> kernel_;
+  std::shared_ptr<const FusionSettings> settings_;
+  std::shared_ptr<const ParameterValues> params_in_force_;
+  std::shared_ptr<const std::vector<TemperatureInterval>> highlighted_;
+  double range_minimum_ = 0;
+  double range_maximum_ = 0;
+};
+
+}  // namespace spectra::fusion

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fusion/vertex_types.hpp"
+
+namespace spectra::fusion {
+
+/// A scene in memory: per vertex a position, a visible colour and a temperature, and triangles (none: a point cloud).
+/// The vertex data live in the property arrays of an OpenMesh mesh, in the order of the input, and are seen here as
+/// flat spans; half-edge connectivity is built only when topology() is asked for, because serving does not need it.
+/// Movable, not copyable. Not thread-safe while it is changed.
+class MultispectralMesh {
+ public:
+  MultispectralMesh();
+  ~MultispectralMesh();
+  MultispectralMesh(MultispectralMesh&&) noexcept;
+  MultispectralMesh& operator=(MultispectralMesh&&) noexcept;
+
+  std::size_t vertex_count() const;
+  std::size_t triangle_count() const { return triangles_.size(); }
+  bool is_point_cloud() const { return triangles_.empty(); }
+
+  /// Sets the number of vertices; new ones are at the origin, mid grey, without temperature.
+  void resize_vertices(std::size_t count);
+
+  /// Positions in metres relative to origin().
+  std::span<const Vec3f> positions() const;
+  std::span<Vec3f> positions();
+  std::span<const Rgb8> visible() const;
+  std::span<Rgb8> visible();
+  /// degC; NaN = missing.
+  std::span<const float> temperature_celsius() const;
+  std::span<float> temperature_celsius();
+
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  std::vector<Triangle>& triangles() { return triangles_; }
+
+  /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM loses nothing).
+  Vec3d origin;
+  bool has_visible = false;      ///< The input had colours; otherwise visible() is mid grey.
+  bool has_temperature = false;  ///< The input had a temperature property, or a thermal file was joined.
+  bool double_positions = false; ///< The input had double positions; output keeps them.
+  std::string name;              ///< For people: the file's name without folder, or "demo".
+
+ private:
+  struct Storage;
+  std::unique_ptr<Storage> storage_;
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace spectra::fusion

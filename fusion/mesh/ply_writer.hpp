@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <span>
+
+#include "fusion/error.hpp"
+#include "fusion/mesh/multispectral_mesh.hpp"
+
+namespace spectra::fusion {
+
+/// Writes binary little-endian PLY: x,y,z (double when the input was), red,green,blue from `colours` (one a vertex),
+/// temperature when the mesh has one, and the triangles. Vertices keep order and number.
+Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
+
+/// The same into a file that appears whole or not at all: written beside it, synced, then renamed.
+Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh,
+                       std::span<const Rgb8> colours);
+
+}  // namespace spectra::fusion

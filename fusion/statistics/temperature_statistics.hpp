@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace spectra::fusion {
+
+/// Facts of the finite temperatures (degC) of a whole scene. Population mean and sigma, from exact sums: the same
+/// for every order and every split of the vertices.
+struct TemperatureSummary {
+  std::uint64_t finite_count = 0;
+  std::uint64_t missing_count = 0;  ///< NaN or infinite.
+  float minimum = 0;                ///< degC; 0 when finite_count is 0, as are the next three.
+  float maximum = 0;
+  double mean = 0;
+  double sigma = 0;
+  bool has_temperature() const { return finite_count > 0; }
+};
+
+/// Counts of finite temperatures in equal bins from minimum to maximum:
+/// bin = min(bins - 1, floor((T - minimum) / (maximum - minimum) * bins)); a uniform scene is all in bin 0.
+struct Histogram {
+  float minimum = 0;  ///< degC, the data's own extremes.
+  float maximum = 0;
+  std::vector<std::uint64_t> counts;
+};
+
+/// Lower edge of bin `index`, or the upper edge of the last for index == bins. For display only: bins are defined
+/// by the formula above, never by comparing edges.
+double histogram_edge(const Histogram& histogram, std::size_t index);
+
+/// What a fusion method may know of the scene. `histogram` is called only by a method that needs one; the scene
+/// may compute it then, and keep it.
+struct SceneTemperature {
+  TemperatureSummary summary;
+  std::function<Histogram(std::uint32_t bins)> histogram;
+};
+
+/// Collects a TemperatureSummary; exact, mergeable in any order, and of fixed size.
+class TemperatureAccumulator {
+ public:
+  TemperatureAccumulator();
+  void add(std::span<const float> temperature_celsius);
+  void merge(const TemperatureAccumulator& other);
+  TemperatureSummary summary() const;
+
+ private:
+  /// Sums of the mantissas, by exponent: no rounding ever happens before summary().
+  std::vector<std::int64_t> sum_by_exponent_;
+  std::vector<std::uint64_t> square_low_by_exponent_;
+  std::vector<std::uint64_t> square_high_by_exponent_;
+  std::uint64_t finite_count_ = 0;
+  std::uint64_t missing_count_ = 0;
+  float minimum_;
+  float maximum_;
+};
+
+/// Adds the temperatures to the counts of a histogram whose extremes and bin number are set already; values that are
+/// not finite are left out.
+void add_to_histogram(std::span<const float> temperature_celsius, Histogram& histogram);
+
+}  // namespace spectra::fusion

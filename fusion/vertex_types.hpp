@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace spectra::fusion {
+
+/// A visible or fused colour: sRGB-encoded, 8 bits a channel, three bytes without padding.
+struct Rgb8 {
+  std::uint8_t r = 0, g = 0, b = 0;
+  friend bool operator==(const Rgb8&, const Rgb8&) = default;
+};
+static_assert(sizeof(Rgb8) == 3);
+
+/// A position in metres, relative to an origin that is kept in double precision beside it.
+struct Vec3f {
+  float x = 0, y = 0, z = 0;
+  friend bool operator==(const Vec3f&, const Vec3f&) = default;
+};
+static_assert(sizeof(Vec3f) == 12);
+
+/// A position or origin in metres, in the coordinates of the input file.
+struct Vec3d {
+  double x = 0, y = 0, z = 0;
+  friend bool operator==(const Vec3d&, const Vec3d&) = default;
+};
+
+/// Three vertex indices, counter-clockwise as in the input.
+using Triangle = std::array<std::uint32_t, 3>;
+
+}  // namespace spectra::fusion

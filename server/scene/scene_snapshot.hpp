@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/statistics/temperature_statistics.hpp"
+#include "fusion/vertex_types.hpp"
+#include "protocol/tile_frame.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::server {
+
+/// Smallest and largest coordinates, metres relative to the scene origin.
+struct Bounds {
+  fusion::Vec3f min, max;
+};
+
+/// One node of the tile tree: flat arrays of its vertices. Owned vertices come first: every vertex of the scene is owned
+/// by exactly one leaf, copies on a border follow. Vertices of no triangle are owned too, but not part of the geometry.
+struct Tile {
+  protocol::TileId id;
+  std::uint8_t child_mask = 0;
+  float geometric_error_m = 0;  ///< Against the full mesh; 0 at leaves.
+  Bounds bounds;
+  float lowest_celsius = 0;  ///< Under this tile in the full mesh; NaN = no temperature.
+  float highest_celsius = 0;
+  std::uint32_t owned_count = 0;
+  std::vector<fusion::Vec3f> positions;
+  std::vector<fusion::Rgb8> visible;
+  std::vector<float> temperature_celsius;
+  std::vector<std::uint32_t> source_vertex;  ///< Index in the input, per vertex.
+  std::vector<fusion::Triangle> triangles;   ///< Indices into this tile; empty for a point cloud.
+  std::vector<std::uint32_t> source_triangle;  ///< Index in the input, per triangle (leaves).
+};
+
+/// The vertex nearest to a place, at full accuracy.
+struct Probe {
+  std::uint32_t vertex_index = 0;  ///< In the input's order.
+  fusion::Vec3f position;          ///< Metres relative to the scene origin.
+  std::optional<float> temperature_celsius;
+  fusion::Rgb8 visible;
+  double distance_m = 0;
+};
+
+/// Where it is hottest or coldest.
+struct Extreme {
+  fusion::Vec3f position;
+  float temperature_celsius = 0;
+};
+
+/// An immutable scene, cut into tiles; shared by pointer, readers never lock. The histogram is computed once for each number
+/// of bins, when first asked for (thread-safe).
+class SceneSnapshot {
+ public:
+  /// Cuts the mesh into octree leaves of about `leaf_vertex_count` vertices (small ones merged with a neighbour).
+  /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store.
+  static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
+                                                    WorkerPool& pool, std::uint32_t leaf_vertex_count = 32'000);
+  virtual ~SceneSnapshot() = default;
+
+  virtual const std::string& name() const = 0;
+  virtual std::uint32_t revision() const = 0;
+  virtual std::uint64_t vertex_count() const = 0;
+  virtual std::uint64_t triangle_count() const = 0;
+  virtual bool is_point_cloud() const = 0;
+  virtual fusion::Vec3d origin() const = 0;
+  virtual const Bounds& bounds() const = 0;
+  virtual int level_count() const = 0;
+  /// All tiles, coarse before fine.
+  virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;
+  /// Summary and histogram, for FusionPlan::prepare.
+  virtual const fusion::SceneTemperature& temperature() const = 0;
+  virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
+  virtual std::optional<Extreme> hottest() const = 0;
+  virtual std::optional<Extreme> coldest() const = 0;
+  /// A position step (metres) that loses nothing the eye can see: about a quarter of the median edge length.
+  virtual float suggested_position_step_m() const = 0;
+  /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
+  virtual fusion::MultispectralMesh whole_mesh() const = 0;
+};
+
+}  // namespace spectra::server

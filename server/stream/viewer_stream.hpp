@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+#include "fusion/settings.hpp"
+#include "protocol/tile_frame.hpp"
+#include "server/scene/scene_snapshot.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::server {
+
+/// The knobs of PROTOCOL quality.set, as in force.
+struct StreamQuality {
+  bool automatic = false;
+  float position_step_m = 0;  ///< Always a lattice_step(); 0 = the scene's suggestion.
+  int colour_bits = 8;
+  double pixel_error = 1;
+  int encoder_speed = 7;
+  double latency_target_ms = 200;
+  friend bool operator==(const StreamQuality&, const StreamQuality&) = default;
+};
+
+/// The largest step <= `wanted_m` of the form m * 2^e with m in 4..7, so that lattice * step is exact in float.
+float lattice_step(double wanted_m);
+
+/// Where a viewer looks from; metres relative to the scene origin.
+struct Camera {
+  fusion::Vec3f eye, target, up;
+  double fov_y_deg = 50;
+  std::array<int, 2> viewport{1280, 720};
+};
+
+/// A frame ready to be written: a header of this connection's own and a payload shared by all viewers.
+struct OutgoingFrame {
+  std::array<std::byte, protocol::kTileFrameHeaderSize> header;
+  std::shared_ptr<const std::vector<std::byte>> payload;  ///< May be null (remove).
+  std::size_t size_bytes() const { return header.size() + (payload ? payload->size() : 0); }
+};
+
+/// stream.complete of the protocol.
+struct StreamComplete {
+  std::uint32_t generation = 0;
+  std::uint32_t scene_revision = 0;
+  std::uint32_t tile_count = 0;
+  std::uint64_t vertex_count = 0;
+};
+
+/// stream.stats of the protocol, without what only the connection knows.
+struct StreamStats {
+  double round_trip_ms = 0;
+  double throughput_bytes_per_s = 0;
+  std::uint64_t queued_bytes = 0;
+  std::uint64_t skipped_frames = 0;
+  double position_mm = 0;
+  int colour_levels = 256;
+  double pixel_error = 0;
+};
+
+/// Encoded geometry and colours, each made once and shared by every viewer with the same need; bounded in bytes, the
+/// least recently used goes first. Thread-safe. One for the whole server.
+class FrameCache {
+ public:
+  explicit FrameCache(std::size_t capacity_bytes);
+  ~FrameCache();
+  std::size_t size_bytes() const;
+  std::uint64_t hit_count() const;
+  std::uint64_t miss_count() const;
+
+  struct State;  // Seen by server/stream only.
+  State& state() { return *state_; }
+
+ private:
+  std::unique_ptr<State> state_;
+};
+
+/// What one viewer is sent: decides the order, asks the cache and the workers for frames, keeps to the sending window,
+/// and lets the newest settings overtake what is not yet on the wire. It has no socket and no clock of its own: the session
+/// calls it on its strand, writes what next_frame() gives, and is woken when there may be more.
+class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
+ public:
+  /// `wake` is called from any thread whenever next_frame() or take_complete() may have something new; it must only
+  /// post to the session's strand. It is not called after close().
+  static std::shared_ptr<ViewerStream> create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
+                                              WorkerPool& pool, std::function<void()> wake);
+  virtual ~ViewerStream() = default;
+
+  virtual void close() = 0;
+
+  /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
+  virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
+
+  /// Starts sending; `in_flight_bytes` 0 = our choice.
+  virtual void subscribe(std::size_t in_flight_bytes) = 0;
+  virtual void unsubscribe() = 0;
+
+  /// A plan made (on a worker) for the current scene; returns the generation its colours will carry, from 1.
+  virtual std::uint32_t set_plan(fusion::FusionPlan plan) = 0;
+  virtual std::uint32_t generation() const = 0;
+  virtual void set_quality(const StreamQuality& quality) = 0;
+  virtual const StreamQuality& quality() const = 0;
+  virtual void set_camera(const Camera& camera) = 0;
+
+  /// stream.ack; a sequence that was never sent, or an older one than before, is ignored. `now_s` is a steady clock.
+  virtual void acknowledge(std::uint32_t sequence, double now_s) = 0;
+
+  /// The next frame the window lets through, or nothing now. Sequence numbers rise by one.
+  virtual std::optional<OutgoingFrame> next_frame(double now_s) = 0;
+
+  /// Once after everything of the newest generation has been given out by next_frame().
+  virtual std::optional<StreamComplete> take_complete() = 0;
+
+  virtual StreamStats stats() const = 0;
+};
+
+}  // namespace spectra::server
