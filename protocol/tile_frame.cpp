@@ -1,0 +1,114 @@
+#include "protocol/tile_frame.hpp"
+
+#include <bit>
+#include <concepts>
+#include <string>
+
+namespace spectra::protocol {
+namespace {
+
+/// Writes little-endian values one after another, whatever the machine's own order.
+class Writer {
+ public:
+  explicit Writer(std::span<std::byte> out) : out_(out) {}
+
+  template <std::unsigned_integral T>
+  void put(T value) {
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      out_[at_++] = static_cast<std::byte>((static_cast<std::uint64_t>(value) >> (8 * i)) & 0xFF);
+  }
+  void put(float value) { put(std::bit_cast<std::uint32_t>(value)); }
+
+ private:
+  std::span<std::byte> out_;
+  std::size_t at_ = 0;
+};
+
+/// Reads what Writer wrote; the caller has checked that there is enough.
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> in) : in_(in) {}
+
+  template <std::unsigned_integral T>
+  T get() {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      value |= std::to_integer<std::uint64_t>(in_[at_++]) << (8 * i);
+    return static_cast<T>(value);
+  }
+  float get_float() { return std::bit_cast<float>(get<std::uint32_t>()); }
+
+ private:
+  std::span<const std::byte> in_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+std::array<std::byte, kTileFrameHeaderSize> encoded_header(const TileFrameHeader& header) {
+  std::array<std::byte, kTileFrameHeaderSize> bytes{};
+  Writer out(bytes);
+  out.put(kTileFrameMagic);
+  out.put(static_cast<std::uint8_t>(header.kind));
+  out.put(header.child_mask);
+  out.put(static_cast<std::uint16_t>(kTileFrameHeaderSize));
+  out.put(header.sequence);
+  out.put(header.generation);
+  out.put(static_cast<std::uint32_t>(header.tile.level));  // level and its three zero bytes
+  out.put(header.tile.x);
+  out.put(header.tile.y);
+  out.put(header.tile.z);
+  out.put(header.revision);
+  out.put(header.vertex_count);
+  for (const float coordinate : header.origin_m) out.put(coordinate);
+  out.put(header.position_step_m);
+  out.put(header.geometric_error_m);
+  out.put(header.lowest_celsius);
+  out.put(header.highest_celsius);
+  out.put(header.payload_size_bytes);
+  return bytes;
+}
+
+Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
+  const auto malformed = [](std::string field, std::string what) {
+    return refusal(RpcErrorCode::InvalidRequest, "tile frame: " + what, std::move(field));
+  };
+  if (message.size() < kTileFrameHeaderSize)
+    return malformed("", "message of " + std::to_string(message.size()) + " bytes, a header has " +
+                             std::to_string(kTileFrameHeaderSize));
+  Reader in(message);
+  if (in.get<std::uint32_t>() != kTileFrameMagic) return malformed("magic", "does not start with \"SPC1\"");
+
+  TileFrameView view;
+  TileFrameHeader& header = view.header;
+  header.kind = static_cast<FrameKind>(in.get<std::uint8_t>());
+  header.child_mask = in.get<std::uint8_t>();
+  const std::size_t header_size = in.get<std::uint16_t>();
+  if (header_size < kTileFrameHeaderSize || header_size > message.size())
+    return malformed("header_size", "header size " + std::to_string(header_size) + " is not between " +
+                                        std::to_string(kTileFrameHeaderSize) + " and the message's " +
+                                        std::to_string(message.size()) + " bytes");
+  header.sequence = in.get<std::uint32_t>();
+  header.generation = in.get<std::uint32_t>();
+  header.tile.level = static_cast<std::uint8_t>(in.get<std::uint32_t>() & 0xFF);
+  header.tile.x = in.get<std::uint32_t>();
+  header.tile.y = in.get<std::uint32_t>();
+  header.tile.z = in.get<std::uint32_t>();
+  header.revision = in.get<std::uint32_t>();
+  header.vertex_count = in.get<std::uint32_t>();
+  for (float& coordinate : header.origin_m) coordinate = in.get_float();
+  header.position_step_m = in.get_float();
+  header.geometric_error_m = in.get_float();
+  header.lowest_celsius = in.get_float();
+  header.highest_celsius = in.get_float();
+  header.payload_size_bytes = in.get<std::uint32_t>();
+
+  view.payload = message.subspan(header_size);
+  if (view.payload.size() != header.payload_size_bytes)
+    return malformed("payload_size", "payload of " + std::to_string(view.payload.size()) +
+                                         " bytes, the header says " +
+                                         std::to_string(header.payload_size_bytes));
+  return view;
+}
+
+}  // namespace spectra::protocol
