@@ -1,0 +1,104 @@
+// A parameter change against sending the whole mesh again, both over loopback and both decoded by Node, taken in turns in
+// one run:
+//   node tests/bench/stream/parameter_change.mjs [SCENE.ply] [ROUNDS]     (default: a generated scene of 1,000,000 vertices)
+// Prints the medians and the ratios of time and bytes.
+import { spawn } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import net from "node:net";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { KIND, SpectraClient } from "../../integration/node/spectra_client.mjs";
+import { binary, run, serve } from "../../integration/node/spectra_server.mjs";
+
+const folder = mkdtempSync(path.join(tmpdir(), "spectra-bench-"));
+const rounds = Number(process.argv[3] ?? 7);
+let scene = process.argv[2];
+if (!scene) {
+  scene = path.join(folder, "million.ply");
+  run("demo-scene", scene, "--vertices", "1000000");
+}
+
+const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
+const alphaOf = (round) => (0.3 + 0.05 * round).toFixed(2);
+
+/** One exchange with the whole-mesh sender: request to decoded mesh and colours. */
+class WholeMeshClient {
+  static async start(step, draco) {
+    const client = new WholeMeshClient();
+    client.draco = draco;
+    client.process = spawn(path.join(path.dirname(binary), "whole_mesh_sender"), [scene, String(step)]);
+    const port = await new Promise((resolve) => client.process.stdout.once("data", (text) => resolve(Number(text))));
+    client.socket = net.connect(port, "127.0.0.1");
+    client.socket.setNoDelay(true);
+    await new Promise((resolve) => client.socket.once("connect", resolve));
+    return client;
+  }
+
+  async change(alpha) {
+    const start = performance.now();
+    const received = new Promise((resolve) => {
+      const chunks = [];
+      let size = 0;
+      const onData = (chunk) => {
+        chunks.push(chunk);
+        size += chunk.length;
+        const first = chunks[0];
+        if (size >= 4 && first.length >= 4 && size === 4 + first.readUInt32LE(0)) {
+          this.socket.off("data", onData);
+          resolve(Buffer.concat(chunks).subarray(4));
+        }
+      };
+      this.socket.on("data", onData);
+    });
+    this.socket.write(`${alpha}\n`);
+    const bytes = await received;
+    this.draco.colouredMesh(bytes);
+    return { ms: performance.now() - start, bytes: bytes.length };
+  }
+
+  stop() {
+    this.socket.destroy();
+    this.process.kill();
+  }
+}
+
+const server = await serve([scene]);
+const client = await SpectraClient.connect(server.url);
+await client.request("scene.subscribe", { channels: ["fused"] });
+await client.complete((await client.request("fusion.get")).generation);
+const step = [...client.tiles.values()][0].frame.step;
+const whole = await WholeMeshClient.start(step, client.draco);
+
+async function tileChange(alpha) {
+  const bytesBefore = client.received_bytes;
+  const framesBefore = client.frames.length;
+  const start = performance.now();
+  const { generation } = await client.request("fusion.set", { method: "thermal_visible_blend", params: { alpha: Number(alpha) } });
+  await client.complete(generation);
+  const ms = performance.now() - start;
+  if (client.failures.length) throw client.failures[0];
+  if (client.frames.slice(framesBefore).some((frame) => frame.kind === KIND.geometry)) throw new Error("geometry was sent again");
+  if ([...client.tiles.values()].some((tile) => tile.generation !== generation)) throw new Error("a tile is behind");
+  return { ms, bytes: client.received_bytes - bytesBefore };
+}
+
+const tile = [];
+const mesh = [];
+for (let round = -1; round < rounds; ++round) {
+  const a = await tileChange(alphaOf(round));
+  const b = await whole.change(alphaOf(round));
+  if (round < 0) continue; // warm-up
+  tile.push(a);
+  mesh.push(b);
+}
+const ratios = tile.map((a, i) => mesh[i].ms / a.ms);
+const { vertex_count, triangle_count } = client.hello.scene;
+console.log(`${path.basename(scene)}: ${vertex_count} vertices, ${triangle_count} triangles, ${client.tiles.size} tiles, step ${(step * 1000).toFixed(3)} mm, ${rounds} rounds`);
+console.log(`colours only     median ${median(tile.map((a) => a.ms)).toFixed(1)} ms, ${median(tile.map((a) => a.bytes))} bytes`);
+console.log(`whole mesh again median ${median(mesh.map((a) => a.ms)).toFixed(1)} ms, ${median(mesh.map((a) => a.bytes))} bytes`);
+console.log(`faster by ${median(ratios).toFixed(2)} (min ${Math.min(...ratios).toFixed(2)}), bytes ratio ${(median(tile.map((a) => a.bytes)) / median(mesh.map((a) => a.bytes))).toFixed(3)}`);
+
+whole.stop();
+await client.close();
+await server.stop();
+rmSync(folder, { recursive: true });
