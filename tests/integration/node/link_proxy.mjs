@@ -1,0 +1,113 @@
+// A radio link on loopback: a TCP proxy that gives each direction a rate, a delay, jitter, and stalls. Like a modem with a
+// bounded queue, it stops reading when its queue is full, so that the sender feels the link.
+import net from "node:net";
+
+/** One direction of one connection. */
+class Lane {
+  constructor(from, to, link) {
+    this.from = from;
+    this.to = to;
+    this.link = link;
+    this.queued_bytes = 0;
+    this.lineFreeAt = 0;
+    this.lastDelivery = 0;
+    from.on("data", (chunk) => this.#accept(chunk));
+    from.on("end", () => this.#after(this.lastDelivery, () => to.end()));
+    from.on("error", () => to.destroy());
+    from.on("close", () => this.#after(this.lastDelivery, () => to.destroy()));
+  }
+
+  #accept(chunk) {
+    const slice_bytes = 1400;
+    for (let offset = 0; offset < chunk.length; offset += slice_bytes) {
+      this.#send(chunk.subarray(offset, offset + slice_bytes));
+    }
+    if (this.queued_bytes > this.link.queue_bytes) this.from.pause();
+  }
+
+  #send(packet) {
+    const { rate_bytes_per_s, delay_ms, jitter_ms, stalledUntil } = this.link;
+    const now = performance.now();
+    this.queued_bytes += packet.length;
+    this.lineFreeAt = Math.max(this.lineFreeAt, now, stalledUntil) + (packet.length / rate_bytes_per_s) * 1000;
+    const delivery = this.lineFreeAt + delay_ms + this.link.random() * jitter_ms;
+    this.lastDelivery = Math.max(this.lastDelivery, delivery);
+    this.#after(this.lineFreeAt, () => {
+      this.queued_bytes -= packet.length;
+      if (this.queued_bytes <= this.link.queue_bytes / 2) this.from.resume();
+    });
+    this.#after(this.lastDelivery, () => {
+      this.link.delivered_bytes += packet.length;
+      if (!this.to.destroyed) this.to.write(packet);
+    });
+  }
+
+  #after(time, action) {
+    this.link.schedule(time, action);
+  }
+}
+
+/**
+ * Starts a proxy in front of `target_url`; `url` is what a client connects to.
+ * rate_bytes_per_s and delay_ms hold for each direction (a round trip is twice the delay).
+ */
+export async function linkProxy(target_url, { rate_bytes_per_s = Infinity, delay_ms = 0, jitter_ms = 0, queue_bytes = 16_384, seed = 1 } = {}) {
+  const target = new URL(target_url);
+  const events = [];
+  let state = seed;
+  const link = {
+    rate_bytes_per_s,
+    delay_ms,
+    jitter_ms,
+    queue_bytes,
+    stalledUntil: 0,
+    delivered_bytes: 0,
+    random() {
+      state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+      return state / 2 ** 32;
+    },
+    schedule(time, action) {
+      events.push({ time, action });
+    },
+  };
+  // One ticking clock keeps the order of equal times; timers of a millisecond each would not.
+  const timer = setInterval(() => {
+    const now = performance.now();
+    const due = [];
+    for (let i = 0; i < events.length; ) {
+      if (events[i].time <= now) due.push(...events.splice(i, 1));
+      else ++i;
+    }
+    due.sort((a, b) => a.time - b.time);
+    for (const { action } of due) action();
+  }, 1);
+
+  const sockets = new Set();
+  const proxy = net.createServer({ noDelay: true }, (near) => {
+    const far = net.connect({ host: target.hostname, port: Number(target.port), noDelay: true });
+    for (const socket of [near, far]) {
+      sockets.add(socket);
+      socket.on("close", () => sockets.delete(socket));
+    }
+    new Lane(near, far, link);
+    new Lane(far, near, link);
+  });
+  await new Promise((resolve) => proxy.listen(0, "127.0.0.1", resolve));
+  return {
+    url: `http://127.0.0.1:${proxy.address().port}`,
+    link,
+    /** Nothing passes for that long. */
+    stall(duration_ms) {
+      link.stalledUntil = performance.now() + duration_ms;
+    },
+    /** Connections break, as when a robot drives behind a wall. */
+    cut() {
+      for (const socket of sockets) socket.destroy();
+    },
+    async close() {
+      clearInterval(timer);
+      for (const socket of sockets) socket.destroy();
+      await new Promise((resolve) => proxy.close(resolve));
+    },
+  };
+}
