@@ -19,10 +19,10 @@ enum class ErrorCode : int {
   FileNotFound = 200,
   FileUnreadable = 201,
   FileUnwritable = 202,
-  BadHeader = 210,   ///< The file does not start as its format demands.
-  Truncated = 211,   ///< Fewer bytes than the header promises.
-  BadValue = 212,    ///< A value in the body that cannot be meant (NaN position, index out of range).
-  Unsupported = 213, ///< Well-formed, but outside what Spectra reads.
+  BadHeader = 210,    ///< The file does not start as its format demands.
+  Truncated = 211,    ///< Fewer bytes than the header promises.
+  BadValue = 212,     ///< A value in the body that cannot be meant (NaN position, index out of range).
+  Unsupported = 213,  ///< Well-formed, but outside what Spectra reads.
   TooLarge = 214,
 };
 
@@ -35,8 +35,9 @@ struct Error {
 
 /// A value or an Error; asking for the value of an error throws boost::outcome_v2::bad_result_access.
 template <class T>
-using Result = BOOST_OUTCOME_V2_NAMESPACE::basic_result<
-    T, Error, BOOST_OUTCOME_V2_NAMESPACE::policy::throw_bad_result_access<Error, void>>;
+using Result =
+    BOOST_OUTCOME_V2_NAMESPACE::basic_result<T, Error,
+                                             BOOST_OUTCOME_V2_NAMESPACE::policy::throw_bad_result_access<Error, void>>;
 
 /// The error side of any Result: `return failure(ErrorCode::OutOfRange, "...", "alpha");`
 inline auto failure(ErrorCode code, std::string message, std::string field = {}) {
@@ -44,6 +45,8 @@ inline auto failure(ErrorCode code, std::string message, std::string field = {})
 }
 
 /// The success side of a Result<void>.
-inline auto success() { return BOOST_OUTCOME_V2_NAMESPACE::success(); }
+inline auto success() {
+  return BOOST_OUTCOME_V2_NAMESPACE::success();
+}
 
 }  // namespace spectra::fusion

@@ -37,12 +37,12 @@ struct Parameter {
   std::string label;  ///< A few words for a form.
   std::string help;   ///< One sentence.
   ParameterKind kind = ParameterKind::Number;
-  ParameterValue default_value;
-  double min = -std::numeric_limits<double>::infinity();  ///< Inclusive; Number and Integer.
-  double max = std::numeric_limits<double>::infinity();   ///< Inclusive; Number and Integer.
-  double step = 0;                                        ///< A sensible slider step; 0 = none.
-  std::string unit;                                       ///< "degC", "deg", "" ...
-  std::vector<std::string> options;                       ///< Choice only.
+  ParameterValue default_value = {};
+  double min = -std::numeric_limits<double>::infinity();            ///< Inclusive; Number and Integer.
+  double max = std::numeric_limits<double>::infinity();             ///< Inclusive; Number and Integer.
+  double step = 0;                                                  ///< A sensible slider step; 0 = none.
+  std::string unit = {};                                            ///< "degC", "deg", "" ...
+  std::vector<std::string> options = {};                            ///< Choice only.
   double exclusive_min = -std::numeric_limits<double>::infinity();  ///< A bound that is itself not allowed (k > 0).
 };
 

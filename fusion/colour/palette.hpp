@@ -10,14 +10,19 @@ namespace spectra::fusion {
 /// 256 sRGB-encoded colours in 0..255, real-valued; row 0 is the coldest.
 using PaletteTable = std::array<std::array<double, 3>, 256>;
 
-/// A palette. fusion_safe: it carries temperature by hue alone (smallest chroma >= 0.25 and no hue used twice), so
-/// that intensity_hue may give lightness to the visible picture.
+/// A palette. fusion_safe: it carries temperature by hue alone, so that intensity_hue may give lightness to the visible
+/// picture; see carries_hue_alone.
 struct Palette {
   std::string id;
   std::string label;
   bool fusion_safe = false;
   PaletteTable table{};
 };
+
+/// The rule behind fusion_safe. Chroma is that of HSV, the largest channel minus the smallest, as a part of 255: at least
+/// 0.25 in every row. Hue is that of HSV, the one intensity_hue keeps: it turns one way from row to row without a halt,
+/// and by less than the full circle, so that no hue is used twice.
+bool carries_hue_alone(const PaletteTable& table);
 
 /// All palettes, in the order a person should see them; at least 15.
 std::span<const Palette> all_palettes();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -30,6 +32,29 @@ struct Histogram {
 /// Lower edge of bin `index`, or the upper edge of the last for index == bins. For display only: bins are defined
 /// by the formula above, never by comparing edges.
 double histogram_edge(const Histogram& histogram, std::size_t index);
+
+/// Which bin of a histogram a finite temperature belongs to, by the formula of Histogram; temperatures outside the
+/// histogram's extremes count as the nearest.
+class HistogramBinning {
+ public:
+  /// The histogram's extremes and bin number are set; it has at least one bin.
+  explicit HistogramBinning(const Histogram& histogram)
+      : minimum_(double{histogram.minimum}),
+        span_(double{histogram.maximum} - double{histogram.minimum}),
+        bins_(static_cast<double>(histogram.counts.size())) {}
+
+  std::size_t operator()(float temperature_celsius) const {
+    if (!(span_ > 0)) return 0;
+    const double position = (double{temperature_celsius} - minimum_) / span_ * bins_;
+    // Truncation is the floor, because what is negative stops at 0.
+    return position > 0 ? static_cast<std::size_t>(std::min(position, bins_ - 1)) : 0;
+  }
+
+ private:
+  double minimum_;
+  double span_;
+  double bins_;
+};
 
 /// What a fusion method may know of the scene. `histogram` is called only by a method that needs one; the scene
 /// may compute it then, and keep it.

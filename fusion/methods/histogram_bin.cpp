@@ -1,0 +1,118 @@
+// Histogram bin highlighting: the rarest temperatures of the scene stand out in palette colours.
+//
+//   bin = min(bins - 1, floor((T - min) / (max - min) * bins)) over the data's own extremes
+//   F = alpha M + (1 - alpha) V   in the n occupied bins of lowest (inverted: highest) count, else V
+//
+// Source: section 3.7. Bins are defined by the formula, never by comparing edges, which would put a third of them one
+// bin low. Cost: a bin, a palette lookup and a mix, and once per plan a histogram. Missing temperature: the visible
+// colour, or the fixed colour that is set for it.
+
+#include <algorithm>
+#include <vector>
+
+#include "fusion/methods/vertex_kernel.hpp"
+#include "fusion/parameter_schema.hpp"
+#include "fusion/statistics/temperature_statistics.hpp"
+
+namespace spectra::fusion::methods {
+namespace {
+
+enum class Ties { Index, All };
+
+struct HistogramBin {
+  std::int64_t bins = 64;
+  std::int64_t n = 8;
+  double alpha = 1;
+  bool invert = false;
+  Ties ties = Ties::Index;
+};
+
+ParameterSchema<HistogramBin> schema() {
+  ParameterSchema<HistogramBin> entries;
+  entries
+      .integer(&HistogramBin::bins, {.name = "bins",
+                                     .label = "Bins",
+                                     .help = "How many equal bins divide the temperatures of the scene.",
+                                     .min = 1,
+                                     .max = 4096,
+                                     .step = 1})
+      .integer(&HistogramBin::n, {.name = "n",
+                                  .label = "Highlighted bins",
+                                  .help = "How many of the rarest bins are highlighted.",
+                                  .min = 0,
+                                  .max = 4096,
+                                  .step = 1})
+      .number(&HistogramBin::alpha, {.name = "alpha",
+                                     .label = "Opacity",
+                                     .help = "How much of the highlight covers the visible picture.",
+                                     .min = 0,
+                                     .max = 1,
+                                     .step = 0.01})
+      .toggle(&HistogramBin::invert,
+              {.name = "invert", .label = "Invert", .help = "Highlights the most frequent bins instead of the rarest."})
+      .choice(&HistogramBin::ties,
+              {.name = "ties",
+               .label = "Equal counts",
+               .help = "Whether of bins with equal counts the coldest come first, or all of them are highlighted.",
+               .options = {"index", "all"}});
+  return entries;
+}
+
+/// For every bin whether it is highlighted.
+std::vector<std::uint8_t> highlighted_bins(const HistogramBin& params, const std::vector<std::uint64_t>& counts) {
+  std::vector<std::size_t> order;
+  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
+    if (counts[bin] > 0) order.push_back(bin);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return params.invert ? counts[a] > counts[b] : counts[a] < counts[b];
+  });
+  std::size_t chosen = std::min(order.size(), static_cast<std::size_t>(params.n));
+  if (params.ties == Ties::All && chosen > 0) {
+    const std::uint64_t last = counts[order[chosen - 1]];
+    while (chosen < order.size() && counts[order[chosen]] == last) ++chosen;
+  }
+  std::vector<std::uint8_t> flags(counts.size(), 0);
+  for (std::size_t i = 0; i < chosen; ++i) flags[order[i]] = 1;
+  return flags;
+}
+
+std::vector<TemperatureInterval> intervals(const std::vector<std::uint8_t>& flags, const Histogram& histogram) {
+  std::vector<TemperatureInterval> result;
+  for (std::size_t bin = 0; bin < flags.size(); ++bin) {
+    if (!flags[bin]) continue;
+    std::size_t end = bin + 1;
+    while (end < flags.size() && flags[end]) ++end;
+    result.push_back({histogram_edge(histogram, bin), histogram_edge(histogram, end)});
+    bin = end;
+  }
+  return result;
+}
+
+PreparedMethod prepare(const HistogramBin& params, const MethodContext& context) {
+  Histogram histogram;
+  if (context.scene.summary.has_temperature() && context.scene.histogram) {
+    histogram = context.scene.histogram(static_cast<std::uint32_t>(params.bins));
+  }
+  histogram.counts.resize(static_cast<std::size_t>(params.bins));
+  std::vector<std::uint8_t> flags = highlighted_bins(params, histogram.counts);
+  std::vector<TemperatureInterval> highlighted = intervals(flags, histogram);
+  const auto shade = [thermal = ThermalColour(context), alpha = params.alpha, flags = std::move(flags),
+                      bin = HistogramBinning(histogram)](const Vertex& vertex) -> Colour {
+    if (!flags[bin(vertex.temperature_celsius)]) return vertex.visible;
+    return mixed(alpha, thermal(double{vertex.temperature_celsius}), vertex.visible);
+  };
+  return {vertex_kernel(shade, context.missing), std::move(highlighted)};
+}
+
+}  // namespace
+
+Method histogram_bin() {
+  Method method;
+  method.id = "histogram_bin";
+  method.label = "Histogram bins";
+  method.summary = "The rarest temperatures of the scene show palette colours; the rest stays visible.";
+  return make_method(std::move(method), schema(), &prepare);
+}
+
+}  // namespace spectra::fusion::methods

@@ -1,0 +1,78 @@
+// Histogram distribution: temperatures far from the scene's mean stand out in palette colours.
+//
+//   F = alpha M + (1 - alpha) V   where T < mu - k sigma or T > mu + k sigma, else V
+//   inverted: in the closed inside instead; sigma = 0 highlights nothing
+//
+// Source: Eqs. 13-14 with the population mean and sigma of the data. Cost: two comparisons, a palette lookup and a mix.
+// Missing temperature: the visible colour, or the fixed colour that is set for it.
+
+#include "fusion/methods/vertex_kernel.hpp"
+#include "fusion/parameter_schema.hpp"
+
+namespace spectra::fusion::methods {
+namespace {
+
+struct Distribution {
+  double k = 1;
+  double alpha = 1;
+  bool invert = false;
+};
+
+ParameterSchema<Distribution> schema() {
+  ParameterSchema<Distribution> entries;
+  entries
+      .number(&Distribution::k, {.name = "k",
+                                 .label = "Deviations",
+                                 .help = "How many standard deviations from the mean count as ordinary.",
+                                 .min = 0,
+                                 .max = 10,
+                                 .step = 0.1})
+      .number(&Distribution::alpha, {.name = "alpha",
+                                     .label = "Opacity",
+                                     .help = "How much of the highlight covers the visible picture.",
+                                     .min = 0,
+                                     .max = 1,
+                                     .step = 0.01})
+      .toggle(&Distribution::invert, {.name = "invert",
+                                      .label = "Invert",
+                                      .help = "Highlights the ordinary temperatures instead of the unusual ones."});
+  return entries;
+}
+
+PreparedMethod prepare(const Distribution& params, const MethodContext& context) {
+  const TemperatureSummary& data = context.scene.summary;
+  const double lower = data.mean - params.k * data.sigma;
+  const double upper = data.mean + params.k * data.sigma;
+  const bool spread = data.sigma > 0;
+  const auto shade = [thermal = ThermalColour(context), alpha = params.alpha, invert = params.invert, spread,
+                      first_inside = smallest_at_least(lower),
+                      last_inside = largest_at_most(upper)](const Vertex& vertex) -> Colour {
+    const float t = vertex.temperature_celsius;
+    const bool inside = t >= first_inside && t <= last_inside;
+    if (!spread || inside != invert) return vertex.visible;
+    return mixed(alpha, thermal(double{t}), vertex.visible);
+  };
+
+  std::vector<TemperatureInterval> highlighted;
+  const double minimum = double{data.minimum};
+  const double maximum = double{data.maximum};
+  if (spread && params.invert) {
+    highlighted.push_back({std::max(lower, minimum), std::min(upper, maximum)});
+  } else if (spread) {
+    if (minimum < lower) highlighted.push_back({minimum, lower});
+    if (maximum > upper) highlighted.push_back({upper, maximum});
+  }
+  return {vertex_kernel(shade, context.missing), std::move(highlighted)};
+}
+
+}  // namespace
+
+Method histogram_distribution() {
+  Method method;
+  method.id = "histogram_distribution";
+  method.label = "Histogram distribution";
+  method.summary = "Temperatures far from the scene's mean show palette colours; the rest stays visible.";
+  return make_method(std::move(method), schema(), &prepare);
+}
+
+}  // namespace spectra::fusion::methods

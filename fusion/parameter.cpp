@@ -1,0 +1,162 @@
+#include "fusion/parameter.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+namespace spectra::fusion {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// The shortest text that reads back as the same number.
+std::string shown(double value) {
+  char buffer[32];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value);
+  return {buffer, end.ptr};
+}
+
+std::string shown(const ParameterValue& value) {
+  struct Visitor {
+    std::string operator()(Automatic) const { return "null"; }
+    std::string operator()(double number) const { return shown(number); }
+    std::string operator()(std::int64_t integer) const { return std::to_string(integer); }
+    std::string operator()(bool toggle) const { return toggle ? "true" : "false"; }
+    std::string operator()(const std::string& text) const { return "'" + text + "'"; }
+  };
+  return std::visit(Visitor{}, value);
+}
+
+/// What the parameter takes, as words that follow "must be".
+std::string expectation(const Parameter& parameter) {
+  switch (parameter.kind) {
+    case ParameterKind::Toggle:
+      return "true or false";
+    case ParameterKind::Choice: {
+      std::string text = "one of";
+      for (const std::string& option : parameter.options) text += " '" + option + "'";
+      return text;
+    }
+    case ParameterKind::Temperature:
+      return "a finite temperature in degC, or null for automatic";
+    case ParameterKind::Number:
+    case ParameterKind::Integer:
+      break;
+  }
+  std::string text = parameter.kind == ParameterKind::Integer ? "a whole number" : "a finite number";
+  const bool exclusive = parameter.exclusive_min >= parameter.min && parameter.exclusive_min > -kInfinity;
+  if (exclusive) {
+    text += " above " + shown(parameter.exclusive_min);
+  } else if (parameter.min > -kInfinity) {
+    text += " of at least " + shown(parameter.min);
+  }
+  if (parameter.max < kInfinity) {
+    if (exclusive || parameter.min > -kInfinity) text += " and";
+    text += " of at most " + shown(parameter.max);
+  }
+  return text;
+}
+
+auto refused(ErrorCode code, const Parameter& parameter, const std::string& given) {
+  return failure(code, parameter.name + " must be " + expectation(parameter) + ", not " + given, parameter.name);
+}
+
+/// The value as a number if it is one.
+std::optional<double> number_in(const ParameterValue& value) {
+  if (const auto* number = std::get_if<double>(&value)) return *number;
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return static_cast<double>(*integer);
+  return std::nullopt;
+}
+
+bool within_bounds(const Parameter& parameter, double number) {
+  return number >= parameter.min && number <= parameter.max && number > parameter.exclusive_min;
+}
+
+}  // namespace
+
+std::string_view to_string(ParameterKind kind) {
+  switch (kind) {
+    case ParameterKind::Number:
+      return "number";
+    case ParameterKind::Integer:
+      return "integer";
+    case ParameterKind::Toggle:
+      return "toggle";
+    case ParameterKind::Choice:
+      return "choice";
+    case ParameterKind::Temperature:
+      return "temperature";
+  }
+  return "";
+}
+
+Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value) {
+  const std::optional<double> number = number_in(value);
+  switch (parameter.kind) {
+    case ParameterKind::Toggle:
+      if (std::holds_alternative<bool>(value)) return value;
+      break;
+    case ParameterKind::Choice:
+      if (const auto* option = std::get_if<std::string>(&value)) {
+        if (std::find(parameter.options.begin(), parameter.options.end(), *option) != parameter.options.end()) {
+          return value;
+        }
+        return refused(ErrorCode::OutOfRange, parameter, shown(value));
+      }
+      break;
+    case ParameterKind::Temperature:
+      if (std::holds_alternative<Automatic>(value)) return value;
+      [[fallthrough]];
+    case ParameterKind::Number:
+      if (number) {
+        if (!std::isfinite(*number) || !within_bounds(parameter, *number)) {
+          return refused(ErrorCode::OutOfRange, parameter, shown(value));
+        }
+        // Adding zero turns -0 into 0, so that equal settings are equal in every bit.
+        return ParameterValue{*number + 0.0};
+      }
+      break;
+    case ParameterKind::Integer:
+      if (number) {
+        if (!std::isfinite(*number)) return refused(ErrorCode::OutOfRange, parameter, shown(value));
+        if (*number != std::floor(*number)) return refused(ErrorCode::WrongType, parameter, shown(value));
+        // Above 2^53 a double no longer tells whole numbers apart; no parameter goes there.
+        if (!within_bounds(parameter, *number) || std::abs(*number) > 9007199254740992.0) {
+          return refused(ErrorCode::OutOfRange, parameter, shown(value));
+        }
+        return ParameterValue{static_cast<std::int64_t>(*number)};
+      }
+      break;
+  }
+  return refused(ErrorCode::WrongType, parameter, shown(value));
+}
+
+Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text) {
+  const std::string given = "'" + std::string(text) + "'";
+  switch (parameter.kind) {
+    case ParameterKind::Toggle:
+      if (text == "true" || text == "1" || text == "on" || text == "yes") return ParameterValue{true};
+      if (text == "false" || text == "0" || text == "off" || text == "no") return ParameterValue{false};
+      return refused(ErrorCode::WrongType, parameter, given);
+    case ParameterKind::Choice:
+      return validated(parameter, ParameterValue{std::string(text)});
+    case ParameterKind::Temperature:
+      if (text == "null" || text == "auto") return ParameterValue{Automatic{}};
+      [[fallthrough]];
+    case ParameterKind::Number:
+    case ParameterKind::Integer:
+      break;
+  }
+  std::string_view digits = text;
+  if (digits.starts_with('+')) digits.remove_prefix(1);
+  double number = 0;
+  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (status == std::errc::result_out_of_range) return refused(ErrorCode::OutOfRange, parameter, given);
+  if (status != std::errc{} || end != digits.data() + digits.size() || digits.starts_with("+")) {
+    return refused(ErrorCode::WrongType, parameter, given);
+  }
+  return validated(parameter, ParameterValue{number});
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fusion/method.hpp"
+
+namespace spectra::fusion {
+
+/// Binds the members of a method's parameter struct to their schema entries. The member initialisers of Params are
+/// the defaults; an entry adds name, label, help, bounds and unit. Used by the methods only.
+template <std::default_initializable Params>
+class ParameterSchema {
+ public:
+  ParameterSchema& number(double Params::*member, Parameter entry) {
+    entry.kind = ParameterKind::Number;
+    return bind<double>(member, std::move(entry));
+  }
+  ParameterSchema& integer(std::int64_t Params::*member, Parameter entry) {
+    entry.kind = ParameterKind::Integer;
+    return bind<std::int64_t>(member, std::move(entry));
+  }
+  ParameterSchema& toggle(bool Params::*member, Parameter entry) {
+    entry.kind = ParameterKind::Toggle;
+    return bind<bool>(member, std::move(entry));
+  }
+
+  /// The enumerators of Enum are numbered from 0 in the order of entry.options.
+  template <class Enum>
+  ParameterSchema& choice(Enum Params::*member, Parameter entry) {
+    entry.kind = ParameterKind::Choice;
+    entry.default_value = entry.options.at(static_cast<std::size_t>(Params{}.*member));
+    const std::vector<std::string> options = entry.options;
+    return add(std::move(entry), [member, options](Params& params, const ParameterValue& value) {
+      const std::string& option = std::get<std::string>(value);
+      for (std::size_t i = 0; i < options.size(); ++i) {
+        if (options[i] == option) params.*member = static_cast<Enum>(i);
+      }
+    });
+  }
+
+  /// A temperature; nullopt = automatic, which is range_minimum + part(params) * (range_maximum - range_minimum).
+  ParameterSchema& temperature(std::optional<double> Params::*member, Parameter entry,
+                               std::function<double(const Params&)> part) {
+    entry.kind = ParameterKind::Temperature;
+    entry.unit = "degC";
+    entry.default_value = Automatic{};
+    automatic_.push_back({entry.name, std::move(part)});
+    return add(std::move(entry), [member](Params& params, const ParameterValue& value) {
+      const auto* number = std::get_if<double>(&value);
+      params.*member = number ? std::optional<double>(*number) : std::nullopt;
+    });
+  }
+
+  const std::vector<Parameter>& entries() const { return entries_; }
+
+  /// The values as a struct; they are complete and valid.
+  Params read(const ParameterValues& values) const {
+    Params params;
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      const auto found = values.find(entries_[i].name);
+      if (found != values.end()) assign_[i](params, found->second);
+    }
+    return params;
+  }
+
+  ParameterValues resolve(ParameterValues values, double range_minimum, double range_maximum) const {
+    const Params params = read(values);
+    for (const auto& [name, part] : automatic_) {
+      ParameterValue& value = values[name];
+      if (!std::holds_alternative<Automatic>(value)) continue;
+      // The two halves keep the span finite whatever the range.
+      value = range_minimum + 2 * (part(params) * (range_maximum / 2 - range_minimum / 2));
+    }
+    return values;
+  }
+
+ private:
+  using Assign = std::function<void(Params&, const ParameterValue&)>;
+
+  ParameterSchema& add(Parameter entry, Assign assign) {
+    entries_.push_back(std::move(entry));
+    assign_.push_back(std::move(assign));
+    return *this;
+  }
+
+  template <class Value>
+  ParameterSchema& bind(Value Params::*member, Parameter entry) {
+    entry.default_value = Params{}.*member;
+    return add(std::move(entry),
+               [member](Params& params, const ParameterValue& value) { params.*member = std::get<Value>(value); });
+  }
+
+  std::vector<Parameter> entries_;
+  std::vector<Assign> assign_;
+  std::vector<std::pair<std::string, std::function<double(const Params&)>>> automatic_;
+};
+
+/// A method from its description, its schema and the function that makes it ready.
+template <class Params>
+Method make_method(Method description, const ParameterSchema<Params>& schema,
+                   PreparedMethod (*prepare)(const Params&, const MethodContext&),
+                   Result<void> (*check)(const Params&) = nullptr) {
+  description.parameters = schema.entries();
+  description.check = [schema, check](const ParameterValues& values) -> Result<void> {
+    if (check) return check(schema.read(values));
+    return success();
+  };
+  description.resolve = [schema](const ParameterValues& values, double range_minimum, double range_maximum) {
+    return schema.resolve(values, range_minimum, range_maximum);
+  };
+  description.prepare = [schema, prepare](const ParameterValues& values, const MethodContext& context) {
+    return prepare(schema.read(values), context);
+  };
+  return description;
+}
+
+}  // namespace spectra::fusion

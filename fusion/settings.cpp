@@ -1,0 +1,142 @@
+#include "fusion/settings.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+#include "fusion/colour/palette.hpp"
+#include "fusion/registry.hpp"
+
+namespace spectra::fusion {
+namespace {
+
+ParameterValues defaults_of(const Method& method) {
+  ParameterValues values;
+  for (const Parameter& parameter : method.parameters) values[parameter.name] = parameter.default_value;
+  return values;
+}
+
+const Parameter* find_parameter(const Method& method, std::string_view name) {
+  for (const Parameter& parameter : method.parameters) {
+    if (parameter.name == name) return &parameter;
+  }
+  return nullptr;
+}
+
+std::string known_parameters(const Method& method) {
+  if (method.parameters.empty()) return "it has none";
+  std::string text = "it has";
+  for (const Parameter& parameter : method.parameters) text += " " + parameter.name;
+  return text;
+}
+
+std::string known_methods() {
+  std::string text;
+  for (const Method* method : all_methods()) text += " " + method->id;
+  return text;
+}
+
+std::string known_palettes() {
+  std::string text;
+  for (const Palette& palette : all_palettes()) text += " " + palette.id;
+  return text;
+}
+
+/// A double in hexadecimal: exact and short.
+std::string exact(double value) {
+  char buffer[40];
+  std::snprintf(buffer, sizeof buffer, "%a", value);
+  return buffer;
+}
+
+struct KeyText {
+  std::string operator()(Automatic) const { return "auto"; }
+  std::string operator()(double number) const { return exact(number); }
+  std::string operator()(std::int64_t integer) const { return std::to_string(integer); }
+  std::string operator()(bool toggle) const { return toggle ? "true" : "false"; }
+  std::string operator()(const std::string& text) const { return text; }
+};
+
+}  // namespace
+
+FusionSettings default_settings() {
+  FusionSettings settings;
+  settings.method = "thermal_visible_blend";
+  settings.params = defaults_of(*find_method(settings.method));
+  settings.palette = "iron";
+  return settings;
+}
+
+Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change) {
+  FusionSettings changed = settings;
+  if (change.method && *change.method != settings.method) {
+    const Method* method = find_method(*change.method);
+    if (!method) {
+      return failure(ErrorCode::UnknownMethod,
+                     "method '" + *change.method + "' is unknown; known are" + known_methods(), "method");
+    }
+    changed.method = method->id;
+    changed.params = defaults_of(*method);
+  }
+  const Method* method = find_method(changed.method);
+  if (!method) {
+    return failure(ErrorCode::UnknownMethod, "method '" + changed.method + "' is unknown; known are" + known_methods(),
+                   "method");
+  }
+  for (const auto& [name, value] : change.params) {
+    const Parameter* parameter = find_parameter(*method, name);
+    if (!parameter) {
+      return failure(ErrorCode::UnknownParameter,
+                     "method " + method->id + " has no parameter '" + name + "'; " + known_parameters(*method), name);
+    }
+    BOOST_OUTCOME_TRY(changed.params[name], validated(*parameter, value));
+  }
+  BOOST_OUTCOME_TRYV(method->check(changed.params));
+
+  if (change.palette) {
+    const Palette* palette = find_palette(*change.palette);
+    if (!palette) {
+      return failure(ErrorCode::UnknownPalette,
+                     "palette '" + *change.palette + "' is unknown; known are" + known_palettes(), "palette");
+    }
+    changed.palette = palette->id;
+  }
+  if (change.range) {
+    const RangeSetting& range = *change.range;
+    if (range.automatic) {
+      changed.range = RangeSetting{};
+    } else {
+      if (!std::isfinite(range.minimum_celsius) || !std::isfinite(range.maximum_celsius)) {
+        return failure(ErrorCode::OutOfRange, "range must have a finite minimum and maximum in degC", "range");
+      }
+      if (range.minimum_celsius > range.maximum_celsius) {
+        return failure(ErrorCode::Inconsistent, "range must have its minimum at or below its maximum", "range");
+      }
+      changed.range = {false, range.minimum_celsius + 0.0, range.maximum_celsius + 0.0};
+    }
+  }
+  if (change.missing) changed.missing = *change.missing;
+  return changed;
+}
+
+std::string cache_key(const FusionSettings& settings) {
+  std::string key = settings.method;
+  for (const auto& [name, value] : settings.params) key += ";" + name + "=" + std::visit(KeyText{}, value);
+  key += ";palette=" + settings.palette + ";range=";
+  if (settings.range.automatic) {
+    key += "auto";
+  } else {
+    key += exact(settings.range.minimum_celsius) + ":" + exact(settings.range.maximum_celsius);
+  }
+  key += ";missing=";
+  if (const MissingDisplay& missing = settings.missing) {
+    char buffer[8];
+    std::snprintf(buffer, sizeof buffer, "%02x%02x%02x", unsigned{missing->r}, unsigned{missing->g},
+                  unsigned{missing->b});
+    key += buffer;
+  } else {
+    key += "visible";
+  }
+  return key;
+}
+
+}  // namespace spectra::fusion
