@@ -34,10 +34,11 @@ using Result = BOOST_OUTCOME_V2_NAMESPACE::basic_result<
     T, RpcError, BOOST_OUTCOME_V2_NAMESPACE::policy::throw_bad_result_access<RpcError, void>>;
 
 inline auto refusal(RpcErrorCode code, std::string message, std::string field = {}, std::string limits = {}) {
-  return BOOST_OUTCOME_V2_NAMESPACE::failure(
-      RpcError{code, std::move(message), std::move(field), std::move(limits)});
+  return BOOST_OUTCOME_V2_NAMESPACE::failure(RpcError{code, std::move(message), std::move(field), std::move(limits)});
 }
 
-inline auto success() { return BOOST_OUTCOME_V2_NAMESPACE::success(); }
+inline auto success() {
+  return BOOST_OUTCOME_V2_NAMESPACE::success();
+}
 
 }  // namespace spectra::protocol

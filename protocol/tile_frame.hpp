@@ -32,7 +32,7 @@ struct TileFrameHeader {
   std::array<float, 3> origin_m{};
   float position_step_m = 0;
   float geometric_error_m = 0;
-  float lowest_celsius = 0;   ///< NaN = none.
+  float lowest_celsius = 0;  ///< NaN = none.
   float highest_celsius = 0;
   std::uint32_t payload_size_bytes = 0;
 };
