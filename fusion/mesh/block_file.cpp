@@ -1,0 +1,87 @@
+#include "fusion/mesh/block_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+namespace spectra::fusion {
+
+Result<BlockFile> BlockFile::open(const std::filesystem::path& path) {
+  // O_NONBLOCK: opening a named pipe must not wait for a writer that never comes.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) {
+    const int error = errno;
+    const bool is_missing = error == ENOENT || error == ENOTDIR;
+    return failure(is_missing ? ErrorCode::FileNotFound : ErrorCode::FileUnreadable,
+                   is_missing ? "no such file" : "cannot be opened: " + std::generic_category().message(error));
+  }
+  struct stat facts {};
+  if (::fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode)) {
+    ::close(descriptor);
+    return failure(ErrorCode::FileUnreadable,
+                   S_ISDIR(facts.st_mode) ? "is a folder, not a file" : "is not a regular file");
+  }
+  ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_SEQUENTIAL);
+  return BlockFile(descriptor, static_cast<std::uint64_t>(facts.st_size));
+}
+
+BlockFile::BlockFile(int descriptor, std::uint64_t size_bytes)
+    : descriptor_(descriptor), size_bytes_(size_bytes), buffer_(kBufferBytes) {}
+
+BlockFile::~BlockFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+BlockFile::BlockFile(BlockFile&& other) noexcept {
+  *this = std::move(other);
+}
+
+BlockFile& BlockFile::operator=(BlockFile&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  std::swap(size_bytes_, other.size_bytes_);
+  std::swap(buffer_position_, other.buffer_position_);
+  std::swap(begin_, other.begin_);
+  std::swap(end_, other.end_);
+  std::swap(read_error_, other.read_error_);
+  std::swap(buffer_, other.buffer_);
+  return *this;
+}
+
+void BlockFile::fill() {
+  std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_), buffer_.begin() + static_cast<std::ptrdiff_t>(end_),
+            buffer_.begin());
+  buffer_position_ += begin_;
+  end_ -= begin_;
+  begin_ = 0;
+  while (end_ < buffer_.size() && buffer_position_ + end_ < size_bytes_) {
+    const std::uint64_t wanted = std::min<std::uint64_t>(buffer_.size() - end_, size_bytes_ - buffer_position_ - end_);
+    const ssize_t count = ::pread(descriptor_, buffer_.data() + end_, static_cast<std::size_t>(wanted),
+                                  static_cast<off_t>(buffer_position_ + end_));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) read_error_ = errno;
+    if (count <= 0) return;
+    end_ += static_cast<std::size_t>(count);
+  }
+}
+
+void BlockFile::skip(std::uint64_t count) {
+  if (count <= end_ - begin_) {
+    begin_ += static_cast<std::size_t>(count);
+  } else {
+    seek(position() + count);
+  }
+}
+
+void BlockFile::seek(std::uint64_t position) {
+  buffer_position_ = position;
+  begin_ = 0;
+  end_ = 0;
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "fusion/error.hpp"
+
+namespace spectra::fusion {
+
+/// Reads a regular file from front to back through one buffer of fixed size. A file that shrinks meanwhile only ends
+/// early (a mapped one would end the process).
+class BlockFile {
+ public:
+  /// The most that ready() can be asked for.
+  static constexpr std::size_t kBufferBytes = 512 * 1024;
+
+  /// FileNotFound, or FileUnreadable (also for what is not a regular file: its size would not bound anything).
+  static Result<BlockFile> open(const std::filesystem::path& path);
+  ~BlockFile();
+  BlockFile(BlockFile&& other) noexcept;
+  BlockFile& operator=(BlockFile&& other) noexcept;
+
+  /// As it was when the file was opened.
+  std::uint64_t size_bytes() const { return size_bytes_; }
+  /// Of the next byte that was not consumed.
+  std::uint64_t position() const { return buffer_position_ + begin_; }
+  std::uint64_t remaining() const { return size_bytes_ > position() ? size_bytes_ - position() : 0; }
+
+  /// The bytes from position() on that are in memory: at least `count` of them, or all there are to the end of the file
+  /// (or up to a read error, see read_error()). Valid until the next call.
+  std::span<const unsigned char> ready(std::size_t count) {
+    if (end_ - begin_ < count) fill();
+    return {buffer_.data() + begin_, end_ - begin_};
+  }
+
+  /// Moves on within what ready() gave.
+  void consume(std::size_t count) { begin_ += count; }
+  /// Moves on by any number of bytes, without reading them.
+  void skip(std::uint64_t count);
+  void seek(std::uint64_t position);
+
+  /// errno of the read that failed, or 0.
+  int read_error() const { return read_error_; }
+
+ private:
+  BlockFile(int descriptor, std::uint64_t size_bytes);
+  void fill();
+
+  int descriptor_ = -1;
+  std::uint64_t size_bytes_ = 0;
+  std::uint64_t buffer_position_ = 0;  ///< Where in the file the buffer begins.
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  int read_error_ = 0;
+  std::vector<unsigned char> buffer_;
+};
+
+}  // namespace spectra::fusion

@@ -1,0 +1,29 @@
+#include "fusion/mesh/scene_origin.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spectra::fusion {
+
+namespace {
+
+double axis_origin(double min, double max, double extent) {
+  if (std::max(std::abs(min), std::abs(max)) <= 2 * extent) return 0;
+  const double centre = min + (max - min) / 2;
+  if (extent == 0) return static_cast<double>(static_cast<float>(centre)) == centre ? 0 : centre;
+  int exponent = 0;
+  const double mantissa = std::frexp(extent, &exponent);
+  const double step = std::ldexp(1.0, mantissa == 0.5 ? exponent - 1 : exponent);
+  const double steps = std::round(centre / step);
+  // Beyond 2^53 every double is a multiple of the step already.
+  return std::abs(steps) < 0x1p53 ? steps * step : centre;
+}
+
+}  // namespace
+
+Vec3d scene_origin(const Vec3d& min, const Vec3d& max) {
+  const double extent = std::max({max.x - min.x, max.y - min.y, max.z - min.z});
+  return {axis_origin(min.x, max.x, extent), axis_origin(min.y, max.y, extent), axis_origin(min.z, max.z, extent)};
+}
+
+}  // namespace spectra::fusion
