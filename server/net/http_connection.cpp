@@ -1,0 +1,272 @@
+#include "server/net/http_connection.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/error.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/serializer.hpp>
+#include <boost/beast/http/span_body.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <exception>
+#include <utility>
+
+#include "server/net/websocket_session.hpp"
+
+namespace spectra::server {
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using boost::system::error_code;
+
+namespace {
+
+constexpr std::string_view kContentSecurityPolicy =
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'; "
+    "img-src 'self' data: blob:; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+constexpr std::string_view kNoWebClient =
+    "<!doctype html><meta charset=utf-8><title>Spectra</title><h1>Spectra</h1>"
+    "<p>The server runs, but its web client is not built. Build it with <code>npm ci &amp;&amp; npm run build</code> "
+    "in the folder <code>web</code>, or name a built one with <code>spectra serve --web DIR</code>, and load this page "
+    "again.</p>";
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+std::size_t count_of(const http::fields& fields, http::field name) {
+  const auto [begin, end] = fields.equal_range(name);
+  return static_cast<std::size_t>(std::distance(begin, end));
+}
+
+/// Where a handler leaves its answer; outlives both the connection and the handler.
+struct PendingReply {
+  explicit PendingReply(const asio::any_io_executor& executor)
+      : arrived(executor, asio::steady_timer::time_point::max()) {}
+  std::optional<HttpReply> reply;
+  asio::steady_timer arrived;
+};
+
+/// Posts the answer to the connection's strand; without one when the handler drops it.
+class ReplyOnce {
+ public:
+  explicit ReplyOnce(std::shared_ptr<PendingReply> pending) : pending_(std::move(pending)) {}
+  ~ReplyOnce() {
+    if (!is_done_) give(text_reply(503, "not answered\n"));
+  }
+  ReplyOnce(const ReplyOnce&) = delete;
+  ReplyOnce& operator=(const ReplyOnce&) = delete;
+
+  void give(HttpReply reply) {
+    is_done_ = true;
+    asio::post(pending_->arrived.get_executor(), [pending = pending_, reply = std::move(reply)]() mutable {
+      pending->reply = std::move(reply);
+      pending->arrived.cancel();
+    });
+  }
+
+ private:
+  std::shared_ptr<PendingReply> pending_;
+  bool is_done_ = false;
+};
+
+}  // namespace
+
+HttpConnection::HttpConnection(ConnectionStream stream, ServerContext& context)
+    : stream_(std::move(stream)), context_(context), buffer_(64 * 1024) {}
+
+asio::awaitable<void> HttpConnection::run() {
+  const auto self = shared_from_this();
+  error_code error;
+  local_address_ = stream_.socket().local_endpoint(error).address().to_string();
+  context_.metrics.connections_open += 1;
+  if (context_.add(self)) {
+    try {
+      while (co_await serve_one()) {
+      }
+    } catch (const std::exception& failure) {
+      spdlog::error("a connection failed: {}", failure.what());
+    }
+    context_.remove(this);
+  }
+  stream_.close();
+  context_.metrics.connections_open -= 1;
+}
+
+asio::awaitable<bool> HttpConnection::serve_one() {
+  const NetLimits& limits = context_.options.limits;
+  http::request_parser<http::string_body> parser;
+  parser.header_limit(static_cast<std::uint32_t>(limits.header_size_bytes));
+  parser.body_limit(limits.body_size_bytes);
+
+  stream_.expires_after(limits.header_timeout);
+  is_waiting_for_request_ = true;
+  auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
+  is_waiting_for_request_ = false;
+  if (is_stopping_) co_return false;
+  const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
+  if (!error && is_read_method && !parser.is_done()) {
+    std::tie(error, size) = co_await http::async_read(stream_, buffer_, parser, kAwait);
+  }
+  const bool is_syntax_error = error.category() == http::make_error_code(http::error::bad_method).category() &&
+                               error != http::error::end_of_stream && error != http::error::partial_message;
+  if (error && !is_syntax_error) co_return false;
+  context_.metrics.requests += 1;
+  if (error) {
+    context_.metrics.requests_refused += 1;
+    const unsigned status = error == http::error::header_limit || error == http::error::buffer_overflow ? 431U
+                            : error == http::error::body_limit                                          ? 413U
+                                                                                                        : 400U;
+    co_return co_await write(text_reply(status, error.message() + "\n"), 11, false, false);
+  }
+
+  const Request request = parser.release();
+  const bool is_head = request.method() == http::verb::head;
+  if (auto refused = refusal_of(request)) {
+    context_.metrics.requests_refused += 1;
+    co_return co_await write(*refused, request.version(), is_head, request.keep_alive() && is_read_method);
+  }
+  auto target = *parsed_target(view(request.target()));
+
+  if (target.path == "/ws") {
+    if (auto refused = upgrade_refusal_of(request)) {
+      context_.metrics.requests_refused += 1;
+      co_return co_await write(*refused, request.version(), is_head, false);
+    }
+    const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_);
+    context_.remove(this);
+    co_await session->run(request);
+    co_return false;
+  }
+
+  const HttpRequest checked{std::move(target), std::string(view(request[http::field::if_none_match]))};
+  const HttpReply reply = co_await answer(checked);
+  co_return co_await write(reply, request.version(), is_head, request.keep_alive() && !is_stopping_);
+}
+
+std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) const {
+  if (count_of(request, http::field::host) != 1) return text_reply(400, "exactly one Host header is required\n");
+  const auto host = view(request[http::field::host]);
+  if (!context_.hosts.allows_host(host, local_address_)) {
+    return text_reply(403, "this server does not answer to that host name; see --allow-host\n");
+  }
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    auto reply = text_reply(405, "only GET and HEAD\n");
+    reply.headers.emplace_back("Allow", "GET, HEAD");
+    return reply;
+  }
+  if (!parsed_target(view(request.target()))) return text_reply(400, "bad request target\n");
+  return std::nullopt;
+}
+
+std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request) const {
+  if (!beast::websocket::is_upgrade(request)) {
+    auto reply = text_reply(426, "a WebSocket upgrade with subprotocol spectra.v1 is required\n");
+    reply.headers.emplace_back("Upgrade", "websocket");
+    return reply;
+  }
+  const auto origins = count_of(request, http::field::origin);
+  if (origins > 1 ||
+      (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
+    return text_reply(403, "pages of that origin may not connect; see --allow-host\n");
+  }
+  const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
+  for (auto it = begin; it != end; ++it) {
+    for (const auto& offered : http::token_list(it->value())) {
+      if (offered == "spectra.v1") return std::nullopt;
+    }
+  }
+  return text_reply(400, "the subprotocol spectra.v1 is required\n");
+}
+
+HttpReply HttpConnection::static_reply(const HttpRequest& request) const {
+  const std::string& path = request.target.path;
+  const auto file = context_.files.find(path);
+  if (!file) {
+    if (path == "/") return text_reply(200, std::string(kNoWebClient), "text/html; charset=utf-8");
+    return text_reply(404, "not found\n");
+  }
+  HttpReply reply;
+  reply.headers = {{"ETag", file->etag},
+                   {"Cache-Control", file->immutable ? "public, max-age=31536000, immutable" : "no-cache"}};
+  if (request.if_none_match == file->etag) {
+    reply.status = 304;
+    return reply;
+  }
+  reply.content_type = file->content_type;
+  reply.body = std::shared_ptr<const std::string>(file, &file->content);
+  return reply;
+}
+
+asio::awaitable<HttpReply> HttpConnection::answer(const HttpRequest& request) {
+  const auto& path = request.target.path;
+  const bool is_ours = path.starts_with("/api/") || path == "/healthz" || path == "/readyz" || path == "/metrics";
+  if (!is_ours) co_return static_reply(request);
+
+  const auto pending = std::make_shared<PendingReply>(stream_.get_executor());
+  {
+    const auto once = std::make_shared<ReplyOnce>(pending);
+    context_.http(request, [once](HttpReply reply) { once->give(std::move(reply)); });
+  }
+  while (!pending->reply) co_await pending->arrived.async_wait(kAwait);
+  co_return std::move(*pending->reply);
+}
+
+asio::awaitable<bool> HttpConnection::write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive) {
+  static const std::string kEmpty;
+  const std::string& body = reply.body ? *reply.body : kEmpty;
+  http::response<http::span_body<const char>> response;
+  response.version(version);
+  response.result(reply.status);
+  response.set(http::field::server, "Spectra");
+  if (reply.status != 304) response.set(http::field::content_type, reply.content_type);
+  response.set("Content-Security-Policy", kContentSecurityPolicy);
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set("Referrer-Policy", "no-referrer");
+  response.set("Cross-Origin-Resource-Policy", "same-origin");
+  for (const auto& [name, value] : reply.headers) response.set(name, value);
+  if (response.count(http::field::cache_control) == 0) response.set(http::field::cache_control, "no-store");
+  response.keep_alive(keep_alive);
+  if (reply.status != 304) response.content_length(body.size());
+  if (!is_head && reply.status != 304) response.body() = {body.data(), body.size()};
+
+  http::response_serializer<http::span_body<const char>> serializer(response);
+  serializer.split(is_head || reply.status == 304);
+  while (is_head || reply.status == 304 ? !serializer.is_header_done() : !serializer.is_done()) {
+    stream_.expires_after(context_.options.limits.write_timeout);
+    const auto [error, size] = co_await http::async_write_some(stream_, serializer, kAwait);
+    if (error) co_return false;
+  }
+  if (!keep_alive) {
+    error_code ignored;
+    stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+    // Reading what is still coming lets the peer see the answer instead of a reset.
+    stream_.expires_after(context_.options.limits.close_timeout);
+    std::array<char, 4096> rest;
+    std::size_t drained = 0;
+    while (drained < context_.options.limits.body_size_bytes) {
+      const auto [error, size] = co_await stream_.async_read_some(asio::buffer(rest), kAwait);
+      if (error) break;
+      drained += size;
+    }
+  }
+  co_return keep_alive;
+}
+
+void HttpConnection::begin_stop() {
+  asio::post(stream_.get_executor(), [self = shared_from_this()] {
+    self->is_stopping_ = true;
+    if (self->is_waiting_for_request_) self->stream_.cancel();
+  });
+}
+
+void HttpConnection::cut() {
+  asio::post(stream_.get_executor(), [self = shared_from_this()] { self->stream_.close(); });
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <memory>
+#include <string>
+
+#include "server/net/connection_stream.hpp"
+#include "server/net/server_context.hpp"
+
+namespace spectra::server {
+
+/// One TCP connection from its first byte: checks every request, answers HTTP, and hands an upgrade of /ws over to a
+/// WebSocketSession. Runs on its strand.
+class HttpConnection final : public Stoppable, public std::enable_shared_from_this<HttpConnection> {
+ public:
+  /// `stream` is connected and its executor is a strand.
+  HttpConnection(ConnectionStream stream, ServerContext& context);
+
+  boost::asio::awaitable<void> run();
+
+  void begin_stop() override;
+  void cut() override;
+
+ private:
+  using Request = boost::beast::http::request<boost::beast::http::string_body>;
+
+  boost::asio::awaitable<bool> serve_one();
+  boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
+  boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
+  HttpReply static_reply(const HttpRequest& request) const;
+  /// Why the request is refused before anything looks at what it asks for.
+  std::optional<HttpReply> refusal_of(const Request& request) const;
+  std::optional<HttpReply> upgrade_refusal_of(const Request& request) const;
+
+  ConnectionStream stream_;
+  ServerContext& context_;
+  boost::beast::flat_buffer buffer_;
+  std::string local_address_;
+  bool is_stopping_ = false;
+  bool is_waiting_for_request_ = false;
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,266 @@
+#include "server/net/http_server.hpp"
+
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <spdlog/spdlog.h>
+#include <sys/socket.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <charconv>
+#include <csignal>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "server/net/connection_stream.hpp"
+#include "server/net/http_connection.hpp"
+#include "server/net/server_context.hpp"
+#include "server/net/static_files.hpp"
+
+namespace spectra::server {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+namespace {
+
+/// Unsent bytes the kernel may hold for a connection: more would only age there.
+constexpr int kNotSentLowWaterBytes = 16 * 1024;
+/// How long sent bytes may stay unacknowledged before the kernel gives a connection up.
+constexpr int kUserTimeoutMs = 20'000;
+/// How often the staged stop looks whether everybody has gone.
+constexpr std::chrono::milliseconds kStopPoll{20};
+
+std::string url_of(const asio::ip::address& address, std::uint16_t port) {
+  const std::string host = address.is_v6() ? '[' + address.to_string() + ']' : address.to_string();
+  return "http://" + host + ':' + std::to_string(port) + '/';
+}
+
+/// The addresses of all interfaces that are up, loopback first; link-local IPv6 ones are left out, for no browser takes
+/// them without a zone.
+std::vector<asio::ip::address> interface_addresses(bool with_v6) {
+  std::vector<asio::ip::address> addresses;
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) return addresses;
+  for (const bool loopback : {true, false}) {
+    for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+      if (entry->ifa_addr == nullptr || (entry->ifa_flags & IFF_UP) == 0) continue;
+      if (((entry->ifa_flags & IFF_LOOPBACK) != 0) != loopback) continue;
+      const void* raw = entry->ifa_addr;
+      if (entry->ifa_addr->sa_family == AF_INET) {
+        addresses.push_back(asio::ip::address_v4(ntohl(static_cast<const sockaddr_in*>(raw)->sin_addr.s_addr)));
+      } else if (entry->ifa_addr->sa_family == AF_INET6 && with_v6) {
+        asio::ip::address_v6::bytes_type bytes;
+        const auto& from = static_cast<const sockaddr_in6*>(raw)->sin6_addr.s6_addr;
+        std::copy(std::begin(from), std::end(from), bytes.begin());
+        const asio::ip::address_v6 address(bytes);
+        if (!address.is_link_local()) addresses.push_back(address);
+      }
+    }
+  }
+  freeifaddrs(list);
+  return addresses;
+}
+
+bool is_shortage(const error_code& error) {
+  return error == asio::error::no_descriptors || error == asio::error::no_memory ||
+         error == asio::error::no_buffer_space || error.value() == ENFILE;
+}
+
+void set_socket_options(tcp::socket& socket) {
+  error_code ignored;
+  socket.set_option(tcp::no_delay(true), ignored);
+  const int descriptor = socket.native_handle();
+  setsockopt(descriptor, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kNotSentLowWaterBytes, sizeof kNotSentLowWaterBytes);
+  setsockopt(descriptor, IPPROTO_TCP, TCP_USER_TIMEOUT, &kUserTimeoutMs, sizeof kUserTimeoutMs);
+}
+
+}  // namespace
+
+std::optional<ListenAddress> parsed_listen_address(std::string_view text) {
+  const auto colon = text.rfind(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  std::string_view host = text.substr(0, colon);
+  const std::string_view port_text = text.substr(colon + 1);
+  const bool is_bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
+  if (is_bracketed) host = host.substr(1, host.size() - 2);
+  if (host == "localhost") host = "127.0.0.1";
+  error_code error;
+  const auto address = asio::ip::make_address(std::string(host), error);
+  if (error || address.is_v6() != is_bracketed) return std::nullopt;
+  ListenAddress listen{address.to_string(), 0};
+  const auto [end, parse_error] = std::from_chars(port_text.data(), port_text.data() + port_text.size(), listen.port);
+  if (port_text.empty() || parse_error != std::errc{} || end != port_text.data() + port_text.size()) {
+    return std::nullopt;
+  }
+  return listen;
+}
+
+struct HttpServer::State {
+  State(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root)
+      : files(std::move(web_root)),
+        context(std::move(options), std::move(http), std::move(viewers), files, metrics),
+        io(static_cast<int>(context.options.io_thread_count)),
+        acceptor(asio::make_strand(io)),
+        accept_timer(acceptor.get_executor()),
+        signals(acceptor.get_executor()) {}
+
+  void listen();
+  asio::awaitable<void> accept_connections();
+  asio::awaitable<void> stop_in_stages();
+  void begin_stop();
+
+  NetMetrics metrics;
+  StaticFiles files;
+  ServerContext context;
+  asio::io_context io;
+  tcp::acceptor acceptor;
+  asio::steady_timer accept_timer;
+  asio::signal_set signals;
+  tcp::endpoint endpoint;
+  bool is_stopping = false;
+};
+
+void HttpServer::State::listen() {
+  const auto& options = context.options;
+  endpoint = {asio::ip::make_address(options.address), options.port};
+  error_code error;
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+  if (!error && endpoint.address().is_v6()) acceptor.set_option(asio::ip::v6_only(false), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
+  if (error) {
+    const std::string where = options.address + ':' + std::to_string(options.port);
+    if (error == asio::error::address_in_use) {
+      throw std::runtime_error("cannot listen on " + where + ": the port is in use; choose another with --listen");
+    }
+    throw std::runtime_error("cannot listen on " + where + ": " + error.message());
+  }
+  endpoint = acceptor.local_endpoint();
+  if (endpoint.address().is_unspecified()) {
+    for (const auto& address : interface_addresses(endpoint.address().is_v6())) {
+      context.hosts.add(address.to_string());
+    }
+  } else {
+    context.hosts.add(endpoint.address().to_string());
+  }
+  for (const auto& name : options.allowed_hosts) {
+    if (!context.hosts.add(name)) throw std::runtime_error("not a host name: " + name);
+  }
+}
+
+asio::awaitable<void> HttpServer::State::accept_connections() {
+  const NetLimits& limits = context.options.limits;
+  bool was_short = false;
+  while (!is_stopping) {
+    tcp::socket socket(asio::make_strand(io));
+    const auto [error] = co_await acceptor.async_accept(socket, kAwait);
+    if (is_stopping) co_return;
+    if (error) {
+      if (!is_shortage(error)) {
+        // The peer was gone before it was accepted; the next one is none the worse for it.
+        spdlog::debug("accept: {}", error.message());
+        continue;
+      }
+      metrics.accept_failures += 1;
+      if (!was_short) spdlog::warn("cannot accept connections for the moment: {}", error.message());
+      was_short = true;
+      accept_timer.expires_after(limits.accept_backoff);
+      co_await accept_timer.async_wait(kAwait);
+      continue;
+    }
+    was_short = false;
+    metrics.connections_accepted += 1;
+    if (metrics.connections_open >= static_cast<std::int64_t>(limits.max_connections)) {
+      metrics.connections_refused += 1;
+      continue;
+    }
+    set_socket_options(socket);
+    const auto executor = socket.get_executor();
+    const auto connection = std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), context);
+    asio::co_spawn(executor, connection->run(), asio::detached);
+  }
+}
+
+asio::awaitable<void> HttpServer::State::stop_in_stages() {
+  error_code ignored;
+  acceptor.close(ignored);
+  accept_timer.cancel();
+  signals.cancel(ignored);
+  for (const auto& connection : context.begin_stop()) connection->begin_stop();
+  const auto deadline = std::chrono::steady_clock::now() + context.options.limits.stop_timeout;
+  asio::steady_timer timer(acceptor.get_executor());
+  while (context.has_connections()) {
+    if (std::chrono::steady_clock::now() >= deadline) {
+      for (const auto& connection : context.connections()) connection->cut();
+      co_return;
+    }
+    timer.expires_after(kStopPoll);
+    co_await timer.async_wait(kAwait);
+  }
+}
+
+void HttpServer::State::begin_stop() {
+  if (std::exchange(is_stopping, true)) return;
+  asio::co_spawn(acceptor.get_executor(), stop_in_stages(), asio::detached);
+}
+
+HttpServer::HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory viewers,
+                       std::filesystem::path web_root)
+    : state_(std::make_unique<State>(std::move(options), std::move(http), std::move(viewers), std::move(web_root))) {
+  state_->listen();
+}
+
+HttpServer::~HttpServer() = default;
+
+void HttpServer::run() {
+  State& state = *state_;
+  if (state.context.options.stop_on_signals) {
+    state.signals.add(SIGINT);
+    state.signals.add(SIGTERM);
+    state.signals.async_wait([&state](const error_code& error, int) {
+      if (!error) state.begin_stop();
+    });
+  }
+  asio::co_spawn(state.acceptor.get_executor(), state.accept_connections(), asio::detached);
+  std::vector<std::jthread> threads;
+  for (unsigned i = 1; i < state.context.options.io_thread_count; ++i) {
+    threads.emplace_back([&state] { state.io.run(); });
+  }
+  state.io.run();
+}
+
+void HttpServer::stop() {
+  asio::post(state_->acceptor.get_executor(), [this] { state_->begin_stop(); });
+}
+
+std::uint16_t HttpServer::port() const {
+  return state_->endpoint.port();
+}
+
+std::vector<std::string> HttpServer::urls() const {
+  const auto& endpoint = state_->endpoint;
+  if (!endpoint.address().is_unspecified()) return {url_of(endpoint.address(), endpoint.port())};
+  std::vector<std::string> urls;
+  for (const auto& address : interface_addresses(endpoint.address().is_v6())) {
+    urls.push_back(url_of(address, endpoint.port()));
+  }
+  return urls;
+}
+
+const NetMetrics& HttpServer::metrics() const {
+  return state_->metrics;
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace spectra::server {
+
+/// What the network side counts, for /metrics. Written from the I/O threads, read from anywhere.
+struct NetMetrics {
+  std::atomic<std::uint64_t> connections_accepted{0};
+  std::atomic<std::int64_t> connections_open{0};
+  std::atomic<std::uint64_t> accept_failures{0};      ///< Descriptors or memory ran out.
+  std::atomic<std::uint64_t> connections_refused{0};  ///< Over max_connections.
+  std::atomic<std::uint64_t> requests{0};             ///< HTTP, upgrades included.
+  std::atomic<std::uint64_t> requests_refused{0};     ///< Answered with 4xx.
+  std::atomic<std::int64_t> viewers{0};               ///< WebSocket sessions now.
+  std::atomic<std::uint64_t> viewers_total{0};
+  std::atomic<std::uint64_t> viewers_cut{0};  ///< Ended by a deadline or a full queue.
+  std::atomic<std::uint64_t> messages_received{0};
+  std::atomic<std::uint64_t> messages_sent{0};
+  std::atomic<std::uint64_t> frames_sent{0};
+  std::atomic<std::uint64_t> frame_bytes_sent{0};
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace spectra::server {
+
+/// Every bound the network side keeps. The defaults are what is shipped; tests shorten the times.
+struct NetLimits {
+  std::size_t header_size_bytes = 8 * 1024;
+  std::size_t body_size_bytes = 1024 * 1024;
+  std::size_t message_size_bytes = 64 * 1024;     ///< One WebSocket message of a client.
+  std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
+  std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.
+  double messages_per_s = 2000;                   ///< Beyond it a session's reading pauses (back-pressure).
+  double requests_per_s = 300;                    ///< Beyond it requests are refused with Busy.
+  double message_burst_s = 2;                     ///< How many seconds' worth of either may come at once.
+  /// A request must be complete within this; the peer sees the end well within 10 s.
+  std::chrono::milliseconds header_timeout{9'500};
+  /// A write may stand still for this long; with two ticks more, within which it is noticed, that is 15 s.
+  std::chrono::milliseconds write_timeout{13'000};
+  std::chrono::milliseconds ping_interval{10'000};
+  std::chrono::milliseconds idle_timeout{120'000};  ///< Neither a byte read nor a byte written for this long.
+  std::chrono::milliseconds close_timeout{2'000};   ///< For the peer to answer a polite close.
+  std::chrono::milliseconds stop_timeout{4'000};    ///< From stop() until everything is cancelled.
+  std::chrono::milliseconds tick{1'000};            ///< How often a session looks at its deadlines.
+  std::chrono::milliseconds accept_backoff{100};    ///< Pause after the descriptors ran out.
+};
+
+/// Where and how to serve.
+struct NetOptions {
+  std::string address = "127.0.0.1";       ///< An IPv4 or IPv6 address.
+  std::uint16_t port = 8080;               ///< 0 picks a free one.
+  std::vector<std::string> allowed_hosts;  ///< Host names beside loopback and the addresses listened on.
+  unsigned io_thread_count = 1;
+  bool stop_on_signals = false;  ///< SIGINT and SIGTERM begin stop().
+  NetLimits limits;
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,73 @@
+#include "server/net/request_target.hpp"
+
+namespace spectra::server {
+namespace {
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::optional<std::string> percent_decoded(std::string_view text, bool plus_is_space) {
+  std::string decoded;
+  decoded.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    char c = text[i];
+    if (c == '%') {
+      if (i + 2 >= text.size()) return std::nullopt;
+      const int high = hex_digit(text[i + 1]);
+      const int low = hex_digit(text[i + 2]);
+      if (high < 0 || low < 0) return std::nullopt;
+      c = static_cast<char>(high * 16 + low);
+      i += 2;
+    } else if (c == '+' && plus_is_space) {
+      c = ' ';
+    }
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f) return std::nullopt;
+    decoded.push_back(c);
+  }
+  return decoded;
+}
+
+bool has_plain_segments(std::string_view path) {
+  std::size_t begin = 1;
+  while (begin <= path.size()) {
+    const auto end = std::min(path.find('/', begin), path.size());
+    const auto segment = path.substr(begin, end - begin);
+    if (segment == "." || segment == "..") return false;
+    if (segment.empty() && end != path.size()) return false;
+    begin = end + 1;
+  }
+  return path.find('\\') == std::string_view::npos;
+}
+
+}  // namespace
+
+std::optional<RequestTarget> parsed_target(std::string_view target) {
+  if (!target.starts_with('/')) return std::nullopt;
+  target = target.substr(0, target.find('#'));
+  const auto question = target.find('?');
+  auto path = percent_decoded(target.substr(0, question), false);
+  if (!path || !has_plain_segments(*path)) return std::nullopt;
+
+  RequestTarget parsed{std::move(*path), {}};
+  std::string_view rest = question == std::string_view::npos ? std::string_view{} : target.substr(question + 1);
+  while (!rest.empty()) {
+    const auto end = std::min(rest.find('&'), rest.size());
+    const auto item = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (item.empty()) continue;
+    const auto equals = item.find('=');
+    auto name = percent_decoded(item.substr(0, equals), true);
+    auto value = equals == std::string_view::npos ? std::optional(std::string{})
+                                                  : percent_decoded(item.substr(equals + 1), true);
+    if (!name || !value) return std::nullopt;
+    parsed.query.emplace_back(std::move(*name), std::move(*value));
+  }
+  return parsed;
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/net/host_list.hpp"
+#include "server/net/http_types.hpp"
+#include "server/net/net_metrics.hpp"
+#include "server/net/net_options.hpp"
+#include "server/net/static_files.hpp"
+#include "server/net/viewer_link.hpp"
+
+namespace spectra::server {
+
+/// A connection as the server's staged stop sees it; both are callable from any thread.
+class Stoppable {
+ public:
+  virtual ~Stoppable() = default;
+  /// Finish politely: no new request, a close frame to a viewer.
+  virtual void begin_stop() = 0;
+  /// Close the socket now.
+  virtual void cut() = 0;
+};
+
+/// What all connections of one server share. Outlives them.
+class ServerContext {
+ public:
+  ServerContext(NetOptions options_in, HttpHandler http_in, ViewerClientFactory viewers_in, StaticFiles& files_in,
+                NetMetrics& metrics_in)
+      : options(std::move(options_in)),
+        http(std::move(http_in)),
+        viewers(std::move(viewers_in)),
+        files(files_in),
+        metrics(metrics_in) {}
+
+  const NetOptions options;
+  const HttpHandler http;
+  const ViewerClientFactory viewers;
+  StaticFiles& files;
+  NetMetrics& metrics;
+  HostList hosts;
+
+  /// Registers a connection for the staged stop; false when the server is stopping already.
+  bool add(const std::shared_ptr<Stoppable>& connection) {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return false;
+    connections_.insert_or_assign(connection.get(), connection);
+    return true;
+  }
+
+  void remove(const Stoppable* connection) {
+    const std::lock_guard lock(mutex_);
+    connections_.erase(connection);
+  }
+
+  /// All live connections; from now on add() refuses further ones.
+  std::vector<std::shared_ptr<Stoppable>> begin_stop() {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    return live();
+  }
+
+  bool has_connections() {
+    const std::lock_guard lock(mutex_);
+    return !connections_.empty();
+  }
+
+  std::vector<std::shared_ptr<Stoppable>> connections() {
+    const std::lock_guard lock(mutex_);
+    return live();
+  }
+
+ private:
+  std::vector<std::shared_ptr<Stoppable>> live() const {
+    std::vector<std::shared_ptr<Stoppable>> alive;
+    for (const auto& [key, weak] : connections_) {
+      if (auto connection = weak.lock()) alive.push_back(std::move(connection));
+    }
+    return alive;
+  }
+
+  std::mutex mutex_;
+  bool stopping_ = false;
+  std::map<const Stoppable*, std::weak_ptr<Stoppable>> connections_;
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <algorithm>
+
+namespace spectra::server {
+
+/// Lets `rate_per_s` things through in the long run and `burst` at once. Time is handed in (seconds of a steady clock).
+class TokenBucket {
+ public:
+  TokenBucket(double rate_per_s, double burst) : rate_per_s_(rate_per_s), burst_(burst), tokens_(burst) {}
+
+  /// Takes one token; false when there is none.
+  bool take(double now_s) {
+    refill(now_s);
+    if (tokens_ < 1) return false;
+    tokens_ -= 1;
+    return true;
+  }
+
+  /// Seconds until take() succeeds; 0 = now.
+  double wait_s(double now_s) {
+    refill(now_s);
+    return tokens_ >= 1 ? 0 : (1 - tokens_) / rate_per_s_;
+  }
+
+ private:
+  void refill(double now_s) {
+    tokens_ = std::min(burst_, tokens_ + std::max(0.0, now_s - last_s_) * rate_per_s_);
+    last_s_ = now_s;
+  }
+
+  double rate_per_s_;
+  double burst_;
+  double tokens_;
+  double last_s_ = 0;
+};
+
+}  // namespace spectra::server

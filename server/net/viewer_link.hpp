@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/stream/viewer_stream.hpp"
+
+namespace spectra::server {
+
+/// The network's side of one viewer. Everything of a session runs on its strand, one thing at a time; what is callable
+/// from any thread says so.
+class ViewerPeer {
+ public:
+  virtual ~ViewerPeer() = default;
+
+  /// Runs `job` on the strand; from any thread. After the session has ended it is dropped.
+  virtual void post(std::function<void()> job) = 0;
+
+  /// The frame lane may have something: next_frame() is asked soon. From any thread.
+  virtual void wake() = 0;
+
+  /// Puts a JSON text on the control lane, which goes before frames and never loses anything; when it grows beyond its
+  /// bound the viewer is cut.
+  virtual void send(std::string text) = 0;
+
+  /// Round trip of the last answered ping, milliseconds; 0 before the first.
+  virtual double round_trip_ms() const = 0;
+
+  /// Bytes on the control lane that are not written yet.
+  virtual std::size_t queued_bytes() const = 0;
+};
+
+/// The application's side of one viewer; all calls are made on the session's strand.
+class ViewerClient {
+ public:
+  virtual ~ViewerClient() = default;
+  virtual void opened() = 0;
+  virtual void text_received(std::string_view text) = 0;
+  virtual void binary_received() = 0;
+  /// The frame lane: what to write next, or nothing now.
+  virtual std::optional<OutgoingFrame> next_frame() = 0;
+  /// Called about once a NetLimits::tick.
+  virtual void ticked() = 0;
+  /// The last call.
+  virtual void closed() = 0;
+};
+
+using ViewerClientFactory = std::function<std::shared_ptr<ViewerClient>(std::shared_ptr<ViewerPeer> peer)>;
+
+}  // namespace spectra::server

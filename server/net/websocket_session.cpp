@@ -1,0 +1,257 @@
+#include "server/net/websocket_session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <array>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/http/field.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <exception>
+#include <utility>
+
+namespace spectra::server {
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = boost::beast::websocket;
+using boost::system::error_code;
+
+WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context)
+    : ws_(std::move(stream)),
+      context_(context),
+      writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
+      minder_timer_(ws_.get_executor()),
+      reader_timer_(ws_.get_executor()),
+      messages_(context.options.limits.messages_per_s,
+                context.options.limits.messages_per_s * context.options.limits.message_burst_s) {}
+
+asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
+  using namespace asio::experimental::awaitable_operators;
+  const auto self = shared_from_this();
+  const NetLimits& limits = context_.options.limits;
+  beast::get_lowest_layer(ws_).expires_never();
+  // Beast's own idle timeout takes a slow reader for a dead one; mind_deadlines() watches progress instead.
+  websocket::stream_base::timeout timeouts{};
+  timeouts.handshake_timeout = limits.header_timeout;
+  timeouts.idle_timeout = websocket::stream_base::none();
+  timeouts.keep_alive_pings = false;
+  ws_.set_option(timeouts);
+  ws_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+    response.set(beast::http::field::sec_websocket_protocol, "spectra.v1");
+    response.set(beast::http::field::server, "Spectra");
+  }));
+  ws_.read_message_max(limits.message_size_bytes);
+  ws_.auto_fragment(false);
+  ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
+    if (kind == websocket::frame_type::pong && is_pinging_) {
+      is_pinging_ = false;
+      round_trip_ms_ = std::chrono::duration<double, std::milli>(Clock::now() - ping_sent_).count();
+    }
+  });
+
+  const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
+  if (accept_error || !context_.add(self)) {
+    beast::get_lowest_layer(ws_).close();
+    co_return;
+  }
+  is_open_ = true;
+  context_.metrics.viewers += 1;
+  context_.metrics.viewers_total += 1;
+  try {
+    client_ = context_.viewers(self);
+    client_->opened();
+    co_await (read_messages() && write_messages() && mind_deadlines());
+  } catch (const std::exception& error) {
+    spdlog::error("a viewer's session failed: {}", error.what());
+  }
+  end(false, "");
+  if (client_) client_->closed();
+  client_.reset();
+  context_.metrics.viewers -= 1;
+  context_.remove(this);
+}
+
+asio::awaitable<void> WebSocketSession::read_messages() {
+  beast::flat_buffer buffer;
+  while (!is_ended_) {
+    const auto [error, size] = co_await ws_.async_read(buffer, kAwait);
+    if (error) {
+      end(false, error.message());
+      co_return;
+    }
+    context_.metrics.messages_received += 1;
+    if (!closing_) {
+      if (ws_.got_binary()) {
+        client_->binary_received();
+      } else {
+        client_->text_received({static_cast<const char*>(buffer.data().data()), size});
+      }
+    }
+    buffer.consume(buffer.size());
+    // A flood is slowed down by not reading on; the kernel's window then holds the sender.
+    while (!messages_.take(steady_now_s()) && !is_ended_) {
+      reader_timer_.expires_after(
+          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(messages_.wait_s(steady_now_s()))));
+      co_await reader_timer_.async_wait(kAwait);
+    }
+  }
+}
+
+template <class Buffers>
+asio::awaitable<bool> WebSocketSession::write(Buffers buffers, bool is_text) {
+  ws_.text(is_text);
+  is_writing_ = true;
+  const auto [error, size] = co_await ws_.async_write(buffers, kAwait);
+  is_writing_ = false;
+  if (error) end(false, error.message());
+  co_return !error;
+}
+
+asio::awaitable<void> WebSocketSession::write_messages() {
+  while (!is_ended_) {
+    if (closing_) {
+      co_await ws_.async_close(*closing_, kAwait);
+      end(false, "closed by the server");
+      co_return;
+    }
+    if (!control_.empty()) {
+      const std::string text = std::move(control_.front());
+      control_.pop_front();
+      if (!co_await write(asio::buffer(text), true)) co_return;
+      control_bytes_ -= text.size();
+      context_.metrics.messages_sent += 1;
+      continue;
+    }
+    if (may_have_frame_) {
+      if (const auto frame = client_->next_frame()) {
+        const std::array<asio::const_buffer, 2> buffers{
+            asio::buffer(frame->header), frame->payload ? asio::buffer(*frame->payload) : asio::const_buffer{}};
+        if (!co_await write(buffers, false)) co_return;
+        context_.metrics.frames_sent += 1;
+        context_.metrics.frame_bytes_sent += frame->size_bytes();
+        continue;
+      }
+      may_have_frame_ = false;
+      continue;
+    }
+    writer_signal_.expires_at(Clock::time_point::max());
+    co_await writer_signal_.async_wait(kAwait);
+  }
+}
+
+asio::awaitable<void> WebSocketSession::mind_deadlines() {
+  const NetLimits& limits = context_.options.limits;
+  const auto& counted = beast::get_lowest_layer(ws_).rate_policy();
+  std::uint64_t written_bytes = 0;
+  std::uint64_t moved_bytes = 0;
+  auto last_write_progress = Clock::now();
+  auto last_move = Clock::now();
+  auto last_ping = Clock::now();
+  while (!is_ended_) {
+    minder_timer_.expires_after(limits.tick);
+    co_await minder_timer_.async_wait(kAwait);
+    if (is_ended_) co_return;
+    const auto now = Clock::now();
+    if (!is_writing_ || counted.written_bytes() != written_bytes) {
+      written_bytes = counted.written_bytes();
+      last_write_progress = now;
+    }
+    if (counted.read_bytes() + counted.written_bytes() != moved_bytes) {
+      moved_bytes = counted.read_bytes() + counted.written_bytes();
+      last_move = now;
+    }
+    if (now - last_write_progress >= limits.write_timeout) {
+      end(true, "it takes no bytes");
+    } else if (now - last_move >= limits.idle_timeout) {
+      end(true, "it is silent");
+    } else if (now >= close_deadline_) {
+      end(true, "it does not answer the close");
+    } else if (!closing_) {
+      client_->ticked();
+      if (!is_pinging_ && now - last_ping >= limits.ping_interval) {
+        last_ping = now;
+        is_pinging_ = true;
+        asio::co_spawn(ws_.get_executor(), ping(), asio::detached);
+      }
+    }
+  }
+}
+
+asio::awaitable<void> WebSocketSession::ping() {
+  const auto self = shared_from_this();
+  ping_sent_ = Clock::now();
+  co_await ws_.async_ping({}, kAwait);
+}
+
+void WebSocketSession::post(std::function<void()> job) {
+  asio::post(ws_.get_executor(), [self = shared_from_this(), job = std::move(job)] {
+    if (!self->is_open_ || self->is_ended_) return;
+    try {
+      job();
+    } catch (const std::exception& error) {
+      spdlog::error("a viewer's session failed: {}", error.what());
+      self->end(true, "of an internal error");
+    }
+  });
+}
+
+void WebSocketSession::wake() {
+  asio::post(ws_.get_executor(), [self = shared_from_this()] {
+    self->may_have_frame_ = true;
+    self->notify_writer();
+  });
+}
+
+void WebSocketSession::send(std::string text) {
+  if (is_ended_ || closing_) return;
+  control_bytes_ += text.size();
+  control_.push_back(std::move(text));
+  if (control_bytes_ > context_.options.limits.control_queue_bytes) {
+    context_.metrics.viewers_cut += 1;
+    close({websocket::close_code::policy_error, "messages to you pile up unread"});
+    return;
+  }
+  notify_writer();
+}
+
+void WebSocketSession::close(websocket::close_reason reason) {
+  if (closing_ || is_ended_) return;
+  closing_ = std::move(reason);
+  close_deadline_ = Clock::now() + context_.options.limits.close_timeout;
+  control_.clear();
+  notify_writer();
+}
+
+void WebSocketSession::end(bool is_cut, std::string_view why) {
+  if (is_ended_) return;
+  is_ended_ = true;
+  if (is_cut) {
+    context_.metrics.viewers_cut += 1;
+    spdlog::info("a viewer is cut: {}", why);
+  } else {
+    spdlog::debug("a viewer's session ended: {}", why);
+  }
+  beast::get_lowest_layer(ws_).close();
+  writer_signal_.cancel();
+  minder_timer_.cancel();
+  reader_timer_.cancel();
+}
+
+void WebSocketSession::notify_writer() {
+  writer_signal_.cancel();
+}
+
+void WebSocketSession::begin_stop() {
+  asio::post(ws_.get_executor(), [self = shared_from_this()] {
+    self->close({websocket::close_code::going_away, "the server stops"});
+  });
+}
+
+void WebSocketSession::cut() {
+  asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end(true, "the server stops"); });
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "server/net/connection_stream.hpp"
+#include "server/net/server_context.hpp"
+#include "server/net/token_bucket.hpp"
+
+namespace spectra::server {
+
+/// One viewer's WebSocket: a reader, a writer and a minder of deadlines as coroutines on one strand. The writer takes the
+/// control lane before the frame lane; a read is outstanding all the time; the minder cuts whoever stops taking bytes.
+class WebSocketSession final : public ViewerPeer,
+                               public Stoppable,
+                               public std::enable_shared_from_this<WebSocketSession> {
+ public:
+  using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
+
+  /// `stream` is connected and its executor is a strand.
+  WebSocketSession(ConnectionStream stream, ServerContext& context);
+
+  /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
+  boost::asio::awaitable<void> run(UpgradeRequest request);
+
+  void post(std::function<void()> job) override;
+  void wake() override;
+  void send(std::string text) override;
+  double round_trip_ms() const override { return round_trip_ms_; }
+  std::size_t queued_bytes() const override { return control_bytes_; }
+
+  void begin_stop() override;
+  void cut() override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  boost::asio::awaitable<void> read_messages();
+  boost::asio::awaitable<void> write_messages();
+  boost::asio::awaitable<void> mind_deadlines();
+  boost::asio::awaitable<void> ping();
+  template <class Buffers>
+  boost::asio::awaitable<bool> write(Buffers buffers, bool is_text);
+  void close(boost::beast::websocket::close_reason reason);
+  void end(bool is_cut, std::string_view why);
+  void notify_writer();
+
+  boost::beast::websocket::stream<ConnectionStream> ws_;
+  ServerContext& context_;
+  std::shared_ptr<ViewerClient> client_;
+  boost::asio::steady_timer writer_signal_;
+  boost::asio::steady_timer minder_timer_;
+  boost::asio::steady_timer reader_timer_;
+  TokenBucket messages_;
+  std::deque<std::string> control_;
+  std::size_t control_bytes_ = 0;
+  bool is_open_ = false;
+  bool is_ended_ = false;
+  bool is_writing_ = false;
+  bool is_pinging_ = false;
+  bool may_have_frame_ = false;
+  std::optional<boost::beast::websocket::close_reason> closing_;
+  Clock::time_point close_deadline_ = Clock::time_point::max();
+  Clock::time_point ping_sent_;
+  double round_trip_ms_ = 0;
+};
+
+}  // namespace spectra::server
