@@ -9,6 +9,8 @@ find_package(meshoptimizer 0.18 REQUIRED)
 find_package(hwy 1.0 REQUIRED)
 find_package(CLI11 2.1 REQUIRED)
 find_package(prometheus-cpp REQUIRED)  # 1.0; likewise
+find_package(fmt 9.1 REQUIRED)
+find_package(zstd 1.5 REQUIRED)
 find_package(TinyGLTF 2.7 REQUIRED)
 if(SPECTRA_BUILD_TESTS)
   find_package(GTest 1.12 REQUIRED)

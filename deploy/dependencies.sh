@@ -7,10 +7,10 @@ build_packages=(
   g++ cmake ninja-build ccache ca-certificates
   libboost1.81-dev nlohmann-json3-dev libspdlog-dev libcli11-dev
   libdraco-dev libopenmesh-dev libmeshoptimizer-dev libhwy-dev
-  prometheus-cpp-dev libtinygltf-dev
+  prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev libzstd-dev
+  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   clang-format-14 chromium fonts-dejavu-core python3 git
 )
 

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fusion/error.hpp"
+#include "server/scene/scene_snapshot.hpp"
+
+namespace spectra::server {
+
+/// What `spectra tradeoff` measures and how closely.
+struct TradeoffOptions {
+  std::uint32_t sample_count = 20'000;  ///< Vertices of the full scene at which errors are taken.
+  std::string palette = "inferno";      ///< The temperature is read back from its colours.
+  std::vector<int> encoder_speeds{0, 5, 7, 10};
+  std::vector<int> colour_bits{8, 7, 6, 5, 4};
+  std::vector<double> step_factors{0.25, 0.5, 1, 2, 4, 8};  ///< Times the scene's suggested position step.
+};
+
+/// Geometry at one level of detail, position step and encoder: cost and position error against the full mesh surface.
+struct GeometryPoint {
+  std::string codec;  ///< "draco", "raw", "zstd", "meshoptimizer".
+  int level = 0;      ///< Depth to which the tree is refined; the highest is full detail.
+  std::uint64_t vertex_count = 0;
+  double position_step_mm = 0;
+  int encoder_speed = 0;
+  std::uint64_t size_bytes = 0;
+  double encode_ms = 0;
+  double decode_ms = 0;
+  double error_rms_mm = 0;
+  double error_worst_mm = 0;
+};
+
+/// Colours at one level of detail and number of bits: cost, and error of what the screen shows at the samples.
+struct ColourPoint {
+  std::string codec;
+  int level = 0;
+  int colour_bits = 8;
+  std::uint64_t size_bytes = 0;
+  double encode_ms = 0;  ///< Fusing included.
+  double decode_ms = 0;
+  double ciede2000_mean = 0;
+  double ciede2000_p95 = 0;
+  double temperature_p95_celsius = 0;  ///< NaN in a scene without thermal data.
+};
+
+/// Everything that was measured. The full grid of knobs is every GeometryPoint with every ColourPoint of the same level.
+struct TradeoffMeasurement {
+  std::string scene;
+  std::uint64_t vertex_count = 0;
+  std::uint64_t triangle_count = 0;
+  int level_count = 0;
+  double suggested_step_mm = 0;  ///< The scene's suggested position step.
+  std::vector<GeometryPoint> geometry;
+  std::vector<ColourPoint> colours;
+};
+
+/// Measures on one thread, as one core of the server would work; progress goes to `progress` (one line a step).
+fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,
+                                                      const std::function<void(const std::string&)>& progress);
+
+/// One knob setting that a link of some rate deserves.
+struct Recommendation {
+  double rate_mbit_per_s = 0;
+  GeometryPoint geometry;
+  ColourPoint colours;
+  double first_picture_s = 0;     ///< Geometry and colours of this level over the link.
+  double parameter_change_s = 0;  ///< Colours alone.
+};
+
+/// For each rate the most accurate Draco point whose parameter change takes at most `change_target_s` and whose first full
+/// picture at most `picture_target_s`; where none does, the cheapest.
+std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measurement,
+                                               const std::vector<double>& rates_mbit_per_s,
+                                               double change_target_s = 0.5, double picture_target_s = 10);
+
+/// The tiles that are drawn when the tree is refined to `level`: those of that level, and leaves above it.
+std::vector<std::shared_ptr<const Tile>> tiles_at_level(const SceneSnapshot& scene, int level);
+
+}  // namespace spectra::server

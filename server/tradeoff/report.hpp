@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "fusion/error.hpp"
+#include "server/tradeoff/measure.hpp"
+
+namespace spectra::server {
+
+/// One line of header and one a row; numbers with a point, missing ones empty.
+std::string geometry_csv(const TradeoffMeasurement& measurement);
+std::string colours_csv(const TradeoffMeasurement& measurement);
+/// The full grid of Draco's knobs: every geometry point with every colour point of its level.
+std::string grid_csv(const TradeoffMeasurement& measurement);
+
+/// A page that needs nothing else: plots of size against error with the frontier drawn, and all figures as tables.
+std::string report_html(const TradeoffMeasurement& measurement, const std::vector<Recommendation>& recommendations);
+
+/// A few lines for a terminal.
+std::string recommendation_text(const std::vector<Recommendation>& recommendations);
+
+/// Writes geometry.csv, colours.csv, grid.csv and report.html into a folder, made when it does not exist.
+fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
+                                  const std::vector<Recommendation>& recommendations);
+
+}  // namespace spectra::server

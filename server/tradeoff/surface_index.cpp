@@ -1,0 +1,133 @@
+#include "server/tradeoff/surface_index.hpp"
+
+#include <algorithm>
+#include <boost/geometry.hpp>
+#include <boost/geometry/geometries/box.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace spectra::server {
+
+namespace {
+
+namespace bg = boost::geometry;
+using Point = bg::model::point<float, 3, bg::cs::cartesian>;
+using Box = bg::model::box<Point>;
+using Entry = std::pair<Box, std::uint32_t>;
+using Tree = bg::index::rtree<Entry, bg::index::rstar<16>>;
+using Vec = std::array<double, 3>;
+
+Vec to_vec(fusion::Vec3f p) {
+  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
+}
+Vec minus(const Vec& a, const Vec& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+double dot(const Vec& a, const Vec& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// Weights (of a, of b) of the point of the segment a-b nearest to p.
+std::pair<double, double> nearest_on_segment(const Vec& p, const Vec& a, const Vec& b) {
+  const Vec ab = minus(b, a);
+  const double length = dot(ab, ab);
+  const double t = length > 0 ? std::clamp(dot(minus(p, a), ab) / length, 0.0, 1.0) : 0.0;
+  return {1 - t, t};
+}
+
+double squared_distance(const Vec& p, const std::array<Vec, 3>& corners, const std::array<double, 3>& weights) {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double at = weights[0] * corners[0][axis] + weights[1] * corners[1][axis] + weights[2] * corners[2][axis];
+    sum += (p[axis] - at) * (p[axis] - at);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::array<double, 3> nearest_on_triangle(fusion::Vec3f place, fusion::Vec3f a, fusion::Vec3f b, fusion::Vec3f c) {
+  const Vec p = to_vec(place);
+  const std::array<Vec, 3> corner{to_vec(a), to_vec(b), to_vec(c)};
+  // Inside the triangle's prism the foot of the perpendicular is the answer, elsewhere the nearest of the three edges.
+  const Vec u = minus(corner[1], corner[0]), v = minus(corner[2], corner[0]), w = minus(p, corner[0]);
+  const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
+  const double area = uu * vv - uv * uv;
+  if (area > 0) {
+    const double s = (vv * uw - uv * vw) / area, t = (uu * vw - uv * uw) / area;
+    if (s >= 0 && t >= 0 && s + t <= 1) return {1 - s - t, s, t};
+  }
+  std::array<double, 3> best{};
+  double best_distance = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    std::array<double, 3> weights{};
+    std::tie(weights[i], weights[j]) = nearest_on_segment(p, corner[i], corner[j]);
+    const double distance = squared_distance(p, corner, weights);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = weights;
+    }
+  }
+  return best;
+}
+
+struct SurfaceIndex::State {
+  std::vector<fusion::Vec3f> positions;
+  std::vector<fusion::Triangle> triangles;
+  Tree tree;
+
+  std::array<fusion::Vec3f, 3> corners(std::uint32_t index) const {
+    if (triangles.empty()) return {positions[index], positions[index], positions[index]};
+    const fusion::Triangle& t = triangles[index];
+    return {positions[t[0]], positions[t[1]], positions[t[2]]};
+  }
+};
+
+SurfaceIndex::SurfaceIndex(std::vector<fusion::Vec3f> positions, std::vector<fusion::Triangle> triangles)
+    : state_(std::make_unique<State>()) {
+  state_->positions = std::move(positions);
+  state_->triangles = std::move(triangles);
+  const std::size_t count = state_->triangles.empty() ? state_->positions.size() : state_->triangles.size();
+  std::vector<Entry> entries;
+  entries.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto [a, b, c] = state_->corners(i);
+    const Point low(std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y}), std::min({a.z, b.z, c.z}));
+    const Point high(std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y}), std::max({a.z, b.z, c.z}));
+    entries.emplace_back(Box(low, high), i);
+  }
+  state_->tree = Tree(entries);
+}
+
+SurfaceIndex::~SurfaceIndex() = default;
+
+bool SurfaceIndex::empty() const {
+  return state_->tree.empty();
+}
+
+SurfacePoint SurfaceIndex::nearest(fusion::Vec3f place) const {
+  const Point point(place.x, place.y, place.z);
+  SurfacePoint best;
+  double best_distance = std::numeric_limits<double>::infinity();
+  // Boxes come in the order of their distance: once a box is farther than the best triangle, none can be nearer.
+  const auto all = static_cast<unsigned>(state_->tree.size());
+  for (auto entry = state_->tree.qbegin(bg::index::nearest(point, all)); entry != state_->tree.qend(); ++entry) {
+    const double box_distance = static_cast<double>(bg::comparable_distance(point, entry->first));
+    if (box_distance > best_distance) break;
+    const auto corners = state_->corners(entry->second);
+    const auto weights = nearest_on_triangle(place, corners[0], corners[1], corners[2]);
+    const double distance =
+        squared_distance(to_vec(place), {to_vec(corners[0]), to_vec(corners[1]), to_vec(corners[2])}, weights);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = {entry->second, weights, std::sqrt(distance)};
+    }
+  }
+  return best;
+}
+
+}  // namespace spectra::server

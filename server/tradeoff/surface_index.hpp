@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "fusion/vertex_types.hpp"
+
+namespace spectra::server {
+
+/// The point of a surface that is nearest to some place.
+struct SurfacePoint {
+  std::uint32_t triangle = 0;           ///< Index of the triangle (of the point, for a point cloud).
+  std::array<double, 3> barycentric{};  ///< Weights of the three corners, sum 1.
+  double distance_m = 0;
+};
+
+/// Finds nearest points on a triangle mesh or point cloud (no triangles). Keeps its own copy. Immutable after construction.
+class SurfaceIndex {
+ public:
+  SurfaceIndex(std::vector<fusion::Vec3f> positions, std::vector<fusion::Triangle> triangles);
+  ~SurfaceIndex();
+
+  bool empty() const;
+  /// Must not be called on an empty surface.
+  SurfacePoint nearest(fusion::Vec3f place) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The point of the triangle a, b, c nearest to p, as barycentric weights; total for degenerate triangles.
+std::array<double, 3> nearest_on_triangle(fusion::Vec3f p, fusion::Vec3f a, fusion::Vec3f b, fusion::Vec3f c);
+
+}  // namespace spectra::server

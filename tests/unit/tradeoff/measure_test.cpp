@@ -1,0 +1,107 @@
+#include "server/tradeoff/measure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fusion/mesh/multispectral_mesh.hpp"
+#include "server/tradeoff/report.hpp"
+
+namespace spectra::server {
+namespace {
+
+/// A wavy square of side 1 m with a temperature ramp.
+fusion::MultispectralMesh wavy_square(std::uint32_t side) {
+  fusion::MultispectralMesh mesh;
+  mesh.name = "wavy <square>";
+  mesh.has_visible = mesh.has_temperature = true;
+  mesh.resize_vertices(static_cast<std::size_t>(side) * side);
+  for (std::uint32_t y = 0; y < side; ++y) {
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * side + x;
+      const float u = static_cast<float>(x) / static_cast<float>(side - 1);
+      const float v = static_cast<float>(y) / static_cast<float>(side - 1);
+      mesh.positions()[i] = {u, v, 0.05F * std::sin(12 * u) * std::cos(9 * v)};
+      mesh.visible()[i] = {static_cast<std::uint8_t>(255 * u), static_cast<std::uint8_t>(255 * v), 90};
+      mesh.temperature_celsius()[i] = 15 + 20 * u;
+      if (x + 1 < side && y + 1 < side) {
+        const auto at = static_cast<std::uint32_t>(i);
+        mesh.triangles().push_back({at, at + 1, at + side});
+        mesh.triangles().push_back({at + 1, at + side + 1, at + side});
+      }
+    }
+  }
+  return mesh;
+}
+
+class Tradeoff : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    WorkerPool pool(2);
+    const auto scene = SceneSnapshot::build(wavy_square(80), 1, pool, 2000);
+    TradeoffOptions options;
+    options.sample_count = 500;
+    options.encoder_speeds = {0, 10};
+    options.step_factors = {0.5, 4};
+    measurement_ = new TradeoffMeasurement(measured_tradeoff(*scene, options, [](const std::string&) {}).value());
+  }
+  static void TearDownTestSuite() { delete measurement_; }
+  static TradeoffMeasurement* measurement_;
+
+  static int full_level() {
+    int level = 0;
+    for (const auto& p : measurement_->geometry) level = std::max(level, p.level);
+    return level;
+  }
+};
+TradeoffMeasurement* Tradeoff::measurement_ = nullptr;
+
+TEST_F(Tradeoff, FullDetailIsWithinHalfAStepPerAxis) {
+  int seen = 0;
+  for (const GeometryPoint& p : measurement_->geometry) {
+    if (p.level != full_level()) continue;
+    ++seen;
+    EXPECT_LE(p.error_worst_mm, 0.5001 * std::sqrt(3.0) * p.position_step_mm);
+    EXPECT_LE(p.error_rms_mm, p.error_worst_mm);
+    EXPECT_GT(p.size_bytes, 0U);
+  }
+  EXPECT_EQ(seen, 2 * (3 + 2));
+}
+
+TEST_F(Tradeoff, FewerBitsCostFewerBytesAndMoreError) {
+  std::vector<ColourPoint> draco;
+  for (const ColourPoint& p : measurement_->colours) {
+    if (p.codec == "draco" && p.level == full_level()) draco.push_back(p);
+  }
+  ASSERT_EQ(draco.size(), 5U);
+  EXPECT_LT(draco.front().ciede2000_mean, 0.05) << "8 bits at full detail show the fused colours";
+  for (std::size_t i = 1; i < draco.size(); ++i) {
+    EXPECT_LT(draco[i].size_bytes, draco[i - 1].size_bytes);
+    EXPECT_GT(draco[i].ciede2000_mean, draco[i - 1].ciede2000_mean);
+  }
+  EXPECT_LT(draco.front().temperature_p95_celsius, 20 * 0.01) << "read back within one percent of the range";
+}
+
+TEST_F(Tradeoff, RecommendsMoreForFasterLinks) {
+  const auto recommended = recommended_points(*measurement_, {0.05, 100});
+  ASSERT_EQ(recommended.size(), 2U);
+  const auto size = [](const Recommendation& r) { return r.geometry.size_bytes + r.colours.size_bytes; };
+  EXPECT_LE(size(recommended[0]), size(recommended[1]));
+  EXPECT_LE(recommended[1].parameter_change_s, 0.5);
+}
+
+TEST_F(Tradeoff, ReportsEveryPointAndEscapesNames) {
+  const std::string csv = grid_csv(*measurement_);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n') - 1,
+            std::count_if(measurement_->geometry.begin(), measurement_->geometry.end(), [](const auto& p) {
+              return p.codec == "draco";
+            }) * 5);
+  const std::string html = report_html(*measurement_, recommended_points(*measurement_, {5}));
+  EXPECT_NE(html.find("wavy &lt;square&gt;"), std::string::npos);
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+  EXPECT_EQ(html.find("http"), std::string::npos) << "self-contained";
+}
+
+}  // namespace
+}  // namespace spectra::server
