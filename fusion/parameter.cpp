@@ -149,11 +149,11 @@ Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_v
       break;
   }
   std::string_view digits = text;
-  if (digits.starts_with('+')) digits.remove_prefix(1);
+  if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
   double number = 0;
   const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
   if (status == std::errc::result_out_of_range) return refused(ErrorCode::OutOfRange, parameter, given);
-  if (status != std::errc{} || end != digits.data() + digits.size() || digits.starts_with("+")) {
+  if (status != std::errc{} || end != digits.data() + digits.size()) {
     return refused(ErrorCode::WrongType, parameter, given);
   }
   return validated(parameter, ParameterValue{number});

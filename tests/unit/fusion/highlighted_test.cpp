@@ -1,0 +1,72 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/fusion/scene.hpp"
+
+namespace spectra::fusion {
+
+bool operator==(const TemperatureInterval& a, const TemperatureInterval& b) {
+  return a.low == b.low && a.high == b.high;
+}
+void PrintTo(const TemperatureInterval& interval, std::ostream* out) {
+  *out << "[" << interval.low << ", " << interval.high << "]";
+}
+
+namespace {
+
+using Intervals = std::vector<TemperatureInterval>;
+using test::scene_of;
+using test::settings_with;
+
+Intervals highlighted(const std::string& method, ParameterValues params, std::vector<float> temperature) {
+  return FusionPlan::prepare(settings_with(method, std::move(params)), scene_of(std::move(temperature)))
+      .value()
+      .highlighted();
+}
+
+TEST(Highlighted, MethodsThatTreatAllTemperaturesAlikeHaveNone) {
+  for (const char* method :
+       {"thermal_only", "visible_only", "thermal_visible_blend", "intensity_hue", "inverse_intensity_hue"}) {
+    EXPECT_TRUE(highlighted(method, {}, {10, 20, 30}).empty()) << method;
+  }
+}
+
+TEST(Highlighted, ThresholdsReachToTheExtremes) {
+  EXPECT_EQ(highlighted("colour_mapped_threshold", {{"threshold", 25.0}}, {10, 30}), (Intervals{{25, 30}}));
+  EXPECT_EQ(highlighted("monochrome_threshold", {{"threshold", 25.0}, {"invert", true}}, {10, 30}),
+            (Intervals{{10, 25}}));
+  EXPECT_EQ(highlighted("colour_mapped_threshold", {{"threshold", 5.0}}, {10, 30}), (Intervals{{10, 30}}));
+  EXPECT_TRUE(highlighted("colour_mapped_threshold", {{"threshold", 30.0}}, {10, 30}).empty());
+}
+
+TEST(Highlighted, HighlightingHasOneIntervalPerSide) {
+  const std::vector<float> temperature = {10, 30};
+  EXPECT_EQ(highlighted("thermal_highlighting", {{"low", 15.0}, {"high", 25.0}}, temperature),
+            (Intervals{{10, 15}, {25, 30}}));
+  EXPECT_EQ(highlighted("thermal_highlighting", {{"high", 25.0}, {"sides", std::string("hot")}}, temperature),
+            (Intervals{{25, 30}}));
+  EXPECT_EQ(highlighted("thermal_highlighting", {{"low", 15.0}, {"sides", std::string("cold")}}, temperature),
+            (Intervals{{10, 15}}));
+}
+
+TEST(Highlighted, NeighbouringBinsBecomeOneInterval) {
+  // Four bins of [0, 8]: counts 1, 1, 3, 1.
+  const std::vector<float> temperature = {0, 2, 4, 4.5, 5, 8};
+  const ParameterValues three = {{"bins", std::int64_t{4}}, {"n", std::int64_t{3}}};
+  EXPECT_EQ(highlighted("histogram_bin", three, temperature), (Intervals{{0, 4}, {6, 8}}));
+  const ParameterValues commonest = {{"bins", std::int64_t{4}}, {"n", std::int64_t{1}}, {"invert", true}};
+  EXPECT_EQ(highlighted("histogram_bin", commonest, temperature), (Intervals{{4, 6}}));
+  const ParameterValues tied = {{"bins", std::int64_t{4}}, {"n", std::int64_t{1}}, {"ties", std::string("all")}};
+  EXPECT_EQ(highlighted("histogram_bin", tied, temperature), (Intervals{{0, 4}, {6, 8}}));
+  const ParameterValues none = {{"bins", std::int64_t{4}}, {"n", std::int64_t{0}}, {"ties", std::string("all")}};
+  EXPECT_TRUE(highlighted("histogram_bin", none, temperature).empty());
+}
+
+TEST(Highlighted, DistributionIsOutsideOrInside) {
+  const std::vector<float> temperature = {2, 4, 4, 4, 5, 5, 7, 9};  // mean 5, sigma 2
+  EXPECT_EQ(highlighted("histogram_distribution", {}, temperature), (Intervals{{2, 3}, {7, 9}}));
+  EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.75}}, temperature), (Intervals{{8.5, 9}}));
+  EXPECT_EQ(highlighted("histogram_distribution", {{"invert", true}}, temperature), (Intervals{{3, 7}}));
+}
+
+}  // namespace
+}  // namespace spectra::fusion

@@ -1,0 +1,74 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "fusion/statistics/temperature_statistics.hpp"
+
+namespace spectra::fusion {
+namespace {
+
+Histogram empty_histogram(float minimum, float maximum, std::size_t bins) {
+  return {minimum, maximum, std::vector<std::uint64_t>(bins)};
+}
+
+TEST(Histogram, FollowsTheFormulaAtComputedEdges) {
+  Histogram histogram = empty_histogram(17.3F, 41.9F, 64);
+  for (std::size_t edge = 0; edge <= 64; ++edge) {
+    const auto value = static_cast<float>(histogram_edge(histogram, edge));
+    std::fill(histogram.counts.begin(), histogram.counts.end(), 0);
+    add_to_histogram(std::span(&value, 1), histogram);
+    const double position = (double{value} - double{17.3F}) / (double{41.9F} - double{17.3F}) * 64.0;
+    const auto bin = static_cast<std::size_t>(std::clamp(std::floor(position), 0.0, 63.0));
+    EXPECT_EQ(histogram.counts[bin], 1U) << edge;
+  }
+}
+
+TEST(Histogram, LowestIsInTheFirstBinAndHighestInTheLast) {
+  Histogram histogram = empty_histogram(-5, 12, 7);
+  const float values[] = {-5, 12};
+  add_to_histogram(values, histogram);
+  EXPECT_EQ(histogram.counts.front(), 1U);
+  EXPECT_EQ(histogram.counts.back(), 1U);
+}
+
+TEST(Histogram, UniformSceneIsAllInTheFirstBin) {
+  Histogram histogram = empty_histogram(21.5F, 21.5F, 16);
+  add_to_histogram(std::vector<float>(1000, 21.5F), histogram);
+  EXPECT_EQ(histogram.counts[0], 1000U);
+}
+
+TEST(Histogram, LeavesOutWhatIsNotFinite) {
+  Histogram histogram = empty_histogram(0, 1, 4);
+  const float infinity = std::numeric_limits<float>::infinity();
+  const float values[] = {std::numeric_limits<float>::quiet_NaN(), infinity, -infinity, 0.5F};
+  add_to_histogram(values, histogram);
+  EXPECT_EQ(std::accumulate(histogram.counts.begin(), histogram.counts.end(), std::uint64_t{0}), 1U);
+}
+
+TEST(Histogram, WholeFloatRangeAndOneStepRange) {
+  const float largest = std::numeric_limits<float>::max();
+  Histogram wide = empty_histogram(-largest, largest, 4);
+  const float wide_values[] = {-largest, -1e36F, 1e36F, largest};
+  add_to_histogram(wide_values, wide);
+  EXPECT_EQ(wide.counts, (std::vector<std::uint64_t>{1, 1, 1, 1}));
+  const float step = std::numeric_limits<float>::denorm_min();
+  Histogram narrow = empty_histogram(0, step, 4096);
+  const float narrow_values[] = {0, step};
+  add_to_histogram(narrow_values, narrow);
+  EXPECT_EQ(narrow.counts.front(), 1U);
+  EXPECT_EQ(narrow.counts.back(), 1U);
+}
+
+TEST(Histogram, EdgesAscendFromMinimumToMaximum) {
+  const Histogram histogram = empty_histogram(17.3F, 41.9F, 64);
+  EXPECT_EQ(histogram_edge(histogram, 0), double{17.3F});
+  EXPECT_EQ(histogram_edge(histogram, 64), double{41.9F});
+  for (std::size_t edge = 0; edge < 64; ++edge) {
+    EXPECT_LT(histogram_edge(histogram, edge), histogram_edge(histogram, edge + 1));
+  }
+}
+
+}  // namespace
+}  // namespace spectra::fusion

@@ -1,0 +1,136 @@
+#include "fusion/settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fusion/registry.hpp"
+
+namespace spectra::fusion {
+namespace {
+
+FusionChange to_method(const std::string& id, ParameterValues params = {}) {
+  FusionChange change;
+  change.method = id;
+  change.params = std::move(params);
+  return change;
+}
+
+TEST(FusionSettings, DefaultsAreABlendInIron) {
+  const FusionSettings settings = default_settings();
+  EXPECT_EQ(settings.method, "thermal_visible_blend");
+  EXPECT_EQ(settings.params, (ParameterValues{{"alpha", 0.5}}));
+  EXPECT_EQ(settings.palette, "iron");
+  EXPECT_TRUE(settings.range.automatic);
+  EXPECT_EQ(settings.missing, std::nullopt);
+}
+
+TEST(FusionSettings, EveryMethodStartsAtCompleteValidDefaults) {
+  for (const Method* method : all_methods()) {
+    const auto settings = with_change(default_settings(), to_method(method->id));
+    ASSERT_TRUE(settings.has_value()) << method->id;
+    EXPECT_EQ(settings.value().params.size(), method->parameters.size());
+    for (const Parameter& parameter : method->parameters) {
+      EXPECT_EQ(validated(parameter, settings.value().params.at(parameter.name)).value(), parameter.default_value)
+          << method->id << " " << parameter.name;
+      EXPECT_FALSE(parameter.label.empty());
+      EXPECT_FALSE(parameter.help.empty());
+    }
+  }
+}
+
+TEST(FusionSettings, ParametersMergeAndANewMethodStartsAtItsDefaults) {
+  FusionSettings settings =
+      with_change(default_settings(), to_method("monochrome_threshold", {{"hue", 120.0}})).value();
+  settings = with_change(settings, to_method("monochrome_threshold", {{"alpha", 0.25}})).value();
+  EXPECT_EQ(settings.params.at("hue"), ParameterValue{120.0});
+  EXPECT_EQ(settings.params.at("alpha"), ParameterValue{0.25});
+  settings = with_change(settings, to_method("colour_mapped_threshold")).value();
+  EXPECT_EQ(settings.params.at("alpha"), ParameterValue{0.5});
+  EXPECT_FALSE(settings.params.contains("hue"));
+}
+
+TEST(FusionSettings, AnEmptyChangeChangesNothing) {
+  EXPECT_EQ(with_change(default_settings(), {}).value(), default_settings());
+}
+
+TEST(FusionSettings, RefusalsNameTheField) {
+  const auto expect_error = [](const FusionChange& change, ErrorCode code, const std::string& field) {
+    const auto result = with_change(default_settings(), change);
+    ASSERT_TRUE(result.has_error()) << field;
+    EXPECT_EQ(result.error().code, code) << result.error().message;
+    EXPECT_EQ(result.error().field, field);
+  };
+  expect_error(to_method("nothing"), ErrorCode::UnknownMethod, "method");
+  expect_error(to_method("thermal_visible_blend", {{"hue", 1.0}}), ErrorCode::UnknownParameter, "hue");
+  expect_error(to_method("thermal_visible_blend", {{"alpha", 1.5}}), ErrorCode::OutOfRange, "alpha");
+  expect_error(to_method("thermal_visible_blend", {{"alpha", true}}), ErrorCode::WrongType, "alpha");
+  FusionChange palette;
+  palette.palette = "grey";
+  expect_error(palette, ErrorCode::UnknownPalette, "palette");
+  FusionChange range;
+  range.range = RangeSetting{false, 30, 20};
+  expect_error(range, ErrorCode::Inconsistent, "range");
+  range.range = RangeSetting{false, std::nan(""), 20};
+  expect_error(range, ErrorCode::OutOfRange, "range");
+  range.range = RangeSetting{false, 0, std::numeric_limits<double>::infinity()};
+  expect_error(range, ErrorCode::OutOfRange, "range");
+}
+
+TEST(FusionSettings, LowAboveHighIsAnErrorOnlyWhenBothSidesAreOn) {
+  const ParameterValues crossed = {{"low", 30.0}, {"high", 20.0}};
+  const auto both = with_change(default_settings(), to_method("thermal_highlighting", crossed));
+  ASSERT_TRUE(both.has_error());
+  EXPECT_EQ(both.error().code, ErrorCode::Inconsistent);
+  EXPECT_EQ(both.error().field, "low");
+  ParameterValues hot = crossed;
+  hot["sides"] = std::string("hot");
+  const auto one_side = with_change(default_settings(), to_method("thermal_highlighting", hot));
+  ASSERT_TRUE(one_side.has_value());
+  FusionChange back;
+  back.params["sides"] = std::string("both");
+  EXPECT_TRUE(with_change(one_side.value(), back).has_error());
+  EXPECT_TRUE(
+      with_change(default_settings(), to_method("thermal_highlighting", {{"low", 20.0}, {"high", 20.0}})).has_value());
+}
+
+TEST(FusionSettings, AutomaticRangeForgetsHandSetValues) {
+  FusionChange manual;
+  manual.range = RangeSetting{false, 10, 40};
+  const FusionSettings by_hand = with_change(default_settings(), manual).value();
+  EXPECT_EQ(by_hand.range.minimum_celsius, 10);
+  FusionChange automatic;
+  automatic.range = RangeSetting{true, 1, 2};
+  EXPECT_EQ(with_change(by_hand, automatic).value(), default_settings());
+}
+
+TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
+  std::vector<FusionSettings> all = {default_settings()};
+  for (const Method* method : all_methods()) {
+    if (method->id != "thermal_visible_blend")
+      all.push_back(with_change(default_settings(), to_method(method->id)).value());
+  }
+  FusionChange change;
+  change.params["alpha"] = std::nextafter(0.5, 1);
+  all.push_back(with_change(default_settings(), change).value());
+  change = {};
+  change.palette = "rainbow";
+  all.push_back(with_change(default_settings(), change).value());
+  change = {};
+  change.range = RangeSetting{false, 0, 0};
+  all.push_back(with_change(default_settings(), change).value());
+  change = {};
+  change.missing = MissingDisplay{Rgb8{0, 0, 0}};
+  all.push_back(with_change(default_settings(), change).value());
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    for (std::size_t b = 0; b < all.size(); ++b) {
+      EXPECT_EQ(cache_key(all[a]) == cache_key(all[b]), a == b) << cache_key(all[a]);
+    }
+  }
+  change = {};
+  change.range = RangeSetting{false, -0.0, 0.0};
+  EXPECT_EQ(cache_key(with_change(default_settings(), change).value()), cache_key(all[all.size() - 2]));
+}
+
+}  // namespace
+}  // namespace spectra::fusion
