@@ -1,12 +1,118 @@
 #include "fusion/mesh/ply_reader.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
 #include <utility>
 
+#include "fusion/mesh/nearest_vertex.hpp"
 #include "fusion/mesh/ply_stream.hpp"
 #include "fusion/mesh/scene_origin.hpp"
 
 namespace spectra::fusion {
+
+namespace {
+
+/// What a thermal file is read for.
+struct ThermalVertices {
+  std::vector<Vec3d> positions;
+  std::vector<float> temperature_celsius;
+  std::vector<Note> notes;
+};
+
+Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path) {
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path));
+  const std::string name = path.filename().string();
+  if (!stream.has_temperature()) {
+    return failure(ErrorCode::Unsupported, name + ": the thermal file has no temperature property", name);
+  }
+  ThermalVertices thermal;
+  thermal.positions.reserve(static_cast<std::size_t>(stream.vertex_count()));
+  thermal.temperature_celsius.reserve(static_cast<std::size_t>(stream.vertex_count()));
+  PlyHandlers handlers;
+  handlers.vertices = [&thermal](const PlyVertexBlock& block) -> Result<void> {
+    thermal.positions.insert(thermal.positions.end(), block.positions.begin(), block.positions.end());
+    thermal.temperature_celsius.insert(thermal.temperature_celsius.end(), block.temperature_celsius.begin(),
+                                       block.temperature_celsius.end());
+    return success();
+  };
+  BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
+  for (Note& note : stream.notes(facts)) {
+    // Its faces and colours are not asked for, and the gaps are counted again after the join.
+    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes") continue;
+    thermal.notes.push_back({"thermal_" + note.id, note.count, name + ": " + note.message});
+  }
+  return thermal;
+}
+
+std::string in_metres(double distance) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << distance << " m";
+  return text.str();
+}
+
+Vec3d absolute_position(const MultispectralMesh& mesh, std::size_t vertex) {
+  const Vec3f& p = mesh.positions()[vertex];
+  return {mesh.origin.x + static_cast<double>(p.x), mesh.origin.y + static_cast<double>(p.y),
+          mesh.origin.z + static_cast<double>(p.z)};
+}
+
+/// The temperature of vertex i of the thermal file for vertex i; says so when they are not where the others are.
+void join_in_order(const ThermalVertices& thermal, LoadedScene& scene) {
+  MultispectralMesh& mesh = scene.mesh;
+  const std::size_t count = mesh.vertex_count();
+  std::copy(thermal.temperature_celsius.begin(), thermal.temperature_celsius.end(), mesh.temperature_celsius().begin());
+  scene.notes.push_back(
+      {"thermal_joined_in_order", count,
+       "Temperatures of the thermal file taken in order: it has the same " + std::to_string(count) + " vertices"});
+  Vec3d min = thermal.positions[0];
+  Vec3d max = min;
+  for (const Vec3d& p : thermal.positions) {
+    min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
+    max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
+  }
+  constexpr double kSamePlace = 1e-3;
+  const double tolerance = kSamePlace * std::max({max.x - min.x, max.y - min.y, max.z - min.z});
+  std::uint64_t moved_count = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3d p = absolute_position(mesh, i);
+    const Vec3d& q = thermal.positions[i];
+    const double distance = std::max({std::abs(p.x - q.x), std::abs(p.y - q.y), std::abs(p.z - q.z)});
+    moved_count += distance > tolerance ? 1U : 0U;
+  }
+  if (moved_count > 0) {
+    scene.notes.push_back(
+        {"thermal_positions_differ", moved_count,
+         std::to_string(moved_count) + " vertices are elsewhere in the thermal file, although it has as many"});
+  }
+}
+
+void join_nearest(const ThermalVertices& thermal, double join_distance_m, LoadedScene& scene) {
+  MultispectralMesh& mesh = scene.mesh;
+  const NearestVertex nearest(thermal.positions);
+  constexpr double kSpacings = 3;
+  const double distance = join_distance_m > 0 ? join_distance_m : kSpacings * nearest.median_spacing();
+  const std::span<float> temperatures = mesh.temperature_celsius();
+  std::uint64_t joined_count = 0;
+  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
+    const auto hit = nearest.find(absolute_position(mesh, i), distance);
+    temperatures[i] = hit ? thermal.temperature_celsius[hit->index] : std::numeric_limits<float>::quiet_NaN();
+    joined_count += hit ? 1U : 0U;
+  }
+  scene.notes.push_back({"thermal_joined_nearest", joined_count,
+                         std::to_string(joined_count) + " of " + std::to_string(mesh.vertex_count()) +
+                             " vertices have the temperature of the nearest thermal vertex within " +
+                             in_metres(distance)});
+  if (joined_count < mesh.vertex_count()) {
+    scene.notes.push_back({"thermal_not_reached", mesh.vertex_count() - joined_count,
+                           std::to_string(mesh.vertex_count() - joined_count) +
+                               " vertices have no thermal vertex within " + in_metres(distance)});
+  }
+}
+
+}  // namespace
 
 Result<LoadedScene> read_ply(const std::filesystem::path& path) {
   BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path));
@@ -51,6 +157,36 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path) {
     }
   }
   scene.notes = stream.notes(facts);
+  return scene;
+}
+
+Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
+                                          double join_distance_m) {
+  if (!std::isfinite(join_distance_m) || join_distance_m < 0) {
+    return failure(ErrorCode::OutOfRange, "join_distance_m is a finite distance of 0 (automatic) or more",
+                   "join_distance_m");
+  }
+  BOOST_OUTCOME_TRY(ThermalVertices thermal, read_thermal_vertices(thermal_path));
+  BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path));
+  std::erase_if(scene.notes, [](const Note& note) { return note.id == "missing_temperatures"; });
+  if (scene.mesh.has_temperature) {
+    scene.notes.push_back({"replaced_temperatures", scene.mesh.vertex_count(),
+                           "The file's own temperatures replaced by those of the thermal file"});
+  }
+  scene.mesh.has_temperature = true;
+  if (thermal.positions.size() == scene.mesh.vertex_count()) {
+    join_in_order(thermal, scene);
+  } else {
+    join_nearest(thermal, join_distance_m, scene);
+  }
+  const auto missing_count = static_cast<std::uint64_t>(
+      std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
+                    [](float celsius) { return !std::isfinite(celsius); }));
+  if (missing_count > 0) {
+    scene.notes.push_back(
+        {"missing_temperatures", missing_count, std::to_string(missing_count) + " vertices without a temperature"});
+  }
+  scene.notes.insert(scene.notes.end(), thermal.notes.begin(), thermal.notes.end());
   return scene;
 }
 

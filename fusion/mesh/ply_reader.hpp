@@ -12,9 +12,9 @@ namespace spectra::fusion {
 
 /// One thing that was repaired, left out or interpreted while a scene was read: nothing is lost silently.
 struct Note {
-  std::string id;             ///< snake_case, stable: "degenerate_faces", "triangulated_polygons", ...
+  std::string id;  ///< snake_case, stable: "degenerate_faces", "triangulated_polygons", ...
   std::uint64_t count = 0;
-  std::string message;        ///< One sentence for a person, with the count.
+  std::string message;  ///< One sentence for a person, with the count.
 };
 
 /// A scene and what has to be said about it.

@@ -14,7 +14,6 @@ namespace spectra::fusion {
 Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
 
 /// The same into a file that appears whole or not at all: written beside it, synced, then renamed.
-Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh,
-                       std::span<const Rgb8> colours);
+Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
 
 }  // namespace spectra::fusion

@@ -1,0 +1,126 @@
+#include "fusion/mesh/output_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace spectra::fusion {
+
+namespace {
+
+bool is_below(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  auto part = path.begin();
+  for (const auto& folder_part : folder) {
+    if (part == path.end() || *part != folder_part) return false;
+    ++part;
+  }
+  return part != path.end();
+}
+
+/// fsync that a signal does not cut short.
+int sync_descriptor(int descriptor) {
+  int result = 0;
+  do {
+    result = ::fsync(descriptor);
+  } while (result != 0 && errno == EINTR);
+  return result;
+}
+
+}  // namespace
+
+Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
+  OutputFile file;
+  file.path_ = path;
+  struct stat facts {};
+  const bool exists = ::stat(path.c_str(), &facts) == 0;
+  const std::filesystem::path plain = std::filesystem::absolute(path).lexically_normal();
+  if ((exists && !S_ISREG(facts.st_mode)) || is_below(plain, "/dev") || is_below(plain, "/proc")) {
+    file.descriptor_ = ::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
+    if (file.descriptor_ < 0) return file.error("cannot be opened for writing", errno);
+    return file;
+  }
+  std::error_code ignored;
+  const std::filesystem::path resolved = std::filesystem::weakly_canonical(path, ignored);
+  file.target_ = resolved.empty() ? plain : resolved;
+
+  // The process and a count make the name our own; O_EXCL makes sure of it.
+  static std::atomic<unsigned> count{0};
+  constexpr int kAttempts = 100;
+  for (int attempt = 0; attempt < kAttempts && file.descriptor_ < 0; ++attempt) {
+    file.temporary_ = file.target_.parent_path() /
+                      (".spectra-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part");
+    file.descriptor_ = ::open(file.temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file.descriptor_ < 0 && errno != EEXIST) break;
+  }
+  if (file.descriptor_ < 0) {
+    const int error_number = errno;
+    file.temporary_.clear();
+    return file.error("cannot be created", error_number);
+  }
+  if (exists && ::fchmod(file.descriptor_, facts.st_mode & 07777) != 0) {
+    return file.error("cannot be given the permissions of the file it replaces", errno);
+  }
+  return file;
+}
+
+OutputFile::~OutputFile() {
+  discard();
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept {
+  *this = std::move(other);
+}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(target_, other.target_);
+  std::swap(temporary_, other.temporary_);
+  std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+Result<void> OutputFile::write(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return error("cannot be written", errno);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return success();
+}
+
+Result<void> OutputFile::commit() {
+  if (!temporary_.empty() && sync_descriptor(descriptor_) != 0) return error("cannot be written", errno);
+  if (::close(std::exchange(descriptor_, -1)) != 0) return error("cannot be written", errno);
+  if (temporary_.empty()) return success();
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) return error("cannot be put in place", errno);
+  temporary_.clear();
+  const int folder = ::open(target_.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return error("is in place, but its folder cannot be synced", errno);
+  const int result = sync_descriptor(folder);
+  const int error_number = errno;
+  ::close(folder);
+  // Some file systems cannot sync a folder at all; that is theirs to know.
+  if (result != 0 && error_number != EINVAL) {
+    return error("is in place, but its folder cannot be synced", error_number);
+  }
+  return success();
+}
+
+Error OutputFile::error(const std::string& what, int error_number) const {
+  return {ErrorCode::FileUnwritable, path_.string() + " " + what + ": " + std::generic_category().message(error_number),
+          path_.string()};
+}
+
+void OutputFile::discard() {
+  if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  temporary_.clear();
+}
+
+}  // namespace spectra::fusion
