@@ -1,0 +1,127 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "protocol/messages/message.hpp"
+
+namespace spectra::protocol {
+
+/// The value of a fusion parameter on the wire: null (automatic), number, integer, toggle or choice.
+using ParameterValue = std::variant<std::nullptr_t, double, std::int64_t, bool, std::string>;
+using ParameterValues = std::map<std::string, ParameterValue, std::less<>>;
+
+enum class ParameterKind { Number, Integer, Toggle, Choice, Temperature };
+
+/// One parameter of a method, enough to build its form.
+struct ParameterDescription {
+  std::string name;
+  std::string label;
+  std::string help;
+  ParameterKind kind = ParameterKind::Number;
+  ParameterValue default_value;  ///< JSON key "default".
+  std::optional<double> min;     ///< Allowed itself; absent: no bound.
+  std::optional<double> max;
+  std::optional<double> exclusive_min;  ///< A lower bound that is itself refused.
+  std::optional<double> step;           ///< Above 0.
+  std::string unit;                     ///< Absent when empty.
+  std::vector<std::string> options;     ///< Ids of a choice; absent when empty.
+};
+
+/// METHOD.
+struct MethodDescription {
+  std::string id;
+  std::string label;
+  std::string summary;
+  bool needs_temperature = true;
+  bool uses_palette = true;
+  std::vector<ParameterDescription> params;
+};
+
+/// PALETTE: 256 rows of r, g, b in 0..255, real-valued; row 0 is the coldest.
+struct PaletteDescription {
+  std::string id;
+  std::string label;
+  bool fusion_safe = false;
+  std::vector<std::array<double, 3>> colours;
+};
+
+enum class RangeMode { Auto, Manual };
+
+/// The active temperature range, degC; nullopt = null: no thermal data and automatic.
+struct FusionRange {
+  RangeMode mode = RangeMode::Auto;
+  std::optional<double> min;
+  std::optional<double> max;
+};
+
+/// A range as it is set. Manual has both bounds, min <= max; automatic ignores them.
+struct RangeChange {
+  RangeMode mode = RangeMode::Auto;
+  std::optional<double> min;
+  std::optional<double> max;
+};
+
+/// FUSION: the settings in force.
+struct FusionState {
+  std::string method;
+  ParameterValues params;           ///< What was set; null = automatic.
+  ParameterValues params_in_force;  ///< Automatic temperatures as numbers; null when the scene has none.
+  std::string palette;
+  FusionRange range;
+  std::string missing = "visible";  ///< "visible" or "#rrggbb".
+};
+
+/// Params of fusion.set; what is absent stays. Names and bounds of `params` are the server's to check.
+struct FusionChange {
+  std::optional<std::string> method;
+  ParameterValues params;
+  std::optional<std::string> palette;
+  std::optional<RangeChange> range;
+  std::optional<std::string> missing;  ///< "visible" or "#rrggbb", checked.
+};
+
+/// Result of fusion.set and fusion.get; params of fusion.changed.
+struct FusionReply {
+  std::uint32_t generation = 0;
+  FusionState fusion;
+};
+
+nlohmann::json to_json(const ParameterValue& value);
+template <>
+Result<ParameterValue> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ParameterValues& values);
+template <>
+Result<ParameterValues> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ParameterDescription& message);
+template <>
+Result<ParameterDescription> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const MethodDescription& message);
+template <>
+Result<MethodDescription> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const PaletteDescription& message);
+template <>
+Result<PaletteDescription> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const FusionRange& message);
+template <>
+Result<FusionRange> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const RangeChange& message);
+template <>
+Result<RangeChange> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const FusionState& message);
+template <>
+Result<FusionState> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const FusionChange& message);
+template <>
+Result<FusionChange> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const FusionReply& message);
+template <>
+Result<FusionReply> from_json(const nlohmann::json& value, std::string_view path);
+
+}  // namespace spectra::protocol

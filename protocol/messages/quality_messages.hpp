@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+
+#include "protocol/messages/message.hpp"
+
+namespace spectra::protocol {
+
+enum class QualityMode { Auto, Manual };
+
+/// QUALITY: the knobs of speed against accuracy, as in force.
+struct QualityState {
+  QualityMode mode = QualityMode::Manual;
+  double position_step_mm = 1;  ///< Above 0; the largest error per axis is half of it.
+  int colour_bits = 8;          ///< 4..8.
+  double pixel_error = 1;       ///< Above 0; pixels on the screen.
+  int encoder_speed = 7;        ///< 0 smallest .. 10 fastest.
+  double latency_target_ms = 200;
+};
+
+/// Params of quality.set; what is absent stays.
+struct QualityChange {
+  std::optional<QualityMode> mode;
+  std::optional<double> position_step_mm;
+  std::optional<int> colour_bits;
+  std::optional<double> pixel_error;
+  std::optional<int> encoder_speed;
+  std::optional<double> latency_target_ms;
+};
+
+/// Result of quality.set.
+struct QualityReply {
+  QualityState quality;
+};
+
+nlohmann::json to_json(const QualityState& message);
+template <>
+Result<QualityState> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const QualityChange& message);
+template <>
+Result<QualityChange> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const QualityReply& message);
+template <>
+Result<QualityReply> from_json(const nlohmann::json& value, std::string_view path);
+
+}  // namespace spectra::protocol

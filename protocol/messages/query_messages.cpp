@@ -1,0 +1,95 @@
+#include "protocol/messages/query_messages.hpp"
+
+#include "protocol/messages/fields.hpp"
+
+namespace spectra::protocol {
+
+static void describe(auto& fields, Is<HistogramRequest> auto& message) {
+  fields.field("bins", message.bins);
+  fields.require("bins", message.bins >= 1 && message.bins <= 4096, "an integer from 1 to 4096");
+}
+
+static void describe(auto& fields, Is<HistogramReply> auto& message) {
+  fields.field("edges", message.edges);
+  fields.field("counts", message.counts);
+  fields.require("edges", message.edges.size() == message.counts.size() + (message.counts.empty() ? 0U : 1U),
+                 "a list of one more than counts");
+  fields.nullable("mean", message.mean);
+  fields.nullable("sigma", message.sigma);
+  fields.field("highlighted", message.highlighted);
+}
+
+static void describe(auto& fields, Is<ProbeRequest> auto& message) {
+  fields.field("position", message.position);
+  fields.require("position", are_float_coordinates(message.position), "a list of 3 numbers that fit a 32-bit float");
+}
+
+static void describe(auto& fields, Is<ProbeReply> auto& message) {
+  fields.field("vertex_index", message.vertex_index);
+  fields.field("position", message.position);
+  fields.nullable("temperature", message.temperature);
+  fields.field("visible", message.visible);
+  fields.field("fused", message.fused);
+  fields.field("distance", message.distance);
+  fields.require("distance", message.distance >= 0, "a number not below 0");
+}
+
+static void describe(auto& fields, Is<Extreme> auto& message) {
+  fields.field("position", message.position);
+  fields.field("temperature", message.temperature);
+}
+
+static void describe(auto& fields, Is<ExtremesReply> auto& message) {
+  fields.nullable("hottest", message.hottest);
+  fields.nullable("coldest", message.coldest);
+}
+
+template <>
+Result<HistogramRequest> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<HistogramRequest>(value, path);
+}
+nlohmann::json to_json(const HistogramRequest& message) {
+  return written_message(message);
+}
+
+template <>
+Result<HistogramReply> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<HistogramReply>(value, path);
+}
+nlohmann::json to_json(const HistogramReply& message) {
+  return written_message(message);
+}
+
+template <>
+Result<ProbeRequest> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ProbeRequest>(value, path);
+}
+nlohmann::json to_json(const ProbeRequest& message) {
+  return written_message(message);
+}
+
+template <>
+Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ProbeReply>(value, path);
+}
+nlohmann::json to_json(const ProbeReply& message) {
+  return written_message(message);
+}
+
+template <>
+Result<Extreme> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<Extreme>(value, path);
+}
+nlohmann::json to_json(const Extreme& message) {
+  return written_message(message);
+}
+
+template <>
+Result<ExtremesReply> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ExtremesReply>(value, path);
+}
+nlohmann::json to_json(const ExtremesReply& message) {
+  return written_message(message);
+}
+
+}  // namespace spectra::protocol

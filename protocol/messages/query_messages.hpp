@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "protocol/messages/message.hpp"
+
+namespace spectra::protocol {
+
+/// Params of scene.histogram.
+struct HistogramRequest {
+  std::uint32_t bins = 0;  ///< 1..4096.
+};
+
+/// Result of scene.histogram, degC; without thermal data every list is empty, mean and sigma are null.
+struct HistogramReply {
+  std::vector<double> edges;  ///< One more than counts.
+  std::vector<std::uint64_t> counts;
+  std::optional<double> mean;
+  std::optional<double> sigma;
+  std::vector<std::array<double, 2>> highlighted;  ///< Intervals [low, high] that the current method highlights.
+};
+
+/// Params of scene.probe; metres relative to the scene origin, finite as float.
+struct ProbeRequest {
+  std::array<double, 3> position{};
+};
+
+/// Result of scene.probe: the nearest vertex at full accuracy.
+struct ProbeReply {
+  std::uint64_t vertex_index = 0;     ///< In the input's order.
+  std::array<double, 3> position{};   ///< Metres relative to the scene origin.
+  std::optional<double> temperature;  ///< degC; null = missing.
+  std::array<std::uint8_t, 3> visible{};
+  std::array<std::uint8_t, 3> fused{};
+  double distance = 0;  ///< Metres.
+};
+
+/// A place and its temperature, degC.
+struct Extreme {
+  std::array<double, 3> position{};
+  double temperature = 0;
+};
+
+/// Result of scene.extremes; null without thermal data.
+struct ExtremesReply {
+  std::optional<Extreme> hottest;
+  std::optional<Extreme> coldest;
+};
+
+nlohmann::json to_json(const HistogramRequest& message);
+template <>
+Result<HistogramRequest> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const HistogramReply& message);
+template <>
+Result<HistogramReply> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ProbeRequest& message);
+template <>
+Result<ProbeRequest> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ProbeReply& message);
+template <>
+Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const Extreme& message);
+template <>
+Result<Extreme> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ExtremesReply& message);
+template <>
+Result<ExtremesReply> from_json(const nlohmann::json& value, std::string_view path);
+
+}  // namespace spectra::protocol

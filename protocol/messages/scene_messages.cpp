@@ -1,0 +1,126 @@
+#include "protocol/messages/scene_messages.hpp"
+
+#include "protocol/messages/fields.hpp"
+
+namespace spectra::protocol {
+
+template <>
+std::span<const EnumWord<Role>> words_of() {
+  static constexpr EnumWord<Role> kWords[] = {{Role::Operator, "operator"}, {Role::Viewer, "viewer"}};
+  return kWords;
+}
+
+static void describe(auto& fields, Is<Bounds> auto& message) {
+  fields.field("min", message.min);
+  fields.field("max", message.max);
+}
+
+static void describe(auto& fields, Is<SceneTemperature> auto& message) {
+  fields.nullable("min", message.min);
+  fields.nullable("max", message.max);
+  fields.nullable("mean", message.mean);
+  fields.nullable("sigma", message.sigma);
+  fields.field("missing_count", message.missing_count);
+}
+
+static void describe(auto& fields, Is<SceneDescription> auto& message) {
+  fields.field("name", message.name);
+  fields.field("revision", message.revision);
+  fields.field("vertex_count", message.vertex_count);
+  fields.field("triangle_count", message.triangle_count);
+  fields.field("point_cloud", message.point_cloud);
+  fields.field("origin", message.origin);
+  fields.field("bounds", message.bounds);
+  fields.field("temperature", message.temperature);
+  fields.field("tile_count", message.tile_count);
+  fields.field("levels", message.levels);
+}
+
+static void describe(auto& fields, Is<SceneChanged> auto& message) {
+  fields.field("scene", message.scene);
+}
+
+static void describe(auto& fields, Is<ServerInfo> auto& message) {
+  fields.field("name", message.name);
+  fields.field("version", message.version);
+}
+
+static void describe(auto& fields, Is<Limits> auto& message) {
+  fields.field("max_message_bytes", message.max_message_bytes);
+  fields.field("max_depth", message.max_depth);
+  fields.field("max_requests_per_s", message.max_requests_per_s);
+  fields.require("max_requests_per_s", message.max_requests_per_s > 0, "a number above 0");
+}
+
+static void describe(auto& fields, Is<Hello> auto& message) {
+  fields.field("protocol", message.protocol);
+  fields.require("protocol", message.protocol == kProtocolName, "\"spectra.v1\"");
+  fields.field("server", message.server);
+  fields.field("session_id", message.session_id);
+  fields.field("role", message.role);
+  fields.field("capabilities", message.capabilities);
+  fields.field("limits", message.limits);
+  fields.nullable("scene", message.scene);
+  fields.field("methods", message.methods);
+  fields.field("palettes", message.palettes);
+  fields.field("fusion", message.fusion);
+  fields.field("quality", message.quality);
+}
+
+template <>
+Result<Bounds> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<Bounds>(value, path);
+}
+nlohmann::json to_json(const Bounds& message) {
+  return written_message(message);
+}
+
+template <>
+Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SceneTemperature>(value, path);
+}
+nlohmann::json to_json(const SceneTemperature& message) {
+  return written_message(message);
+}
+
+template <>
+Result<SceneDescription> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SceneDescription>(value, path);
+}
+nlohmann::json to_json(const SceneDescription& message) {
+  return written_message(message);
+}
+
+template <>
+Result<SceneChanged> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SceneChanged>(value, path);
+}
+nlohmann::json to_json(const SceneChanged& message) {
+  return written_message(message);
+}
+
+template <>
+Result<ServerInfo> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ServerInfo>(value, path);
+}
+nlohmann::json to_json(const ServerInfo& message) {
+  return written_message(message);
+}
+
+template <>
+Result<Limits> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<Limits>(value, path);
+}
+nlohmann::json to_json(const Limits& message) {
+  return written_message(message);
+}
+
+template <>
+Result<Hello> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<Hello>(value, path);
+}
+nlohmann::json to_json(const Hello& message) {
+  return written_message(message);
+}
+
+}  // namespace spectra::protocol

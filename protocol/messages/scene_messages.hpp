@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/message.hpp"
+#include "protocol/messages/quality_messages.hpp"
+
+namespace spectra::protocol {
+
+/// x, y, z in metres.
+using Vector3 = std::array<double, 3>;
+
+/// Smallest and largest coordinates, metres relative to the scene origin.
+struct Bounds {
+  Vector3 min{};
+  Vector3 max{};
+};
+
+/// Facts of all temperatures, degC; nullopt = null: no thermal data.
+struct SceneTemperature {
+  std::optional<double> min;
+  std::optional<double> max;
+  std::optional<double> mean;
+  std::optional<double> sigma;  ///< Population standard deviation.
+  std::uint64_t missing_count = 0;
+};
+
+/// SCENE: what is served.
+struct SceneDescription {
+  std::string name;
+  std::uint32_t revision = 0;
+  std::uint64_t vertex_count = 0;
+  std::uint64_t triangle_count = 0;
+  bool point_cloud = false;
+  Vector3 origin{};  ///< In the coordinates of the input file.
+  Bounds bounds;
+  SceneTemperature temperature;
+  std::uint64_t tile_count = 0;
+  std::uint32_t levels = 0;
+};
+
+/// Params of scene.changed.
+struct SceneChanged {
+  SceneDescription scene;
+};
+
+struct ServerInfo {
+  std::string name;
+  std::string version;
+};
+
+/// What a client must keep to.
+struct Limits {
+  std::uint64_t max_message_bytes = 64 * 1024;
+  std::uint32_t max_depth = 16;
+  double max_requests_per_s = 0;  ///< Above 0.
+};
+
+enum class Role { Operator, Viewer };
+
+inline constexpr const char* kProtocolName = "spectra.v1";
+
+/// Params of hello, the first message of every connection.
+struct Hello {
+  std::string protocol = kProtocolName;
+  ServerInfo server;
+  std::string session_id;
+  Role role = Role::Viewer;
+  std::vector<std::string> capabilities;
+  Limits limits;
+  std::optional<SceneDescription> scene;  ///< null: none yet.
+  std::vector<MethodDescription> methods;
+  std::vector<PaletteDescription> palettes;
+  FusionState fusion;
+  QualityState quality;
+};
+
+nlohmann::json to_json(const Bounds& message);
+template <>
+Result<Bounds> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const SceneTemperature& message);
+template <>
+Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const SceneDescription& message);
+template <>
+Result<SceneDescription> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const SceneChanged& message);
+template <>
+Result<SceneChanged> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ServerInfo& message);
+template <>
+Result<ServerInfo> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const Limits& message);
+template <>
+Result<Limits> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const Hello& message);
+template <>
+Result<Hello> from_json(const nlohmann::json& value, std::string_view path);
+
+}  // namespace spectra::protocol

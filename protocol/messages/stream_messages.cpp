@@ -1,0 +1,135 @@
+#include "protocol/messages/stream_messages.hpp"
+
+#include "protocol/messages/fields.hpp"
+
+namespace spectra::protocol {
+
+template <>
+std::span<const EnumWord<Channel>> words_of() {
+  static constexpr EnumWord<Channel> kWords[] = {
+      {Channel::Fused, "fused"}, {Channel::Temperature, "temperature"}, {Channel::Visible, "visible"}};
+  return kWords;
+}
+
+template <>
+std::span<const EnumWord<StatusLevel>> words_of() {
+  static constexpr EnumWord<StatusLevel> kWords[] = {
+      {StatusLevel::Info, "info"}, {StatusLevel::Warning, "warning"}, {StatusLevel::Error, "error"}};
+  return kWords;
+}
+
+static constexpr const char* kPosition = "a list of 3 numbers that fit a 32-bit float";
+
+static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
+  fields.field("channels", message.channels);
+  fields.require("channels", !message.channels.empty(), "a list of at least one channel");
+  fields.optional("in_flight_bytes", message.in_flight_bytes);
+  const std::uint32_t in_flight_bytes = message.in_flight_bytes.value_or(1);
+  fields.require("in_flight_bytes", in_flight_bytes >= 1 && in_flight_bytes <= 2'147'483'647U,
+                 "an integer from 1 to 2147483647");
+}
+
+static void describe(auto& fields, Is<CameraSet> auto& message) {
+  fields.field("eye", message.eye);
+  fields.require("eye", are_float_coordinates(message.eye), kPosition);
+  fields.field("target", message.target);
+  fields.require("target", are_float_coordinates(message.target), kPosition);
+  fields.field("up", message.up);
+  fields.require("up", are_float_coordinates(message.up), kPosition);
+  fields.field("fov_y_deg", message.fov_y_deg);
+  fields.require("fov_y_deg", message.fov_y_deg > 0 && message.fov_y_deg < 180, "a number above 0 and below 180");
+  fields.field("viewport", message.viewport);
+  const auto is_side = [](int pixels) { return pixels >= 1 && pixels <= 32'768; };
+  fields.require("viewport", is_side(message.viewport[0]) && is_side(message.viewport[1]),
+                 "a list of 2 integers from 1 to 32768");
+}
+
+static void describe(auto& fields, Is<StreamAck> auto& message) {
+  fields.field("sequence", message.sequence);
+}
+
+static void describe(auto& fields, Is<StreamComplete> auto& message) {
+  fields.field("generation", message.generation);
+  fields.field("scene_revision", message.scene_revision);
+  fields.field("tiles", message.tiles);
+  fields.field("vertices", message.vertices);
+}
+
+static void describe(auto& fields, Is<StreamAccuracy> auto& message) {
+  fields.nullable("position_mm", message.position_mm);
+  fields.field("colour_levels", message.colour_levels);
+  fields.nullable("pixel_error", message.pixel_error);
+}
+
+static void describe(auto& fields, Is<StreamStats> auto& message) {
+  fields.nullable("round_trip_ms", message.round_trip_ms);
+  fields.nullable("throughput_bytes_per_s", message.throughput_bytes_per_s);
+  fields.field("queued_bytes", message.queued_bytes);
+  fields.field("skipped_frames", message.skipped_frames);
+  fields.field("viewers", message.viewers);
+  fields.field("accuracy", message.accuracy);
+}
+
+static void describe(auto& fields, Is<Status> auto& message) {
+  fields.field("id", message.id);
+  fields.field("level", message.level);
+  fields.nullable("message", message.message);
+}
+
+template <>
+Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SubscribeRequest>(value, path);
+}
+nlohmann::json to_json(const SubscribeRequest& message) {
+  return written_message(message);
+}
+
+template <>
+Result<CameraSet> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<CameraSet>(value, path);
+}
+nlohmann::json to_json(const CameraSet& message) {
+  return written_message(message);
+}
+
+template <>
+Result<StreamAck> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<StreamAck>(value, path);
+}
+nlohmann::json to_json(const StreamAck& message) {
+  return written_message(message);
+}
+
+template <>
+Result<StreamComplete> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<StreamComplete>(value, path);
+}
+nlohmann::json to_json(const StreamComplete& message) {
+  return written_message(message);
+}
+
+template <>
+Result<StreamAccuracy> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<StreamAccuracy>(value, path);
+}
+nlohmann::json to_json(const StreamAccuracy& message) {
+  return written_message(message);
+}
+
+template <>
+Result<StreamStats> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<StreamStats>(value, path);
+}
+nlohmann::json to_json(const StreamStats& message) {
+  return written_message(message);
+}
+
+template <>
+Result<Status> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<Status>(value, path);
+}
+nlohmann::json to_json(const Status& message) {
+  return written_message(message);
+}
+
+}  // namespace spectra::protocol

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/messages/message.hpp"
+
+namespace spectra::protocol {
+
+enum class Channel { Fused, Temperature, Visible };
+
+/// Params of scene.subscribe; at least one channel.
+struct SubscribeRequest {
+  std::vector<Channel> channels;
+  std::optional<std::uint32_t> in_flight_bytes;  ///< 1..2^31-1; absent: the server's choice.
+};
+
+/// Params of camera.set; metres relative to the scene origin, finite as float.
+struct CameraSet {
+  std::array<double, 3> eye{};
+  std::array<double, 3> target{};
+  std::array<double, 3> up{};
+  double fov_y_deg = 50;              ///< Above 0, below 180.
+  std::array<int, 2> viewport{1, 1};  ///< Width and height, 1..32768 pixels.
+};
+
+/// Params of stream.ack: every frame up to this one is decoded.
+struct StreamAck {
+  std::uint32_t sequence = 0;
+};
+
+/// Params of stream.complete.
+struct StreamComplete {
+  std::uint32_t generation = 0;
+  std::uint32_t scene_revision = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t vertices = 0;
+};
+
+/// What is on the screen now; nullopt = null: nothing yet.
+struct StreamAccuracy {
+  std::optional<double> position_mm;
+  int colour_levels = 256;
+  std::optional<double> pixel_error;
+};
+
+/// Params of stream.stats; nullopt = null: not measured yet.
+struct StreamStats {
+  std::optional<double> round_trip_ms;
+  std::optional<double> throughput_bytes_per_s;
+  std::uint64_t queued_bytes = 0;
+  std::uint64_t skipped_frames = 0;
+  std::uint64_t viewers = 0;
+  StreamAccuracy accuracy;
+};
+
+enum class StatusLevel { Info, Warning, Error };
+
+/// Params of status; the same id replaces, message null clears.
+struct Status {
+  std::string id;
+  StatusLevel level = StatusLevel::Info;
+  std::optional<std::string> message;
+};
+
+nlohmann::json to_json(const SubscribeRequest& message);
+template <>
+Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const CameraSet& message);
+template <>
+Result<CameraSet> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const StreamAck& message);
+template <>
+Result<StreamAck> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const StreamComplete& message);
+template <>
+Result<StreamComplete> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const StreamAccuracy& message);
+template <>
+Result<StreamAccuracy> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const StreamStats& message);
+template <>
+Result<StreamStats> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const Status& message);
+template <>
+Result<Status> from_json(const nlohmann::json& value, std::string_view path);
+
+}  // namespace spectra::protocol
