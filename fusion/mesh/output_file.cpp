@@ -38,14 +38,15 @@ Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
   file.path_ = path;
   struct stat facts {};
   const bool exists = ::stat(path.c_str(), &facts) == 0;
-  const std::filesystem::path plain = std::filesystem::absolute(path).lexically_normal();
-  if ((exists && !S_ISREG(facts.st_mode)) || is_below(plain, "/dev") || is_below(plain, "/proc")) {
+  const std::filesystem::path plain = std::filesystem::absolute(path);
+  if ((exists && !S_ISREG(facts.st_mode)) || is_below(plain.lexically_normal(), "/dev") ||
+      is_below(plain.lexically_normal(), "/proc")) {
     file.descriptor_ = ::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
     if (file.descriptor_ < 0) return file.error("cannot be opened for writing", errno);
     return file;
   }
   std::error_code ignored;
-  const std::filesystem::path resolved = std::filesystem::weakly_canonical(path, ignored);
+  const std::filesystem::path resolved = std::filesystem::weakly_canonical(plain, ignored);
   file.target_ = resolved.empty() ? plain : resolved;
 
   // The process and a count make the name our own; O_EXCL makes sure of it.

@@ -1,0 +1,162 @@
+#include "fusion/mesh/half_edges.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+namespace spectra::fusion {
+
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Side `side` of face f runs from its corner `side` to the next; sides are numbered 3 f + side.
+std::uint32_t next_side(std::uint32_t side) {
+  return side % 3 == 2 ? side - 2 : side + 1;
+}
+std::uint32_t previous_side(std::uint32_t side) {
+  return side % 3 == 0 ? side + 2 : side - 1;
+}
+
+/// Which side lies against which, kNone where there is none, or the edge is cut.
+std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vector<Triangle>& faces,
+                                        HalfEdges& result) {
+  const auto from = [&faces](std::uint32_t side) { return faces[side / 3][side % 3]; };
+  const auto to = [&](std::uint32_t side) { return from(next_side(side)); };
+  const auto side_count = static_cast<std::uint32_t>(3 * faces.size());
+
+  // Counting sort by the lower end; few sides share one, so the rest of the order costs next to nothing.
+  std::vector<std::uint32_t> begins(vertex_count + 1, 0);
+  for (std::uint32_t side = 0; side < side_count; ++side) ++begins[std::min(from(side), to(side)) + 1];
+  for (std::size_t v = 0; v < vertex_count; ++v) begins[v + 1] += begins[v];
+  struct Entry {
+    std::uint32_t upper_end;
+    std::uint32_t side;
+  };
+  std::vector<Entry> entries(side_count);
+  std::vector<std::uint32_t> fill(begins.begin(), begins.end() - 1);
+  for (std::uint32_t side = 0; side < side_count; ++side) {
+    entries[fill[std::min(from(side), to(side))]++] = {std::max(from(side), to(side)), side};
+  }
+
+  std::vector<std::uint32_t> opposite(side_count, kNone);
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    Entry* group = entries.data() + begins[v];
+    Entry* const end = entries.data() + begins[v + 1];
+    std::sort(group, end, [](const Entry& a, const Entry& b) {
+      return std::pair(a.upper_end, a.side) < std::pair(b.upper_end, b.side);
+    });
+    while (group != end) {
+      Entry* const group_end =
+          std::find_if(group, end, [group](const Entry& entry) { return entry.upper_end != group->upper_end; });
+      const std::ptrdiff_t count = group_end - group;
+      if (count == 2 && from(group[0].side) != from(group[1].side)) {
+        opposite[group[0].side] = group[1].side;
+        opposite[group[1].side] = group[0].side;
+      } else if (count > 1) {
+        ++(count == 2 ? result.flipped_edge_count : result.non_manifold_edge_count);
+        result.cut_edge_side_count += static_cast<std::uint64_t>(count);
+        for (const Entry* entry = group + 1; entry != group_end; ++entry) {
+          result.cut_neighbours.emplace_back(group->side / 3, entry->side / 3);
+        }
+      }
+      group = group_end;
+    }
+  }
+  return opposite;
+}
+
+/// Gives every fan of a vertex but the first a vertex of its own, in `faces`.
+void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& opposite, std::vector<Triangle>& faces,
+                  HalfEdges& result) {
+  std::vector<bool> is_done(opposite.size(), false);
+  std::vector<bool> is_seen(vertex_count, false);
+  for (std::uint32_t start = 0; start < opposite.size(); ++start) {
+    if (is_done[start]) continue;
+    const std::uint32_t vertex = faces[start / 3][start % 3];
+    std::uint32_t target = vertex;
+    if (is_seen[vertex]) {
+      target = static_cast<std::uint32_t>(vertex_count + result.source_vertex.size());
+      result.source_vertex.push_back(vertex);
+    }
+    is_seen[vertex] = true;
+    const auto assign = [&](std::uint32_t side) {
+      is_done[side] = true;
+      faces[side / 3][side % 3] = target;
+    };
+    // Corners are named by the side that leaves the vertex there: all round, or to both ends of an open fan.
+    std::uint32_t side = start;
+    do {
+      assign(side);
+      side = opposite[previous_side(side)];
+    } while (side != kNone && side != start);
+    if (side == start) continue;
+    for (std::uint32_t across = opposite[start]; across != kNone; across = opposite[side]) {
+      side = next_side(across);
+      assign(side);
+    }
+  }
+}
+
+void fill_kernel(std::size_t vertex_count, const std::vector<Triangle>& faces,
+                 const std::vector<std::uint32_t>& opposite, MeshKernel& kernel) {
+  using OpenMesh::FaceHandle;
+  using OpenMesh::HalfedgeHandle;
+  using OpenMesh::VertexHandle;
+  const auto side_count = static_cast<std::uint32_t>(opposite.size());
+  const auto vertex_of = [&faces](std::uint32_t side) {
+    return VertexHandle(static_cast<int>(faces[side / 3][side % 3]));
+  };
+
+  std::vector<int> halfedge_of(side_count);
+  int halfedge_count = 0;
+  for (std::uint32_t side = 0; side < side_count; ++side) {
+    const bool is_second = opposite[side] < side;
+    halfedge_of[side] = is_second ? halfedge_of[opposite[side]] + 1 : halfedge_count;
+    if (!is_second) halfedge_count += 2;
+  }
+  kernel.resize(vertex_count, static_cast<std::size_t>(halfedge_count) / 2, faces.size());
+
+  for (std::uint32_t side = 0; side < side_count; ++side) {
+    const HalfedgeHandle halfedge(halfedge_of[side]);
+    const FaceHandle face(static_cast<int>(side / 3));
+    kernel.set_vertex_handle(halfedge, vertex_of(next_side(side)));
+    kernel.set_face_handle(halfedge, face);
+    kernel.set_next_halfedge_handle(halfedge, HalfedgeHandle(halfedge_of[next_side(side)]));
+    if (side % 3 == 0) kernel.set_halfedge_handle(face, halfedge);
+    kernel.set_halfedge_handle(vertex_of(side), halfedge);
+  }
+  // A boundary half-edge leaves the vertex that its side arrives at; each vertex has at most one, and refers to it.
+  for (std::uint32_t side = 0; side < side_count; ++side) {
+    if (opposite[side] != kNone) continue;
+    const HalfedgeHandle boundary(halfedge_of[side] + 1);
+    kernel.set_vertex_handle(boundary, vertex_of(side));
+    kernel.set_boundary(boundary);
+    kernel.set_halfedge_handle(vertex_of(next_side(side)), boundary);
+  }
+  for (std::uint32_t side = 0; side < side_count; ++side) {
+    if (opposite[side] != kNone) continue;
+    kernel.set_next_halfedge_handle(HalfedgeHandle(halfedge_of[side] + 1), kernel.halfedge_handle(vertex_of(side)));
+  }
+}
+
+}  // namespace
+
+HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles) {
+  HalfEdges result;
+  std::vector<Triangle> faces;
+  faces.reserve(triangles.size());
+  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(faces), [vertex_count](const Triangle& triangle) {
+    const auto& [a, b, c] = triangle;
+    return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
+  });
+  const std::vector<std::uint32_t> opposite = paired_sides(vertex_count, faces, result);
+  cut_vertices(vertex_count, opposite, faces, result);
+  fill_kernel(vertex_count + result.source_vertex.size(), faces, opposite, result.kernel);
+  return result;
+}
+
+}  // namespace spectra::fusion
