@@ -1,0 +1,284 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "protocol/draco_codec.hpp"
+#include "protocol/incoming_message.hpp"
+#include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/quality_messages.hpp"
+#include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "protocol/messages/stream_messages.hpp"
+#include "protocol/tile_frame.hpp"
+
+/// The examples of protocol/golden are what docs/protocol.md shows; the web client's tests read the same files.
+/// SPECTRA_UPDATE_GOLDEN=1 in the environment rewrites the frames (the messages are edited by hand).
+namespace spectra::protocol {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const fs::path kGolden = fs::path(SPECTRA_PROTOCOL_DIR) / "golden";
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  EXPECT_TRUE(in) << file;
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// JSON -> struct -> JSON.
+using Passage = std::function<Result<json>(const json&)>;
+
+template <class Message>
+Passage through() {
+  return [](const json& value) -> Result<json> {
+    BOOST_OUTCOME_TRY(const Message message, from_json<Message>(value));
+    return to_json(message);
+  };
+}
+
+Result<json> unchanged(const json& value) {
+  return value;
+}
+
+struct MethodPassages {
+  Passage params = unchanged;
+  Passage result = unchanged;
+};
+
+const std::map<std::string, MethodPassages> kMethods{
+    {"scene.get", {unchanged, through<SceneDescription>()}},
+    {"scene.subscribe", {through<SubscribeRequest>(), unchanged}},
+    {"scene.unsubscribe", {unchanged, unchanged}},
+    {"fusion.set", {through<FusionChange>(), through<FusionReply>()}},
+    {"fusion.get", {unchanged, through<FusionReply>()}},
+    {"quality.set", {through<QualityChange>(), through<QualityReply>()}},
+    {"scene.histogram", {through<HistogramRequest>(), through<HistogramReply>()}},
+    {"scene.probe", {through<ProbeRequest>(), through<ProbeReply>()}},
+    {"scene.extremes", {unchanged, through<ExtremesReply>()}},
+    {"camera.set", {through<CameraSet>(), unchanged}},
+    {"stream.ack", {through<StreamAck>(), unchanged}},
+    {"hello", {through<Hello>(), unchanged}},
+    {"scene.changed", {through<SceneChanged>(), unchanged}},
+    {"fusion.changed", {through<FusionReply>(), unchanged}},
+    {"stream.complete", {through<StreamComplete>(), unchanged}},
+    {"stream.stats", {through<StreamStats>(), unchanged}},
+    {"status", {through<Status>(), unchanged}},
+};
+
+/// The method that a file is an example of: the longest known name that its name starts with.
+std::string method_of(const std::string& file_name) {
+  std::string best;
+  for (const auto& [method, passages] : kMethods)
+    if (file_name.starts_with(method + ".") && method.size() > best.size()) best = method;
+  return best;
+}
+
+RpcId id_in(const json& message) {
+  const json& id = message.at("id");
+  return id.is_string() ? RpcId(id.get<std::string>()) : RpcId(id.get<std::int64_t>());
+}
+
+TEST(GoldenMessages, SurviveDecodingAndEncoding) {
+  std::set<std::string> seen;
+  for (const auto& entry : fs::directory_iterator(kGolden / "messages")) {
+    const std::string name = entry.path().filename().string();
+    SCOPED_TRACE(name);
+    const std::string text = content(entry.path());
+    const json message = json::parse(text);
+    std::string again;
+    if (name.starts_with("error.")) {
+      const json& error = message.at("error");
+      const json& data = error.at("data");
+      const RpcError refused{static_cast<RpcErrorCode>(error.at("code").get<int>()), error.at("message"),
+                             data.at("field"), data.value("limits", "")};
+      again = error_text(message.at("id").is_null() ? std::nullopt : std::optional(id_in(message)), refused);
+    } else {
+      const std::string method = method_of(name);
+      ASSERT_FALSE(method.empty());
+      seen.insert(method);
+      const MethodPassages& passages = kMethods.at(method);
+      if (name.ends_with(".result.json")) {
+        const Result<json> result = passages.result(message.at("result"));
+        ASSERT_TRUE(result.has_value()) << result.error().message;
+        again = result_text(id_in(message), result.value());
+      } else {
+        const auto incoming = incoming_message(text, {.max_size_bytes = 1 << 20});
+        ASSERT_TRUE(std::holds_alternative<IncomingMessage>(incoming));
+        const auto& read = std::get<IncomingMessage>(incoming);
+        EXPECT_EQ(read.method, method);
+        EXPECT_EQ(read.id.has_value(), name.ends_with(".request.json"));
+        const Result<json> params = passages.params(read.params);
+        ASSERT_TRUE(params.has_value()) << params.error().message;
+        again = notification_text(read.method, params.value());
+        if (read.id) {
+          json request = json::parse(again);
+          request["id"] = message.at("id");
+          EXPECT_EQ(id_in(message), *read.id);
+          again = request.dump();
+        }
+      }
+    }
+    EXPECT_EQ(json::parse(again), message);
+  }
+  for (const auto& [method, passages] : kMethods) EXPECT_TRUE(seen.contains(method)) << "no example of " << method;
+}
+
+TEST(GoldenMessages, CoverEveryMethodOfTheSchema) {
+  const json methods = json::parse(content(fs::path(SPECTRA_PROTOCOL_DIR) / "schema" / "methods.json"));
+  std::set<std::string> named;
+  for (const auto& [group, entries] : methods.items())
+    for (const auto& [method, types] : entries.items()) {
+      named.insert(method);
+      EXPECT_TRUE(kMethods.contains(method)) << method;
+      for (const auto& [part, reference] : types.items()) {
+        const auto text = reference.get<std::string>();
+        const std::size_t hash = text.find('#');
+        const json schema = json::parse(content(fs::path(SPECTRA_PROTOCOL_DIR) / "schema" / text.substr(0, hash)));
+        EXPECT_TRUE(schema.contains(json::json_pointer(text.substr(hash + 1)))) << text;
+      }
+    }
+  for (const auto& [method, passages] : kMethods) EXPECT_TRUE(named.contains(method)) << method;
+}
+
+json number_or_null(float value) {
+  return std::isnan(value) ? json(nullptr) : json(value);
+}
+
+json header_json(const TileFrameHeader& header) {
+  return {{"kind", static_cast<int>(header.kind)},
+          {"child_mask", header.child_mask},
+          {"sequence", header.sequence},
+          {"generation", header.generation},
+          {"tile", {header.tile.level, header.tile.x, header.tile.y, header.tile.z}},
+          {"revision", header.revision},
+          {"vertex_count", header.vertex_count},
+          {"origin_m", header.origin_m},
+          {"position_step_m", header.position_step_m},
+          {"geometric_error_m", header.geometric_error_m},
+          {"lowest_celsius", number_or_null(header.lowest_celsius)},
+          {"highest_celsius", number_or_null(header.highest_celsius)},
+          {"payload_size_bytes", header.payload_size_bytes}};
+}
+
+/// What a frame says, decoded: the .json beside a .bin.
+json frame_json(const TileFrameView& frame) {
+  json described{{"header", header_json(frame.header)}};
+  if (frame.header.kind == FrameKind::Geometry) {
+    const auto geometry = decoded_geometry(frame.payload);
+    if (!geometry) return geometry.error().message;
+    described["positions_m"] = geometry.value().positions_m;
+    described["triangles"] = geometry.value().triangles;
+  } else if (frame.header.kind == FrameKind::Colours) {
+    const auto colours = decoded_colours(frame.payload);
+    if (!colours) return colours.error().message;
+    described["colours"] = colours.value();
+  }
+  return described;
+}
+
+std::vector<std::byte> frame_bytes(TileFrameHeader header, const std::vector<std::byte>& payload) {
+  header.payload_size_bytes = static_cast<std::uint32_t>(payload.size());
+  const auto head = encoded_header(header);
+  std::vector<std::byte> bytes(head.size() + payload.size());
+  std::copy(payload.begin(), payload.end(), std::copy(head.begin(), head.end(), bytes.begin()));
+  return bytes;
+}
+
+/// The frames as they are made: a bent square of two tiles' width, its colours, a cloud, a tile that leaves.
+std::map<std::string, std::vector<std::byte>> made_frames() {
+  std::vector<LatticePoint> positions;
+  std::vector<TileTriangle> triangles;
+  std::vector<ColourBytes> colours;
+  for (std::uint32_t y = 0; y < 4; ++y)
+    for (std::uint32_t x = 0; x < 4; ++x) {
+      positions.push_back({static_cast<std::int32_t>(100 * x), static_cast<std::int32_t>(90 * y),
+                           static_cast<std::int32_t>(7 * x * y)});
+      colours.push_back({static_cast<std::uint8_t>(60 * x), static_cast<std::uint8_t>(70 * y), 200});
+      if (x > 0 && y > 0) {
+        const std::uint32_t corner = 4 * y + x;
+        triangles.push_back({corner - 5, corner - 4, corner});
+        triangles.push_back({corner - 5, corner, corner - 1});
+      }
+    }
+  TileFrameHeader header;
+  header.kind = FrameKind::Geometry;
+  header.sequence = 1;
+  header.tile = {2, 1, 3, 0};
+  header.revision = 3;
+  header.origin_m = {-4.5F, 2.25F, 0};
+  header.position_step_m = 0.001953125F;
+  header.lowest_celsius = 4.25F;
+  header.highest_celsius = 36.5F;
+  const EncodedGeometry mesh = encoded_geometry(positions, triangles, header.position_step_m, 7).value();
+  header.vertex_count = static_cast<std::uint32_t>(mesh.input_of_decoded.size());
+
+  std::map<std::string, std::vector<std::byte>> frames;
+  frames["geometry"] = frame_bytes(header, mesh.payload);
+
+  std::vector<ColourBytes> decoded_order;
+  for (const std::uint32_t input : mesh.input_of_decoded) decoded_order.push_back(colours[input]);
+  header.kind = FrameKind::Colours;
+  header.sequence = 2;
+  header.generation = 9;
+  frames["colours"] = frame_bytes(header, encoded_colours(decoded_order, 8, 7).value());
+  header.sequence = 3;
+  header.generation = 10;
+  frames["colours_6_bits"] = frame_bytes(header, encoded_colours(decoded_order, 6, 7).value());
+
+  header.kind = FrameKind::Remove;
+  header.sequence = 4;
+  header.generation = 0;
+  header.vertex_count = 0;
+  frames["remove"] = frame_bytes(header, {});
+
+  header.kind = FrameKind::Geometry;
+  header.child_mask = 0x81;
+  header.sequence = 5;
+  header.tile = {0, 0, 0, 0};
+  header.geometric_error_m = 0.125F;
+  header.lowest_celsius = header.highest_celsius = std::numeric_limits<float>::quiet_NaN();
+  const EncodedGeometry cloud = encoded_geometry(positions, {}, header.position_step_m, 7).value();
+  header.vertex_count = static_cast<std::uint32_t>(cloud.input_of_decoded.size());
+  frames["points"] = frame_bytes(header, cloud.payload);
+  return frames;
+}
+
+TEST(GoldenFrames, DecodeToTheirDescriptionAndBack) {
+  const bool update = std::getenv("SPECTRA_UPDATE_GOLDEN") != nullptr;
+  for (const auto& [name, made] : made_frames()) {
+    SCOPED_TRACE(name);
+    const fs::path binary = kGolden / "frames" / (name + ".bin");
+    const fs::path description = kGolden / "frames" / (name + ".json");
+    if (update) {
+      std::ofstream(binary, std::ios::binary)
+          .write(reinterpret_cast<const char*>(made.data()), static_cast<std::streamsize>(made.size()));
+      std::ofstream(description) << frame_json(decoded_frame(made).value()).dump() << "\n";
+    }
+    const std::string bytes = content(binary);
+    const auto frame = decoded_frame(std::as_bytes(std::span(bytes)));
+    ASSERT_TRUE(frame.has_value()) << frame.error().message;
+    EXPECT_EQ(frame_json(frame.value()), json::parse(content(description)));
+    const auto header = encoded_header(frame.value().header);
+    EXPECT_TRUE(std::equal(header.begin(), header.end(), std::as_bytes(std::span(bytes)).begin()));
+    // Another release of Draco may pack the payload otherwise; what it says must stay.
+    EXPECT_EQ(frame_json(decoded_frame(made).value()).at("header").at("vertex_count"),
+              frame_json(frame.value()).at("header").at("vertex_count"));
+  }
+}
+
+}  // namespace
+}  // namespace spectra::protocol

@@ -1,0 +1,158 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/quality_messages.hpp"
+#include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "protocol/messages/stream_messages.hpp"
+
+namespace spectra::protocol {
+namespace {
+
+using nlohmann::json;
+
+/// The field that a refusal names, or "accepted".
+template <class Message>
+std::string refused_field(const std::string& text) {
+  const auto read = from_json<Message>(json::parse(text));
+  if (read) return "accepted";
+  EXPECT_EQ(read.error().code, RpcErrorCode::InvalidParams);
+  EXPECT_NE(read.error().message.find(read.error().field), std::string::npos);
+  return read.error().field;
+}
+
+TEST(CameraSet, NamesTheFieldThatIsWrong) {
+  const json good = json::parse(
+      R"({"eye":[1,2,3],"target":[0,0,0],"up":[0,0,1],"fov_y_deg":50,"viewport":[800,600],"unknown":{"x":1}})");
+  const auto changed = [&good](const char* key, json value) {
+    json copy = good;
+    copy[key] = std::move(value);
+    return copy.dump();
+  };
+  EXPECT_EQ(refused_field<CameraSet>(good.dump()), "accepted");
+  EXPECT_EQ(refused_field<CameraSet>(changed("viewport", {800.0, 600.0})), "accepted");
+  EXPECT_EQ(refused_field<CameraSet>(changed("eye", {1, 2})), "eye");
+  EXPECT_EQ(refused_field<CameraSet>(changed("eye", {1, "2", 3})), "eye[1]");
+  EXPECT_EQ(refused_field<CameraSet>(changed("up", {1e39, 0, 0})), "up");
+  EXPECT_EQ(refused_field<CameraSet>(changed("target", nullptr)), "target");
+  EXPECT_EQ(refused_field<CameraSet>(changed("fov_y_deg", 180)), "fov_y_deg");
+  EXPECT_EQ(refused_field<CameraSet>(changed("fov_y_deg", "50")), "fov_y_deg");
+  EXPECT_EQ(refused_field<CameraSet>(changed("viewport", {0, 600})), "viewport");
+  EXPECT_EQ(refused_field<CameraSet>(changed("viewport", {800.5, 600})), "viewport[0]");
+  EXPECT_EQ(refused_field<CameraSet>(changed("viewport", {1e300, 600})), "viewport[0]");
+  json without = good;
+  without.erase("up");
+  EXPECT_EQ(refused_field<CameraSet>(without.dump()), "up");
+  EXPECT_EQ(refused_field<CameraSet>("[]"), "");
+}
+
+TEST(StreamAck, TakesWholeNumbersOf32BitsOnly) {
+  EXPECT_EQ(from_json<StreamAck>(json::parse(R"({"sequence":4294967295})")).value().sequence, 4294967295U);
+  EXPECT_EQ(from_json<StreamAck>(json::parse(R"({"sequence":7.0})")).value().sequence, 7U);
+  for (const std::string value : {"-1", "4294967296", "1.5", "18446744073709551615", "1e20", "true", "\"1\"", "null"})
+    EXPECT_EQ(refused_field<StreamAck>("{\"sequence\":" + value + "}"), "sequence") << value;
+}
+
+TEST(SubscribeRequest, KnowsItsChannels) {
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused","visible"]})"), "accepted");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":[]})"), "channels");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused","sound"]})"), "channels[1]");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":"fused"})"), "channels");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":0})"), "in_flight_bytes");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":2147483648})"),
+            "in_flight_bytes");
+}
+
+TEST(FusionChange, KeepsWhatIsAbsentAbsent) {
+  const auto empty = from_json<FusionChange>(json::object());
+  ASSERT_TRUE(empty.has_value());
+  EXPECT_FALSE(empty.value().method || empty.value().palette || empty.value().range || empty.value().missing);
+  EXPECT_TRUE(empty.value().params.empty());
+}
+
+TEST(FusionChange, ReadsEveryKindOfParameter) {
+  const auto change = from_json<FusionChange>(
+      json::parse(R"({"params":{"a":null,"b":0.5,"c":3,"d":true,"e":"both","f":18446744073709551615}})"));
+  ASSERT_TRUE(change.has_value());
+  const ParameterValues expected{{"a", nullptr},
+                                 {"b", 0.5},
+                                 {"c", std::int64_t{3}},
+                                 {"d", true},
+                                 {"e", std::string("both")},
+                                 {"f", 18446744073709551615.0}};
+  EXPECT_EQ(change.value().params, expected);
+}
+
+TEST(FusionChange, NamesTheFieldThatIsWrong) {
+  EXPECT_EQ(refused_field<FusionChange>(R"({"method":7})"), "method");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"method":null})"), "method");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"params":[1]})"), "params");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"params":{"alpha":[1]}})"), "params.alpha");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"params":{"alpha":{}}})"), "params.alpha");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"auto"}})"), "accepted");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"auto","min":null,"max":null}})"), "accepted");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"manual","min":1,"max":1}})"), "accepted");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"min":1,"max":2}})"), "range.mode");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"manual","min":1}})"), "range.max");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"manual","min":null,"max":2}})"), "range.min");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"manual","min":3,"max":2}})"), "range.max");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"range":{"mode":"sometimes"}})"), "range.mode");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"missing":"visible"})"), "accepted");
+  EXPECT_EQ(refused_field<FusionChange>(R"({"missing":"#00fF7a"})"), "accepted");
+  for (const std::string missing : {"", "#", "#12345", "#1234567", "#12345g", "Visible"})
+    EXPECT_EQ(refused_field<FusionChange>(json{{"missing", missing}}.dump()), "missing") << missing;
+}
+
+TEST(QualityChange, HoldsTheBoundsOfItsKnobs) {
+  EXPECT_EQ(refused_field<QualityChange>("{}"), "accepted");
+  EXPECT_EQ(refused_field<QualityChange>(R"({"mode":"fast"})"), "mode");
+  for (const std::string bits : {"4", "8"})
+    EXPECT_EQ(refused_field<QualityChange>("{\"colour_bits\":" + bits + "}"), "accepted");
+  for (const std::string bits : {"3", "9", "6.5", "\"8\""})
+    EXPECT_EQ(refused_field<QualityChange>("{\"colour_bits\":" + bits + "}"), "colour_bits");
+  for (const std::string speed : {"-1", "11"})
+    EXPECT_EQ(refused_field<QualityChange>("{\"encoder_speed\":" + speed + "}"), "encoder_speed");
+  for (const char* key : {"position_step_mm", "pixel_error", "latency_target_ms"})
+    for (const json& value : {json(0), json(-1), json("1"), json(nullptr)})
+      EXPECT_EQ(refused_field<QualityChange>(json{{key, value}}.dump()), key);
+}
+
+TEST(HistogramRequest, HoldsTheBoundsOfBins) {
+  EXPECT_EQ(refused_field<HistogramRequest>(R"({"bins":1})"), "accepted");
+  EXPECT_EQ(refused_field<HistogramRequest>(R"({"bins":4096})"), "accepted");
+  for (const std::string bins : {"0", "4097", "-5", "2.5", "null"})
+    EXPECT_EQ(refused_field<HistogramRequest>("{\"bins\":" + bins + "}"), "bins");
+  EXPECT_EQ(refused_field<HistogramRequest>("{}"), "bins");
+}
+
+TEST(ToJson, WritesNullForNumbersThatAreNotFinite) {
+  ProbeReply reply;
+  reply.temperature = std::nan("");
+  reply.distance = std::numeric_limits<double>::infinity();
+  const json written = to_json(reply);
+  EXPECT_TRUE(written.at("temperature").is_null());
+  EXPECT_TRUE(written.at("distance").is_null());
+  FusionState state;
+  state.params["k"] = -std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(to_json(state).at("params").at("k").is_null());
+}
+
+TEST(ToJson, LeavesOutWhatIsAbsentAndWritesNullWhereItBelongs) {
+  ParameterDescription parameter;
+  parameter.name = "threshold";
+  parameter.kind = ParameterKind::Temperature;
+  const json written = to_json(parameter);
+  EXPECT_TRUE(written.at("default").is_null());
+  for (const char* key : {"min", "max", "exclusive_min", "step", "unit", "options"})
+    EXPECT_FALSE(written.contains(key));
+  EXPECT_TRUE(to_json(Status{"a", StatusLevel::Info, {}}).at("message").is_null());
+  EXPECT_TRUE(to_json(SceneTemperature{}).at("mean").is_null());
+}
+
+}  // namespace
+}  // namespace spectra::protocol
