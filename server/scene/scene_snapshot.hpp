@@ -23,19 +23,20 @@ struct Bounds {
 
 /// One node of the tile tree: flat arrays of its vertices. Owned vertices come first: every vertex of the scene is owned
 /// by exactly one leaf, copies on a border follow. Vertices of no triangle are owned too, but not part of the geometry.
+/// Every tile of a scene with triangles has at least one.
 struct Tile {
   protocol::TileId id;
   std::uint8_t child_mask = 0;
   float geometric_error_m = 0;  ///< Against the full mesh; 0 at leaves.
   Bounds bounds;
-  float lowest_celsius = 0;  ///< Under this tile in the full mesh; NaN = no temperature.
+  float lowest_celsius = 0;  ///< Of the geometry under this tile in the full mesh; NaN = no temperature.
   float highest_celsius = 0;
   std::uint32_t owned_count = 0;
   std::vector<fusion::Vec3f> positions;
   std::vector<fusion::Rgb8> visible;
   std::vector<float> temperature_celsius;
-  std::vector<std::uint32_t> source_vertex;  ///< Index in the input, per vertex.
-  std::vector<fusion::Triangle> triangles;   ///< Indices into this tile; empty for a point cloud.
+  std::vector<std::uint32_t> source_vertex;    ///< Index in the input, per vertex.
+  std::vector<fusion::Triangle> triangles;     ///< Indices into this tile; empty for a point cloud.
   std::vector<std::uint32_t> source_triangle;  ///< Index in the input, per triangle (leaves).
 };
 
@@ -59,7 +60,8 @@ struct Extreme {
 class SceneSnapshot {
  public:
   /// Cuts the mesh into octree leaves of about `leaf_vertex_count` vertices (small ones merged with a neighbour).
-  /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store.
+  /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
+  /// for any number of threads. Must not be called from a job of the pool.
   static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
                                                     WorkerPool& pool, std::uint32_t leaf_vertex_count = 32'000);
   virtual ~SceneSnapshot() = default;
@@ -74,12 +76,16 @@ class SceneSnapshot {
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;
-  /// Summary and histogram, for FusionPlan::prepare.
+  /// Summary and histogram, for FusionPlan::prepare. A copy stays valid without the snapshot.
   virtual const fusion::SceneTemperature& temperature() const = 0;
+  /// Of several equally near vertices the first of the input; nothing in an empty scene or at a position that is not
+  /// finite.
   virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
+  /// Of several the first of the input; nothing without thermal data.
   virtual std::optional<Extreme> hottest() const = 0;
   virtual std::optional<Extreme> coldest() const = 0;
-  /// A position step (metres) that loses nothing the eye can see: about a quarter of the median edge length.
+  /// A position step (metres) that loses nothing the eye can see: about a quarter of the median edge length (of a point
+  /// cloud: of the distance to the nearest neighbour). Positive and finite whatever the scene.
   virtual float suggested_position_step_m() const = 0;
   /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
   virtual fusion::MultispectralMesh whole_mesh() const = 0;

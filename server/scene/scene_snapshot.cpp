@@ -1,0 +1,302 @@
+#include "server/scene/scene_snapshot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <list>
+#include <mutex>
+#include <utility>
+
+#include "server/scene/octree_cut.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::Vec3f;
+
+std::span<const float> owned_temperature(const Tile& tile) {
+  return std::span(tile.temperature_celsius).first(tile.owned_count);
+}
+
+double squared_distance(const Vec3f& a, const Vec3f& b) {
+  const double dx = static_cast<double>(a.x) - static_cast<double>(b.x);
+  const double dy = static_cast<double>(a.y) - static_cast<double>(b.y);
+  const double dz = static_cast<double>(a.z) - static_cast<double>(b.z);
+  return dx * dx + dy * dy + dz * dz;
+}
+
+double squared_distance(const Vec3f& p, const Bounds& bounds) {
+  return squared_distance(
+      p, Vec3f{std::clamp(p.x, bounds.min.x, bounds.max.x), std::clamp(p.y, bounds.min.y, bounds.max.y),
+               std::clamp(p.z, bounds.min.z, bounds.max.z)});
+}
+
+/// Histograms of a scene by number of bins, each made when first asked for. Keeps the last few, because a slider may
+/// visit thousands.
+class HistogramSource {
+ public:
+  HistogramSource(std::vector<std::shared_ptr<const Tile>> leaves, const fusion::TemperatureSummary& summary)
+      : leaves_(std::move(leaves)), summary_(summary) {}
+
+  fusion::Histogram histogram(std::uint32_t bins) {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::find_if(recent_.begin(), recent_.end(),
+                                    [&](const fusion::Histogram& h) { return h.counts.size() == bins; });
+    if (found != recent_.end()) {
+      recent_.splice(recent_.begin(), recent_, found);
+      return recent_.front();
+    }
+    fusion::Histogram made{summary_.minimum, summary_.maximum, std::vector<std::uint64_t>(bins)};
+    for (const auto& leaf : leaves_) fusion::add_to_histogram(owned_temperature(*leaf), made);
+    recent_.push_front(std::move(made));
+    if (recent_.size() > kKeptCount) recent_.pop_back();
+    return recent_.front();
+  }
+
+ private:
+  static constexpr std::size_t kKeptCount = 16;
+
+  const std::vector<std::shared_ptr<const Tile>> leaves_;
+  const fusion::TemperatureSummary summary_;
+  std::mutex mutex_;
+  std::list<fusion::Histogram> recent_;
+};
+
+/// Up to `kSampleCount` lengths of what neighbours in a leaf: edges, or in a point cloud nearest vertices.
+std::vector<double> neighbour_distances(const Tile& leaf) {
+  constexpr std::size_t kSampleCount = 256;
+  constexpr std::size_t kPointSampleCount = 16;
+  std::vector<double> distances;
+  const auto keep = [&](double squared) {
+    if (squared > 0) distances.push_back(std::sqrt(squared));
+  };
+  if (!leaf.triangles.empty()) {
+    const std::size_t stride = leaf.triangles.size() / kSampleCount + 1;
+    for (std::size_t t = 0; t < leaf.triangles.size(); t += stride) {
+      const fusion::Triangle& triangle = leaf.triangles[t];
+      for (unsigned corner = 0; corner < 3; ++corner) {
+        keep(squared_distance(leaf.positions[triangle[corner]], leaf.positions[triangle[(corner + 1) % 3]]));
+      }
+    }
+    return distances;
+  }
+  const std::size_t stride = leaf.positions.size() / kPointSampleCount + 1;
+  for (std::size_t v = 0; v < leaf.positions.size(); v += stride) {
+    double nearest = 0;
+    for (const Vec3f& other : leaf.positions) {
+      const double squared = squared_distance(leaf.positions[v], other);
+      if (squared > 0 && (nearest == 0 || squared < nearest)) nearest = squared;
+    }
+    keep(nearest);
+  }
+  return distances;
+}
+
+float position_step_m(std::vector<double> distances, const Bounds& bounds) {
+  double step = 0;
+  if (!distances.empty()) {
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    step = *middle / 4;
+  }
+  // Below the spacing of floats at the far end of the scene a step says nothing.
+  double farthest = 0;
+  for (const Vec3f& corner : {bounds.min, bounds.max}) {
+    for (const float c : {corner.x, corner.y, corner.z}) {
+      if (std::isfinite(c)) farthest = std::max(farthest, std::fabs(static_cast<double>(c)));
+    }
+  }
+  step = std::max(step, farthest * 0x1p-24);
+  if (step == 0) step = 0.001;
+  return static_cast<float>(std::max(step, static_cast<double>(std::numeric_limits<float>::min())));
+}
+
+/// What one leaf contributes to the facts of the scene.
+struct LeafFacts {
+  fusion::TemperatureAccumulator temperature;
+  std::vector<double> distances;
+  std::optional<std::uint32_t> hottest, coldest;  ///< Indices into the leaf.
+};
+
+LeafFacts leaf_facts(const Tile& leaf) {
+  LeafFacts facts;
+  facts.temperature.add(owned_temperature(leaf));
+  facts.distances = neighbour_distances(leaf);
+  const auto is_before = [&](std::uint32_t a, std::uint32_t b) {
+    return leaf.source_vertex[a] < leaf.source_vertex[b];
+  };
+  for (std::uint32_t v = 0; v < leaf.owned_count; ++v) {
+    const float t = leaf.temperature_celsius[v];
+    if (!std::isfinite(t)) continue;
+    const auto better = [&](std::optional<std::uint32_t>& best, bool is_beyond, bool is_equal) {
+      if (is_beyond || (is_equal && is_before(v, *best))) best = v;
+    };
+    const float hot = facts.hottest ? leaf.temperature_celsius[*facts.hottest] : t;
+    const float cold = facts.coldest ? leaf.temperature_celsius[*facts.coldest] : t;
+    better(facts.hottest, !facts.hottest || t > hot, t == hot);
+    better(facts.coldest, !facts.coldest || t < cold, t == cold);
+  }
+  return facts;
+}
+
+class TiledSnapshot final : public SceneSnapshot {
+ public:
+  TiledSnapshot(fusion::MultispectralMesh mesh, std::uint32_t revision, WorkerPool& pool,
+                std::uint32_t leaf_vertex_count)
+      : name_(mesh.name),
+        revision_(revision),
+        vertex_count_(mesh.vertex_count()),
+        triangle_count_(mesh.triangle_count()),
+        is_point_cloud_(mesh.is_point_cloud()),
+        origin_(mesh.origin),
+        has_visible_(mesh.has_visible),
+        has_temperature_(mesh.has_temperature),
+        double_positions_(mesh.double_positions) {
+    std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(mesh), pool, leaf_vertex_count);
+    std::vector<LeafFacts> facts(leaves.size());
+    pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
+    tiles_.assign(leaves.begin(), leaves.end());
+    leaves_ = tiles_;
+    gather(std::move(facts));
+  }
+
+  const std::string& name() const override { return name_; }
+  std::uint32_t revision() const override { return revision_; }
+  std::uint64_t vertex_count() const override { return vertex_count_; }
+  std::uint64_t triangle_count() const override { return triangle_count_; }
+  bool is_point_cloud() const override { return is_point_cloud_; }
+  fusion::Vec3d origin() const override { return origin_; }
+  const Bounds& bounds() const override { return bounds_; }
+  int level_count() const override { return tiles_.empty() ? 0 : tiles_.back()->id.level + 1; }
+  std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
+  const fusion::SceneTemperature& temperature() const override { return temperature_; }
+  std::optional<Extreme> hottest() const override { return hottest_; }
+  std::optional<Extreme> coldest() const override { return coldest_; }
+  float suggested_position_step_m() const override { return position_step_m_; }
+
+  std::optional<Probe> probe(Vec3f position) const override {
+    if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) return {};
+    std::vector<std::pair<double, const Tile*>> by_distance;
+    by_distance.reserve(leaves_.size());
+    for (const auto& leaf : leaves_) by_distance.emplace_back(squared_distance(position, leaf->bounds), leaf.get());
+    std::sort(by_distance.begin(), by_distance.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    const Tile* best_tile = nullptr;
+    std::size_t best_vertex = 0;
+    double best_squared = 0;
+    for (const auto& [box_squared, tile] : by_distance) {
+      if (best_tile != nullptr && box_squared > best_squared) break;
+      for (std::size_t v = 0; v < tile->owned_count; ++v) {
+        const double squared = squared_distance(position, tile->positions[v]);
+        if (best_tile == nullptr || squared < best_squared ||
+            (squared == best_squared && tile->source_vertex[v] < best_tile->source_vertex[best_vertex])) {
+          best_tile = tile;
+          best_vertex = v;
+          best_squared = squared;
+        }
+      }
+    }
+    if (best_tile == nullptr) return {};
+    Probe result;
+    result.vertex_index = best_tile->source_vertex[best_vertex];
+    result.position = best_tile->positions[best_vertex];
+    result.visible = best_tile->visible[best_vertex];
+    const float temperature = best_tile->temperature_celsius[best_vertex];
+    if (std::isfinite(temperature)) result.temperature_celsius = temperature;
+    result.distance_m = std::sqrt(best_squared);
+    return result;
+  }
+
+  fusion::MultispectralMesh whole_mesh() const override {
+    fusion::MultispectralMesh mesh;
+    mesh.origin = origin_;
+    mesh.has_visible = has_visible_;
+    mesh.has_temperature = has_temperature_;
+    mesh.double_positions = double_positions_;
+    mesh.name = name_;
+    mesh.resize_vertices(static_cast<std::size_t>(vertex_count_));
+    mesh.triangles().resize(static_cast<std::size_t>(triangle_count_));
+    const std::span<Vec3f> positions = mesh.positions();
+    const std::span<fusion::Rgb8> visible = mesh.visible();
+    const std::span<float> temperature = mesh.temperature_celsius();
+    for (const auto& leaf : leaves_) {
+      for (std::size_t v = 0; v < leaf->owned_count; ++v) {
+        const std::uint32_t source = leaf->source_vertex[v];
+        positions[source] = leaf->positions[v];
+        visible[source] = leaf->visible[v];
+        temperature[source] = leaf->temperature_celsius[v];
+      }
+      for (std::size_t t = 0; t < leaf->triangles.size(); ++t) {
+        fusion::Triangle& triangle = mesh.triangles()[leaf->source_triangle[t]];
+        for (unsigned corner = 0; corner < 3; ++corner) {
+          triangle[corner] = leaf->source_vertex[leaf->triangles[t][corner]];
+        }
+      }
+    }
+    return mesh;
+  }
+
+ private:
+  /// The mesh is freed on return, before anything else is made of the leaves.
+  static std::vector<std::shared_ptr<Tile>> cut_leaves(fusion::MultispectralMesh mesh, WorkerPool& pool,
+                                                       std::uint32_t leaf_vertex_count) {
+    const fusion::MultispectralMesh consumed = std::move(mesh);
+    const OctreeCut cut = octree_cut(consumed, std::max(1u, leaf_vertex_count), pool);
+    std::vector<std::shared_ptr<Tile>> leaves(cut.leaves.size());
+    pool.for_each(leaves.size(), [&](std::size_t i) { leaves[i] = leaf_tile(consumed, cut.leaves[i]); });
+    return leaves;
+  }
+
+  void gather(std::vector<LeafFacts> facts) {
+    fusion::TemperatureAccumulator accumulator;
+    std::vector<double> distances;
+    std::uint32_t hottest_source = 0, coldest_source = 0;
+    const auto take = [](std::optional<Extreme>& best, std::uint32_t& best_source, const Tile& leaf,
+                         std::optional<std::uint32_t> vertex, float sign) {
+      if (!vertex) return;
+      const float t = leaf.temperature_celsius[*vertex];
+      const std::uint32_t source = leaf.source_vertex[*vertex];
+      if (!best || sign * t > sign * best->temperature_celsius ||
+          (t == best->temperature_celsius && source < best_source)) {
+        best = Extreme{leaf.positions[*vertex], t};
+        best_source = source;
+      }
+    };
+    std::vector<Vec3f> corners;
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+      const Tile& leaf = *leaves_[i];
+      accumulator.merge(facts[i].temperature);
+      distances.insert(distances.end(), facts[i].distances.begin(), facts[i].distances.end());
+      take(hottest_, hottest_source, leaf, facts[i].hottest, 1.0f);
+      take(coldest_, coldest_source, leaf, facts[i].coldest, -1.0f);
+      corners.push_back(leaf.bounds.min);
+      corners.push_back(leaf.bounds.max);
+    }
+    if (!corners.empty()) bounds_ = bounds_of(corners);
+    position_step_m_ = position_step_m(std::move(distances), bounds_);
+    temperature_.summary = accumulator.summary();
+    const auto source = std::make_shared<HistogramSource>(leaves_, temperature_.summary);
+    temperature_.histogram = [source](std::uint32_t bins) { return source->histogram(bins); };
+  }
+
+  std::string name_;
+  std::uint32_t revision_;
+  std::uint64_t vertex_count_;
+  std::uint64_t triangle_count_;
+  bool is_point_cloud_;
+  fusion::Vec3d origin_;
+  bool has_visible_, has_temperature_, double_positions_;
+  Bounds bounds_;
+  std::vector<std::shared_ptr<const Tile>> tiles_;
+  std::vector<std::shared_ptr<const Tile>> leaves_;
+  fusion::SceneTemperature temperature_;
+  std::optional<Extreme> hottest_, coldest_;
+  float position_step_m_ = 0;
+};
+
+}  // namespace
+
+std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::MultispectralMesh mesh, std::uint32_t revision,
+                                                          WorkerPool& pool, std::uint32_t leaf_vertex_count) {
+  return std::make_shared<TiledSnapshot>(std::move(mesh), revision, pool, leaf_vertex_count);
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "server/scene/scene_snapshot.hpp"
+
+namespace spectra::server {
+
+/// Holds the scene that is served now. Thread-safe; readers take the pointer and never wait for a build.
+class SceneStore {
+ public:
+  using Listener = std::function<void(const std::shared_ptr<const SceneSnapshot>&)>;
+
+  /// Ends a subscription when destroyed; may outlive the store. A call that is under way in another thread is not waited
+  /// for, so a listener holds what it needs by weak pointer.
+  class Subscription {
+   public:
+    Subscription() = default;
+
+   private:
+    friend class SceneStore;
+    explicit Subscription(std::shared_ptr<Listener> listener) : listener_(std::move(listener)) {}
+    std::shared_ptr<Listener> listener_;
+  };
+
+  /// The newest scene; null while there is none.
+  std::shared_ptr<const SceneSnapshot> current() const;
+
+  /// Builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
+  /// from several threads are served one after the other, so that revisions only rise. Must not be called from a job of
+  /// the pool or from a listener.
+  std::shared_ptr<const SceneSnapshot> replace(fusion::MultispectralMesh mesh, WorkerPool& pool);
+
+  /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
+  [[nodiscard]] Subscription subscribe(Listener listener);
+
+ private:
+  std::mutex replace_mutex_;  // held while a scene is built and told of; taken before mutex_
+  mutable std::mutex mutex_;
+  std::shared_ptr<const SceneSnapshot> current_;
+  std::vector<std::weak_ptr<Listener>> listeners_;
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+
+#include "fusion/mesh/multispectral_mesh.hpp"
+
+namespace spectra::testing {
+
+/// A rough terrain of columns x rows vertices, one metre apart, in scan (shuffled) order of vertices and triangles; every
+/// seventh temperature is missing; vertex 0 is used by no triangle when `has_lone_vertices`.
+struct TerrainOptions {
+  std::uint32_t columns = 100, rows = 100;
+  std::uint32_t seed = 1;
+  bool is_shuffled = true;
+  bool has_lone_vertices = false;
+  bool has_missing_temperature = true;
+};
+fusion::MultispectralMesh terrain(const TerrainOptions& options);
+
+/// Points all over a cube of one metre, with colours and temperatures.
+fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed);
+
+/// The same again: meshes are not copyable.
+fusion::MultispectralMesh copy_of(const fusion::MultispectralMesh& mesh);
+
+}  // namespace spectra::testing

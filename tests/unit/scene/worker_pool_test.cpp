@@ -1,0 +1,136 @@
+#include "server/scene/worker_pool.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace spectra::server {
+namespace {
+
+TEST(WorkerPool, RunsPostedJobs) {
+  WorkerPool pool(2);
+  std::promise<int> answer;
+  pool.post([&] { answer.set_value(42); });
+  EXPECT_EQ(answer.get_future().get(), 42);
+}
+
+TEST(WorkerPool, HasAtLeastOneThread) {
+  WorkerPool pool(0);
+  EXPECT_EQ(pool.thread_count(), 1u);
+}
+
+TEST(WorkerPool, StartsLowerPriorityNumbersFirstAndEqualsInOrder) {
+  WorkerPool pool(1);
+  std::promise<void> gate;
+  std::promise<void> last;
+  std::vector<int> order;
+  pool.post([opened = gate.get_future().share()] { opened.wait(); });
+  for (const int id : {10, 11}) pool.post([&order, id] { order.push_back(id); }, 5);
+  for (const int id : {0, 1}) pool.post([&order, id] { order.push_back(id); }, -5);
+  pool.post([&] { last.set_value(); }, 9);
+  gate.set_value();
+  last.get_future().wait();
+  EXPECT_EQ(order, (std::vector<int>{0, 1, 10, 11}));
+}
+
+TEST(WorkerPool, SurvivesAJobThatThrows) {
+  WorkerPool pool(1);
+  std::promise<void> after;
+  pool.post([] { throw std::runtime_error("expected by a test"); });
+  pool.post([&] { after.set_value(); });
+  after.get_future().wait();
+}
+
+TEST(WorkerPool, ForEachRunsEveryIndexOnce) {
+  WorkerPool pool(3);
+  std::vector<std::atomic<int>> runs(1000);
+  pool.for_each(runs.size(), [&](std::size_t i) { ++runs[i]; });
+  for (const auto& count : runs) EXPECT_EQ(count, 1);
+  pool.for_each(0, [](std::size_t) { FAIL(); });
+}
+
+TEST(WorkerPool, ForEachNeedsNoFreeWorker) {
+  WorkerPool pool(1);
+  std::promise<void> gate;
+  pool.post([opened = gate.get_future().share()] { opened.wait(); });
+  int sum = 0;
+  pool.for_each(10, [&](std::size_t i) { sum += static_cast<int>(i); });
+  EXPECT_EQ(sum, 45);
+  gate.set_value();
+}
+
+TEST(WorkerPool, ForEachFromSeveralThreads) {
+  WorkerPool pool(2);
+  std::vector<std::future<std::size_t>> sums;
+  for (int caller = 0; caller < 4; ++caller) {
+    sums.push_back(std::async(std::launch::async, [&pool] {
+      std::atomic<std::size_t> sum{0};
+      for (int round = 0; round < 50; ++round) pool.for_each(20, [&](std::size_t i) { sum += i; });
+      return sum.load();
+    }));
+  }
+  for (auto& sum : sums) EXPECT_EQ(sum.get(), 50u * 190u);
+}
+
+TEST(WorkerPool, ForEachRethrows) {
+  WorkerPool pool(2);
+  EXPECT_THROW(pool.for_each(100,
+                             [](std::size_t i) {
+                               if (i == 37) throw std::runtime_error("expected by a test");
+                             }),
+               std::runtime_error);
+}
+
+TEST(WorkerPool, LongForEachLetsOtherJobsIn) {
+  WorkerPool pool(1);
+  const auto caller = std::this_thread::get_id();
+  std::atomic<bool> is_posted{false};
+  std::atomic<int> worker_runs{0};
+  std::atomic<int> seen{-1};
+  // The caller is held at its first index, so that the only worker has to run all others.
+  pool.for_each(100, [&](std::size_t) {
+    if (std::this_thread::get_id() == caller) {
+      if (is_posted) return;
+      pool.post([&] { seen = worker_runs.load(); });
+      is_posted = true;
+      while (seen < 0) std::this_thread::yield();
+    } else {
+      while (!is_posted) std::this_thread::yield();
+      ++worker_runs;
+    }
+  });
+  EXPECT_LT(seen, 99);
+}
+
+TEST(WorkerPool, DropsWaitingJobsWhenDestroyed) {
+  const auto token = std::make_shared<int>(1);
+  std::atomic<bool> has_run{false};
+  std::promise<void> started;
+  std::promise<void> gate;
+  std::future<void> opening;
+  {
+    WorkerPool pool(1);
+    pool.post([&started, opened = gate.get_future().share()] {
+      started.set_value();
+      opened.wait();
+    });
+    pool.post([token, &has_run] { has_run = true; });
+    started.get_future().wait();
+    // The running job ends only after the destructor has emptied the queue: then `token` is the only owner left.
+    opening = std::async(std::launch::async, [&] {
+      while (token.use_count() > 1) std::this_thread::yield();
+      gate.set_value();
+    });
+  }
+  opening.wait();
+  EXPECT_FALSE(has_run);
+}
+
+}  // namespace
+}  // namespace spectra::server
