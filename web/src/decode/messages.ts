@@ -1,0 +1,38 @@
+/** What the page and its decode workers say to each other. */
+
+export interface GeometryJob {
+  kind: 'geometry';
+  payload: Uint8Array<ArrayBuffer>;
+  origin_m: [number, number, number];
+}
+export interface ColoursJob {
+  kind: 'colours';
+  payload: Uint8Array<ArrayBuffer>;
+}
+export type DecodeJob = GeometryJob | ColoursJob;
+
+export interface DecodedGeometry {
+  kind: 'geometry';
+  /** Metres relative to the scene origin. */
+  positions: Float32Array<ArrayBuffer>;
+  /** Null: a point cloud. */
+  indices: Uint16Array<ArrayBuffer> | Uint32Array<ArrayBuffer> | null;
+  centre: [number, number, number];
+  radius: number;
+  bounds: { min: [number, number, number]; max: [number, number, number] };
+  /** Sum of the triangles' normals, each as long as twice the triangle's area, and the sum of those lengths. */
+  normal_sum: [number, number, number];
+  area_sum: number;
+}
+export interface DecodedColours {
+  kind: 'colours';
+  /** Red, green, blue, 255 per vertex: sRGB bytes as they go to the screen. */
+  rgba: Uint8Array<ArrayBuffer>;
+}
+export type DecodeResult = DecodedGeometry | DecodedColours;
+
+export interface WorkerRequest {
+  id: number;
+  job: DecodeJob;
+}
+export type WorkerReply = { id: number; result: DecodeResult } | { id: number; error: string };

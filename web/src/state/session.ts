@@ -1,0 +1,628 @@
+import { DecodePool, Superseded } from '../decode/pool';
+import type { DecodeJob, DecodeResult } from '../decode/messages';
+import { decodeTileFrame, FrameKind, type TileFrame, tileKey } from '../protocol/frame';
+import {
+  extremes,
+  type Fusion,
+  type FusionChange,
+  fusionState,
+  type Hello,
+  histogram,
+  type ParameterValue,
+  probe,
+  type Quality,
+  type QualityChange,
+  qualityState,
+  type Scene,
+  sceneChanged,
+  status,
+  type StreamComplete,
+  streamComplete,
+  streamStats,
+  type Vec3,
+} from '../protocol/messages';
+import { fittedView, guessUpAxis, type Insets, meanNormal, samplePoints, type UpAxis, viewDirection } from '../scene/first_view';
+import { TileSet } from '../scene/tile_set';
+import { type CameraPose, FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
+import { Acknowledger } from '../transport/acknowledger';
+import { Coalescer } from '../transport/coalescer';
+import { Connection, ConnectionLost, RpcError } from '../transport/connection';
+import { mergedChange, wholeChange } from './fusion_change';
+import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
+
+const HISTOGRAM_BINS = 192;
+/** Least time between two changes of the settings, and between two camera messages. */
+const CHANGE_INTERVAL_MS = 33;
+const CAMERA_INTERVAL_MS = 100;
+const HOVER_INTERVAL_MS = 120;
+const TICK_MS = 100;
+/** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
+const BYTES_PER_PICTURE = 6 * 1024 * 1024;
+
+interface Decoded {
+  frame: TileFrame;
+  result: DecodeResult;
+}
+
+function createDecodeWorker(): Worker {
+  return new Worker(new URL('../decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' });
+}
+
+/** One user's session: the connection, what it brings, and the actions of the interface. */
+export class Session {
+  readonly viewport: Viewport;
+  readonly tiles: TileSet;
+  readonly #connection: Connection;
+  readonly #pool = new DecodePool(createDecodeWorker);
+  readonly #acknowledger = new Acknowledger((sequence) => this.#connection.notify('stream.ack', { sequence }));
+  readonly #fusionSender: Coalescer<FusionChange>;
+  readonly #qualitySender: Coalescer<QualityChange>;
+  readonly #cameraSender: Coalescer<CameraPose>;
+  readonly #histogramAsker: Coalescer<true>;
+  readonly #hoverAsker: Coalescer<{ x: number; y: number }>;
+  readonly #ticker: ReturnType<typeof setInterval>;
+
+  /** Decoded, waiting for the next picture; the newest per tile and kind. */
+  #decoded = new Map<string, Decoded>();
+  #removedAt = new Map<string, number>();
+  #connectionNumber = 0;
+  #lastSequence = 0;
+  #completeAfter: { sequence: number; message: StreamComplete } | null = null;
+  #userMoved = false;
+  #viewedScene: string | null = null;
+  #qualityChanged = false;
+  #bytesBefore = 0;
+  #rememberedParams = new Map<string, Record<string, ParameterValue>>();
+  #lastFusedMethod: string | null = null;
+  #rateWindow: { at: number; bytes: number }[] = [];
+  #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
+
+  constructor(
+    canvas: HTMLCanvasElement,
+    readonly store: Store,
+    url: string,
+  ) {
+    this.viewport = new Viewport(canvas, {
+      onCamera: (pose) => this.#cameraMoved(pose),
+      onUserMove: () => {
+        this.#userMoved = true;
+      },
+      beforeRender: () => this.#bringIn(),
+    });
+    this.tiles = new TileSet((geometry, rgba) => this.viewport.tiles.create(geometry, rgba));
+    this.#connection = new Connection(url, {
+      onHello: (message) => this.#greeted(message),
+      onNotification: (method, params) => this.#notified(method, params),
+      onFrame: (message) => this.#received(message),
+      onState: (state) => {
+        store.link = state;
+        if (state.phase === 'waiting' && store.lostAt === null && store.scene !== undefined) this.#disconnected();
+      },
+      onProtocolError: (error) => console.warn('left out:', error.message),
+      onRoundTrip: (round_trip_ms) => {
+        const before = store.round_trip_ms;
+        store.round_trip_ms = before === null ? round_trip_ms : before + (round_trip_ms - before) * 0.3;
+      },
+    });
+    this.#fusionSender = new Coalescer({
+      send: (change) => this.#sendFusion(change),
+      merge: mergedChange,
+      interval_ms: CHANGE_INTERVAL_MS,
+      max_in_flight: 3,
+      onIdle: () => {
+        store.wanted = null;
+      },
+    });
+    this.#qualitySender = new Coalescer({
+      send: (change) => this.#sendQuality(change),
+      merge: (earlier, later) => ({ ...earlier, ...later }),
+      interval_ms: CHANGE_INTERVAL_MS,
+      max_in_flight: 1,
+    });
+    this.#cameraSender = new Coalescer({
+      send: (pose) => {
+        this.#connection.notify('camera.set', pose);
+        return Promise.resolve();
+      },
+      merge: (_earlier, later) => later,
+      interval_ms: CAMERA_INTERVAL_MS,
+      max_in_flight: 1,
+    });
+    this.#histogramAsker = new Coalescer({
+      send: () => this.#askHistogram(),
+      merge: () => true,
+      interval_ms: 100,
+      max_in_flight: 1,
+    });
+    this.#hoverAsker = new Coalescer({
+      send: (place) => this.#askHover(place),
+      merge: (_earlier, later) => later,
+      interval_ms: HOVER_INTERVAL_MS,
+      max_in_flight: 1,
+    });
+    this.viewport.setBackground(store.background);
+    this.#ticker = setInterval(() => this.#tick(), TICK_MS);
+    this.#connection.start();
+  }
+
+  dispose(): void {
+    clearInterval(this.#ticker);
+    this.#connection.stop();
+    this.#pool.dispose();
+    this.tiles.clear();
+    this.viewport.dispose();
+  }
+
+  // Actions of the interface
+
+  setMethod(method: string): void {
+    const current = this.store.fusion;
+    if (current === null || current.method === method) return;
+    this.#rememberedParams.set(current.method, current.params);
+    const remembered = this.#rememberedParams.get(method);
+    this.#change(remembered === undefined ? { method } : { method, params: remembered });
+    this.#fusionSender.flush();
+  }
+
+  setViewMode(mode: ViewMode): void {
+    if (mode === 'thermal') this.setMethod(THERMAL_VIEW);
+    else if (mode === 'visible') this.setMethod(VISIBLE_VIEW);
+    else if (this.store.viewMode !== 'fused') {
+      const first = this.store.methods.find((method) => viewModeOf(method.id) === 'fused');
+      const method = this.#lastFusedMethod ?? first?.id;
+      if (method !== undefined) this.setMethod(method);
+    }
+  }
+
+  /** `settled` false while a slider is being dragged. */
+  setParameter(name: string, value: ParameterValue, settled: boolean): void {
+    this.#change({ params: { [name]: value } });
+    if (settled) this.#fusionSender.flush();
+  }
+
+  setPalette(palette: string): void {
+    this.#change({ palette });
+    this.#fusionSender.flush();
+  }
+
+  setMissing(missing: string, settled: boolean): void {
+    this.#change({ missing });
+    if (settled) this.#fusionSender.flush();
+  }
+
+  setRange(min: number, max: number, settled: boolean): void {
+    this.#change({ range: { mode: 'manual', min: Math.min(min, max), max: Math.max(min, max) } });
+    if (settled) this.#fusionSender.flush();
+  }
+
+  setRangeAutomatic(): void {
+    this.#change({ range: { mode: 'auto' } });
+    this.#fusionSender.flush();
+  }
+
+  /** Holds the range where it is, or lets it follow the scene again. */
+  toggleRangeLock(): void {
+    const range = this.store.fusion?.range;
+    if (range === undefined || range.min === null || range.max === null) return;
+    if (range.mode === 'auto') this.setRange(range.min, range.max, true);
+    else this.setRangeAutomatic();
+  }
+
+  setQuality(change: QualityChange): void {
+    this.#qualityChanged = true;
+    if (this.store.quality !== null) this.store.quality = { ...this.store.quality, ...change };
+    this.#qualitySender.push(change);
+  }
+
+  setBackground(colour: string): void {
+    this.store.background = colour;
+    this.viewport.setBackground(colour);
+  }
+
+  setUpAxis(up: UpAxis): void {
+    this.store.upAxis = up;
+    this.viewport.setUpAxis(up);
+    this.fitView('reset');
+  }
+
+  setInsets(insets: Insets): void {
+    this.#insets = insets;
+    if (!this.#userMoved && this.store.scene) this.#firstView(this.store.scene, false);
+  }
+
+  /** `fit` keeps the direction of the camera, `reset` goes back to the first view. */
+  fitView(mode: 'fit' | 'reset'): void {
+    const scene = this.store.scene;
+    if (!scene) return;
+    if (mode === 'reset') {
+      this.#userMoved = false;
+      this.#firstView(scene, true);
+      return;
+    }
+    this.#userMoved = true;
+    const { eye, target } = this.viewport.pose;
+    const direction: Vec3 = [eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]];
+    this.#fit(scene, direction, true);
+  }
+
+  retryNow(): void {
+    this.#connection.retryNow();
+  }
+
+  /** The pointer is over this place of the canvas; null when it has left. */
+  hover(place: { x: number; y: number } | null): void {
+    if (place === null) {
+      this.#hoverAsker.reset();
+      this.store.hover = null;
+      return;
+    }
+    if (this.store.connected) this.#hoverAsker.push(place);
+  }
+
+  /** Reads the scene at a place of the canvas and keeps the reading on the screen. */
+  async pin(place: { x: number; y: number }): Promise<void> {
+    const point = this.#pick(place);
+    if (point === null) {
+      this.store.pinned = null;
+      return;
+    }
+    try {
+      const answer = probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
+      this.store.pinned = { reading: { ...place, probe: answer }, place: this.viewport.project(answer.position) };
+    } catch (error) {
+      this.#say(error);
+    }
+  }
+
+  unpin(): void {
+    this.store.pinned = null;
+  }
+
+  // The connection
+
+  #greeted(message: Hello): void {
+    const { store } = this;
+    const returning = store.scene !== undefined;
+    const before = returning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
+    const qualityBefore = store.quality;
+    this.#connectionNumber += 1;
+    this.#acknowledger.reset();
+    this.#pool.clear();
+    this.#decoded.clear();
+    this.#removedAt.clear();
+    this.#lastSequence = 0;
+    this.#completeAfter = null;
+    this.#fusionSender.reset();
+    this.#qualitySender.reset();
+    this.#histogramAsker.reset();
+
+    store.server = message;
+    store.methods = message.methods;
+    store.palettes = message.palettes;
+    store.fusionInForce = message.fusion;
+    store.wanted = null;
+    store.quality = message.quality;
+    store.baseStep_mm ??= message.quality.position_step_mm;
+    store.generation = 0;
+    store.lostAt = null;
+    store.statuses = [];
+    store.complete = null;
+    this.tiles.beginConnection();
+    if (before !== null) {
+      this.#change(before);
+      this.#fusionSender.flush();
+    }
+    if (returning && this.#qualityChanged && qualityBefore !== null) this.setQuality(qualityBefore);
+    this.#setScene(message.scene);
+    void this.#connection.request('scene.subscribe', { channels: ['fused'] }).catch((error: unknown) => this.#say(error));
+    this.#cameraSender.push(this.viewport.pose);
+    this.#markBehind();
+    this.#rememberFused(message.fusion);
+  }
+
+  #disconnected(): void {
+    this.store.lostAt = this.#connection.lastMessageAt || performance.now();
+    this.store.hover = null;
+    this.store.behindSince = null;
+    this.store.rate_bytes_per_s = 0;
+    this.store.wanted = this.store.wanted ?? null;
+  }
+
+  #notified(method: string, params: unknown): void {
+    const { store } = this;
+    switch (method) {
+      case 'scene.changed':
+        this.#setScene(sceneChanged(params, method).scene);
+        this.#markBehind();
+        break;
+      case 'fusion.changed': {
+        const { generation, fusion } = fusionState(params, method);
+        this.#fusionIs(generation, fusion);
+        break;
+      }
+      case 'stream.complete':
+        this.#completeAfter = { sequence: this.#lastSequence, message: streamComplete(params, method) };
+        this.viewport.invalidate();
+        break;
+      case 'stream.stats':
+        store.stats = streamStats(params, method);
+        break;
+      case 'status': {
+        const message = status(params, method);
+        const others = store.statuses.filter((other) => other.id !== message.id);
+        store.statuses = message.message === null ? others : [...others, message];
+        break;
+      }
+      default:
+    }
+  }
+
+  #setScene(next: Scene | null): void {
+    const { store } = this;
+    const before = store.scene;
+    const other =
+      !before || !next || before.name !== next.name || JSON.stringify(before.bounds) !== JSON.stringify(next.bounds);
+    store.scene = next;
+    if (next === null) {
+      this.tiles.clear();
+      store.histogram = null;
+      store.extremes = null;
+      this.viewport.invalidate();
+      return;
+    }
+    if (other && before) {
+      this.tiles.clear();
+      store.pinned = null;
+    }
+    const { min, max } = next.bounds;
+    const centre: Vec3 = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
+    this.viewport.setSceneExtent(centre, Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2);
+    if (other) {
+      this.#userMoved = false;
+      this.#viewedScene = null;
+      this.#firstView(next, false);
+    }
+    this.#histogramAsker.push(true);
+    this.#connection
+      .request('scene.extremes', {})
+      .then((answer) => {
+        store.extremes = extremes(answer, 'scene.extremes');
+      })
+      .catch((error: unknown) => this.#say(error));
+  }
+
+  // Settings
+
+  #change(change: FusionChange): void {
+    const { store } = this;
+    store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
+    store.refusals = {};
+    if (!store.connected) return;
+    this.#markBehind();
+    this.#fusionSender.push(change);
+  }
+
+  async #sendFusion(change: FusionChange): Promise<void> {
+    try {
+      const answer = fusionState(await this.#connection.request('fusion.set', change), 'fusion.set');
+      this.#fusionIs(answer.generation, answer.fusion);
+    } catch (error) {
+      if (error instanceof RpcError) {
+        this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
+      } else this.#say(error);
+    }
+  }
+
+  #fusionIs(generation: number, fusion: Fusion): void {
+    if (generation < this.store.generation) return;
+    const changed = generation !== this.store.generation;
+    this.store.generation = generation;
+    this.store.fusionInForce = fusion;
+    this.#rememberFused(fusion);
+    if (changed) this.#histogramAsker.push(true);
+  }
+
+  #rememberFused(fusion: Fusion): void {
+    if (viewModeOf(fusion.method) === 'fused') this.#lastFusedMethod = fusion.method;
+  }
+
+  async #sendQuality(change: QualityChange): Promise<void> {
+    try {
+      const wire: Partial<Quality> = { mode: 'manual', ...change };
+      this.#markBehind();
+      this.store.quality = qualityState(await this.#connection.request('quality.set', wire), 'quality.set').quality;
+    } catch (error) {
+      if (error instanceof RpcError) this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
+      else this.#say(error);
+    }
+  }
+
+  async #askHistogram(): Promise<void> {
+    if (!this.store.scene) return;
+    try {
+      this.store.histogram = histogram(
+        await this.#connection.request('scene.histogram', { bins: HISTOGRAM_BINS }),
+        'scene.histogram',
+      );
+    } catch (error) {
+      this.#say(error);
+    }
+  }
+
+  // Frames
+
+  #received(message: ArrayBuffer): void {
+    this.store.received_bytes += message.byteLength;
+    this.#rateWindow.push({ at: performance.now(), bytes: message.byteLength });
+    let frame: TileFrame;
+    try {
+      frame = decodeTileFrame(message);
+    } catch (error) {
+      this.#say(error);
+      return;
+    }
+    this.#lastSequence = frame.sequence;
+    const key = tileKey(frame.tile);
+    if (frame.kind === FrameKind.geometry) {
+      this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
+    } else if (frame.kind === FrameKind.colours) {
+      this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload });
+    } else {
+      if (frame.kind === FrameKind.remove) {
+        this.#removedAt.set(key, frame.sequence);
+        this.#decoded.delete(`geometry ${key}`);
+        this.#decoded.delete(`colours ${key}`);
+        this.tiles.remove(frame.tile);
+        this.viewport.invalidate();
+      }
+      this.#acknowledger.finished(frame.sequence);
+    }
+  }
+
+  #decode(key: string, frame: TileFrame, job: DecodeJob): void {
+    const connectionNumber = this.#connectionNumber;
+    this.#pool
+      .decode(key, job)
+      .then((result) => {
+        if (connectionNumber !== this.#connectionNumber) return;
+        const waiting = this.#decoded.get(key);
+        const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
+        if (frame.sequence > removed && (waiting === undefined || waiting.frame.sequence < frame.sequence)) {
+          this.#decoded.set(key, { frame, result });
+        }
+        this.viewport.invalidate();
+      })
+      .catch((error: unknown) => {
+        if (!(error instanceof Superseded)) this.#say(error);
+      })
+      .finally(() => {
+        if (connectionNumber === this.#connectionNumber) this.#acknowledger.finished(frame.sequence);
+      });
+  }
+
+  /** Brings decoded tiles into the picture, as many as one picture can take. */
+  #bringIn(): boolean {
+    let bytes = 0;
+    for (const [key, { frame, result }] of this.#decoded) {
+      if (bytes > BYTES_PER_PICTURE) break;
+      this.#decoded.delete(key);
+      try {
+        if (result.kind === 'geometry') {
+          bytes += result.positions.byteLength + (result.indices?.byteLength ?? 0);
+          this.tiles.addGeometry(frame, result);
+        } else {
+          bytes += result.rgba.byteLength;
+          this.tiles.addColours(frame, result.rgba);
+        }
+      } catch (error) {
+        this.#say(error);
+      }
+    }
+    const complete = this.#completeAfter;
+    if (complete !== null && this.#decoded.size === 0 && this.#acknowledger.sequence >= complete.sequence) {
+      this.#completeAfter = null;
+      this.#completed(complete.message);
+    }
+    if (this.tiles.updateSelection() || bytes > 0) this.store.shown = this.tiles.counts();
+    return this.#decoded.size > 0;
+  }
+
+  #completed(message: StreamComplete): void {
+    const { store } = this;
+    this.tiles.endStale();
+    store.complete = message;
+    if (message.generation >= store.generation && !this.#fusionSender.busy) {
+      if (store.behindSince !== null) {
+        store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: performance.now() - store.behindSince };
+      }
+      store.behindSince = null;
+      store.progress = 1;
+    }
+    if (store.scene && this.#viewedScene === null) {
+      this.#viewedScene = store.scene.name;
+      if (!this.#userMoved) this.#firstView(store.scene, false);
+    }
+  }
+
+  // The camera
+
+  #cameraMoved(pose: CameraPose): void {
+    const { store } = this;
+    store.camera = pose;
+    store.axes = this.viewport.axesInView();
+    if (store.pinned !== null) {
+      store.pinned = { ...store.pinned, place: this.viewport.project(store.pinned.reading.probe.position) };
+    }
+    this.#cameraSender.push(pose);
+  }
+
+  #firstView(scene: Scene, animated: boolean): void {
+    const geometries = [...this.tiles.shownGeometries()].map(({ geometry }) => geometry);
+    const facing = meanNormal(geometries);
+    if (geometries.length > 0 && this.#viewedScene === scene.name && !animated) {
+      const up = guessUpAxis(scene.bounds, facing);
+      this.store.upAxis = up;
+      this.viewport.setUpAxis(up);
+    }
+    this.#fit(scene, viewDirection(facing, this.store.upAxis), animated);
+  }
+
+  #fit(scene: Scene, direction: Vec3, animated: boolean): void {
+    const geometries = [...this.tiles.shownGeometries()].map(({ geometry }) => geometry);
+    const points = samplePoints(geometries, scene.bounds);
+    const fov = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
+    this.viewport.setView(
+      fittedView(points, direction, this.store.upAxis, fov, this.viewport.aspect, this.#insets),
+      animated,
+    );
+  }
+
+  #pick(place: { x: number; y: number }): Vec3 | null {
+    const visible = function* (tiles: TileSet) {
+      for (const { geometry, visible: drawn } of tiles.shownGeometries()) if (drawn) yield geometry;
+    };
+    return this.viewport.pick(place.x, place.y, visible(this.tiles));
+  }
+
+  async #askHover(place: { x: number; y: number }): Promise<void> {
+    const point = this.#pick(place);
+    if (point === null) {
+      this.store.hover = null;
+      return;
+    }
+    try {
+      const answer = probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
+      this.store.hover = { ...place, probe: answer };
+    } catch {
+      this.store.hover = null;
+    }
+  }
+
+  // Clock
+
+  #markBehind(): void {
+    if (this.store.behindSince !== null) return;
+    this.store.behindSince = performance.now();
+    this.#bytesBefore = this.store.received_bytes;
+  }
+
+  #tick(): void {
+    const { store } = this;
+    const now = performance.now();
+    store.now = now;
+    this.#rateWindow = this.#rateWindow.filter(({ at }) => now - at < 2000);
+    store.rate_bytes_per_s = this.#rateWindow.reduce((sum, { bytes }) => sum + bytes, 0) / 2;
+    if (store.behindSince !== null) {
+      const { current, total } = this.tiles.progress(store.generation);
+      const expected = store.complete === null ? Math.max(total, store.scene?.tile_count ?? 0) : total;
+      store.progress = expected === 0 ? 0 : current / expected;
+    }
+  }
+
+  #say(error: unknown): void {
+    if (error instanceof ConnectionLost || error instanceof Superseded) return;
+    const message = error instanceof Error ? error.message : String(error);
+    console.warn(message);
+    this.store.failure = message;
+  }
+}

@@ -1,0 +1,106 @@
+import type {
+  Extremes,
+  Fusion,
+  FusionChange,
+  Hello,
+  Histogram,
+  Method,
+  Palette,
+  Probe,
+  Quality,
+  Scene,
+  Status,
+  StreamComplete,
+  StreamStats,
+  Vec3,
+} from '../protocol/messages';
+import type { UpAxis } from '../scene/first_view';
+import type { CameraPose } from '../scene/viewport';
+import type { TileCounts } from '../scene/tile_set';
+import type { LinkState } from '../transport/connection';
+import { withChange } from './fusion_change';
+
+/** A reading of the scene at a place. */
+export interface Reading {
+  /** Canvas place that was asked about, CSS pixels. */
+  x: number;
+  y: number;
+  probe: Probe;
+}
+
+/** Ids of the two methods that show one modality alone; every other method is a fused view. */
+export const THERMAL_VIEW = 'thermal_only';
+export const VISIBLE_VIEW = 'visible_only';
+export type ViewMode = 'thermal' | 'visible' | 'fused';
+
+export function viewModeOf(method: string): ViewMode {
+  if (method === THERMAL_VIEW) return 'thermal';
+  return method === VISIBLE_VIEW ? 'visible' : 'fused';
+}
+
+export const DEFAULT_BACKGROUND = '#1c1d1f';
+
+/** Everything the interface shows. Written by the session alone; the interface reads it and calls the session's actions. */
+export class Store {
+  link = $state.raw<LinkState>({ phase: 'connecting', attempt: 1 });
+  /** When the connection was lost, on performance.now()'s clock; null while it is up or before the first one. */
+  lostAt = $state<number | null>(null);
+  server = $state.raw<Pick<Hello, 'server' | 'role' | 'limits' | 'capabilities'> | null>(null);
+  /** Undefined before the first hello, null when the server has no scene. */
+  scene = $state.raw<Scene | null | undefined>(undefined);
+  methods = $state.raw<Method[]>([]);
+  palettes = $state.raw<Palette[]>([]);
+  /** As the server last said it. */
+  fusionInForce = $state.raw<Fusion | null>(null);
+  generation = $state(0);
+  /** What the user has asked for and the server has not answered yet. */
+  wanted = $state.raw<FusionChange | null>(null);
+  quality = $state.raw<Quality | null>(null);
+  /** Why a field was refused; the key is the field's path, such as `params.alpha`. */
+  refusals = $state<Record<string, string>>({});
+
+  histogram = $state.raw<Histogram | null>(null);
+  extremes = $state.raw<Extremes | null>(null);
+  /** Under the pointer. */
+  hover = $state.raw<Reading | null>(null);
+  /** Readings pinned by a click, newest last. */
+  pinned = $state.raw<{ reading: Reading; place: { x: number; y: number } | null } | null>(null);
+  probing = $state(false);
+
+  stats = $state.raw<StreamStats | null>(null);
+  statuses = $state.raw<Status[]>([]);
+  complete = $state.raw<StreamComplete | null>(null);
+  shown = $state.raw<TileCounts>({ tiles: 0, vertices: 0, triangles: 0 });
+  received_bytes = $state(0);
+  rate_bytes_per_s = $state(0);
+  round_trip_ms = $state<number | null>(null);
+  /** Since when the picture has been behind the settings; null when it is not. */
+  behindSince = $state<number | null>(null);
+  /** Share of the tiles that show the newest settings. */
+  progress = $state(1);
+  /** What the last finished change cost: bytes received and time until all of it was on the screen. */
+  lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
+  /** The position step that the server chose by itself. */
+  baseStep_mm = $state<number | null>(null);
+  camera = $state.raw<CameraPose | null>(null);
+  axes = $state.raw<{ x: Vec3; y: Vec3; z: Vec3 }>({ x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] });
+  upAxis = $state<UpAxis>('y');
+  background = $state(DEFAULT_BACKGROUND);
+  failure = $state<string | null>(null);
+
+  /** performance.now(), as old as the last tick; ages are counted with it. */
+  now = $state(performance.now());
+  panelsHidden = $state(false);
+  panelOpen = $state(true);
+  helpOpen = $state(false);
+
+  /** The settings as the controls show them: in force, with what is on its way laid over. */
+  readonly fusion = $derived(this.fusionInForce === null ? null : withChange(this.fusionInForce, this.wanted, this.methods));
+  readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
+  readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
+  readonly viewMode = $derived(viewModeOf(this.fusion?.method ?? ''));
+  readonly hasThermal = $derived(this.scene?.temperature.min != null);
+  readonly connected = $derived(this.link.phase === 'open');
+  readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
+  readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
+}

@@ -1,0 +1,85 @@
+/** Options of a Coalescer. */
+export interface CoalescerOptions<T> {
+  /** Sends one change; settles when the other side has answered. */
+  send: (change: T) => Promise<unknown>;
+  /** The change that has the effect of `earlier` followed by `later`. */
+  merge: (earlier: T, later: T) => T;
+  /** Least time between two sends; a flush does not wait for it. */
+  interval_ms: number;
+  /** Most unanswered sends; what comes meanwhile is merged. */
+  max_in_flight: number;
+  /** Called when nothing is waiting and nothing is unanswered. */
+  onIdle?: () => void;
+}
+
+/**
+ * Thins a stream of changes to what the link can answer. The latest value of every key survives, because changes are merged and the
+ * last merged change is always sent.
+ */
+export class Coalescer<T> {
+  #pending: T | undefined;
+  #inFlight = 0;
+  #lastSent = Number.NEGATIVE_INFINITY;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #urgent = false;
+  #epoch = 0;
+
+  constructor(private readonly options: CoalescerOptions<T>) {}
+
+  /** True while a change waits or is unanswered. */
+  get busy(): boolean {
+    return this.#pending !== undefined || this.#inFlight > 0;
+  }
+
+  push(change: T): void {
+    this.#pending = this.#pending === undefined ? change : this.options.merge(this.#pending, change);
+    this.#pump();
+  }
+
+  /** Sends what waits at once: called when a slider is released. */
+  flush(): void {
+    if (this.#pending === undefined) return;
+    this.#urgent = true;
+    this.#pump();
+  }
+
+  /** Forgets everything: the connection it was meant for is gone. Returns the change that had not been sent. */
+  reset(): T | undefined {
+    const pending = this.#pending;
+    this.#pending = undefined;
+    this.#inFlight = 0;
+    this.#urgent = false;
+    this.#epoch += 1;
+    this.#lastSent = Number.NEGATIVE_INFINITY;
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
+    return pending;
+  }
+
+  #pump(): void {
+    if (this.#pending === undefined || this.#inFlight >= this.options.max_in_flight) return;
+    const wait = this.#lastSent + this.options.interval_ms - performance.now();
+    if (wait > 0 && !this.#urgent) {
+      this.#timer ??= setTimeout(() => {
+        this.#timer = undefined;
+        this.#pump();
+      }, wait);
+      return;
+    }
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
+    const change = this.#pending;
+    this.#pending = undefined;
+    this.#urgent = false;
+    this.#inFlight += 1;
+    this.#lastSent = performance.now();
+    const epoch = this.#epoch;
+    const settled = () => {
+      if (epoch !== this.#epoch) return;
+      this.#inFlight -= 1;
+      this.#pump();
+      if (!this.busy) this.options.onIdle?.();
+    };
+    this.options.send(change).then(settled, settled);
+  }
+}

@@ -1,0 +1,236 @@
+import { decodeServerMessage, type Hello, hello, type RpcErrorBody } from '../protocol/messages';
+
+export const SUBPROTOCOL = 'spectra.v1';
+
+/** The server refused a request. */
+export class RpcError extends Error {
+  readonly code: number;
+  /** Path of the field it is about, such as `params.alpha`. */
+  readonly field: string | null;
+
+  constructor(body: RpcErrorBody) {
+    super(body.data?.reason ?? body.message);
+    this.name = 'RpcError';
+    this.code = body.code;
+    this.field = body.data?.field ?? null;
+  }
+}
+
+/** The connection went away before the answer came. */
+export class ConnectionLost extends Error {
+  constructor() {
+    super('the connection was lost before the answer came');
+    this.name = 'ConnectionLost';
+  }
+}
+
+export type LinkState =
+  | { phase: 'connecting'; attempt: number }
+  | { phase: 'open' }
+  | { phase: 'waiting'; attempt: number; retry_at: number };
+
+export interface ConnectionEvents {
+  onHello: (message: Hello) => void;
+  onNotification: (method: string, params: unknown) => void;
+  onFrame: (message: ArrayBuffer) => void;
+  onState: (state: LinkState) => void;
+  /** A message that does not follow the protocol; it is left out. */
+  onProtocolError: (error: Error) => void;
+  /** Time from a request to its answer. */
+  onRoundTrip: (round_trip_ms: number) => void;
+}
+
+/** The part of WebSocket that is used, so that tests can stand in for it. */
+export type SocketLike = Pick<WebSocket, 'binaryType' | 'readyState' | 'send' | 'close'> & {
+  onopen: ((event: Event) => void) | null;
+  onclose: ((event: CloseEvent) => void) | null;
+  onerror: ((event: Event) => void) | null;
+  onmessage: ((event: MessageEvent) => void) | null;
+};
+
+const OPEN = 1;
+const HELLO_TIMEOUT_MS = 6_000;
+const CHECK_INTERVAL_MS = 500;
+/** Silence after which the server is asked for a sign of life. */
+const QUIET_MS = 1_500;
+/** Time it has to give one. A cut TCP connection takes seconds to resume; a new one is there at once. */
+const ANSWER_MS = 3_000;
+const BACKOFF_FIRST_MS = 250;
+const BACKOFF_LAST_MS = 5_000;
+
+/** Wait before attempt `attempt` (from 1), without jitter. */
+export function backoffDelay(attempt: number): number {
+  return Math.min(BACKOFF_LAST_MS, BACKOFF_FIRST_MS * 2 ** (attempt - 1));
+}
+
+interface OpenRequest {
+  sent_at: number;
+  resolve: (result: unknown) => void;
+  reject: (error: Error) => void;
+}
+
+/** One logical connection to the server: it opens sockets until one says hello, notices when it has died, and opens the next. */
+export class Connection {
+  #socket: SocketLike | null = null;
+  #attempt = 0;
+  #greeted = false;
+  #nextId = 1;
+  #requests = new Map<number, OpenRequest>();
+  #lastMessageAt = 0;
+  #lastCheckAt = 0;
+  #askedAt: number | null = null;
+  #checkTimer: ReturnType<typeof setInterval> | undefined;
+  #retryTimer: ReturnType<typeof setTimeout> | undefined;
+  #helloTimer: ReturnType<typeof setTimeout> | undefined;
+  #closed = false;
+
+  constructor(
+    private readonly url: string,
+    private readonly events: ConnectionEvents,
+    private readonly openSocket: (url: string) => SocketLike = (address) => new WebSocket(address, SUBPROTOCOL),
+  ) {}
+
+  /** When the last message of any kind came, on performance.now()'s clock. */
+  get lastMessageAt(): number {
+    return this.#lastMessageAt;
+  }
+
+  start(): void {
+    this.#closed = false;
+    this.#open();
+  }
+
+  stop(): void {
+    this.#closed = true;
+    clearTimeout(this.#retryTimer);
+    this.#drop();
+  }
+
+  /** Opens now instead of waiting for the back-off to pass; does nothing when the connection is up. */
+  retryNow(): void {
+    if (this.#closed || this.#socket !== null) return;
+    clearTimeout(this.#retryTimer);
+    this.#open();
+  }
+
+  request(method: string, params: object): Promise<unknown> {
+    const socket = this.#socket;
+    if (!this.#greeted || socket === null || socket.readyState !== OPEN) return Promise.reject(new ConnectionLost());
+    const id = this.#nextId;
+    this.#nextId += 1;
+    return new Promise((resolve, reject) => {
+      this.#requests.set(id, { sent_at: performance.now(), resolve, reject });
+      socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
+    });
+  }
+
+  /** Dropped when there is no connection. */
+  notify(method: string, params: object): void {
+    const socket = this.#socket;
+    if (!this.#greeted || socket === null || socket.readyState !== OPEN) return;
+    socket.send(JSON.stringify({ jsonrpc: '2.0', method, params }));
+  }
+
+  #open(): void {
+    this.#attempt += 1;
+    this.#greeted = false;
+    this.events.onState({ phase: 'connecting', attempt: this.#attempt });
+    let socket: SocketLike;
+    try {
+      socket = this.openSocket(this.url);
+    } catch {
+      this.#retryLater();
+      return;
+    }
+    this.#socket = socket;
+    socket.binaryType = 'arraybuffer';
+    socket.onmessage = (event) => this.#receive(event.data);
+    socket.onclose = () => this.#lost();
+    socket.onerror = null;
+    this.#helloTimer = setTimeout(() => this.#lost(), HELLO_TIMEOUT_MS);
+  }
+
+  #receive(data: unknown): void {
+    this.#lastMessageAt = performance.now();
+    this.#askedAt = null;
+    if (data instanceof ArrayBuffer) {
+      if (this.#greeted) this.events.onFrame(data);
+      return;
+    }
+    try {
+      const message = decodeServerMessage(String(data));
+      if (message.type === 'notification') {
+        if (message.method === 'hello') this.#greet(hello(message.params, 'hello'));
+        else if (this.#greeted) this.events.onNotification(message.method, message.params);
+        return;
+      }
+      const request = message.id === null ? undefined : this.#requests.get(message.id);
+      if (request === undefined) {
+        if (message.type === 'error') this.events.onProtocolError(new RpcError(message.error));
+        return;
+      }
+      this.#requests.delete(message.id ?? -1);
+      this.events.onRoundTrip(performance.now() - request.sent_at);
+      if (message.type === 'result') request.resolve(message.result);
+      else request.reject(new RpcError(message.error));
+    } catch (error) {
+      this.events.onProtocolError(error instanceof Error ? error : new Error(String(error)));
+    }
+  }
+
+  #greet(message: Hello): void {
+    clearTimeout(this.#helloTimer);
+    this.#greeted = true;
+    this.#attempt = 0;
+    this.#lastCheckAt = performance.now();
+    clearInterval(this.#checkTimer);
+    this.#checkTimer = setInterval(() => this.#check(), CHECK_INTERVAL_MS);
+    this.events.onState({ phase: 'open' });
+    this.events.onHello(message);
+  }
+
+  #check(): void {
+    const now = performance.now();
+    // After a stalled or sleeping page messages may be waiting behind this timer: judge at the next check.
+    const late = now - this.#lastCheckAt > 4 * CHECK_INTERVAL_MS;
+    this.#lastCheckAt = now;
+    if (late) return;
+    if (this.#askedAt !== null) {
+      if (now - this.#askedAt > ANSWER_MS) this.#lost();
+      return;
+    }
+    if (now - this.#lastMessageAt > QUIET_MS) {
+      this.#askedAt = now;
+      this.request('fusion.get', {}).catch(() => undefined);
+    }
+  }
+
+  #lost(): void {
+    this.#drop();
+    if (!this.#closed) this.#retryLater();
+  }
+
+  #drop(): void {
+    clearTimeout(this.#helloTimer);
+    clearInterval(this.#checkTimer);
+    const socket = this.#socket;
+    this.#socket = null;
+    this.#greeted = false;
+    this.#askedAt = null;
+    if (socket !== null) {
+      socket.onmessage = null;
+      socket.onclose = null;
+      socket.close();
+    }
+    const requests = [...this.#requests.values()];
+    this.#requests.clear();
+    for (const request of requests) request.reject(new ConnectionLost());
+  }
+
+  #retryLater(): void {
+    const attempt = Math.max(1, this.#attempt);
+    const delay = backoffDelay(attempt) * (0.75 + 0.5 * Math.random());
+    this.events.onState({ phase: 'waiting', attempt, retry_at: performance.now() + delay });
+    this.#retryTimer = setTimeout(() => this.#open(), delay);
+  }
+}

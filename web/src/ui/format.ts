@@ -1,0 +1,83 @@
+/** Numbers as the instrument writes them. */
+
+const THIN_SPACE = '\u202f';
+const MINUS = '\u2212';
+
+function signed(text: string): string {
+  return text.startsWith('-') ? MINUS + text.slice(1) : text;
+}
+
+/** Fixed decimals, with a real minus sign. */
+export function fixed(value: number, decimals: number): string {
+  const text = value.toFixed(decimals);
+  return signed(Number(text) === 0 ? text.replace('-', '') : text);
+}
+
+export function withUnit(text: string, unit: string): string {
+  return unit === '' ? text : text + THIN_SPACE + unitSymbol(unit);
+}
+
+/** The symbol of a wire unit. */
+export function unitSymbol(unit: string): string {
+  if (unit === 'degC') return '°C';
+  return unit === 'deg' ? '°' : unit;
+}
+
+export function celsius(value: number | null | undefined): string {
+  return value == null ? 'none' : withUnit(fixed(value, 1), 'degC');
+}
+
+/** Three figures and an SI prefix: 990 k, 1.97 M. */
+export function count(value: number): string {
+  const prefixes = ['', 'k', 'M', 'G'];
+  let scaled = value;
+  let index = 0;
+  while (scaled >= 999.5 && index < prefixes.length - 1) {
+    scaled /= 1000;
+    index += 1;
+  }
+  const decimals = index === 0 || scaled >= 99.95 ? 0 : scaled >= 9.995 ? 1 : 2;
+  return withUnit(fixed(scaled, decimals), prefixes[index] ?? '');
+}
+
+export function bytes(value: number): string {
+  return value < 1000 ? `${fixed(value, 0)}${THIN_SPACE}B` : `${count(value)}B`;
+}
+
+/** A length with a fitting unit, three figures. */
+export function length(value_m: number): string {
+  const size = Math.abs(value_m);
+  if (size === 0) return withUnit('0', 'm');
+  if (size < 0.01) return withUnit(figures(value_m * 1000, 2), 'mm');
+  if (size < 1) return withUnit(figures(value_m * 100, 2), 'cm');
+  return size < 1000 ? withUnit(figures(value_m, 3), 'm') : withUnit(figures(value_m / 1000, 3), 'km');
+}
+
+/** So many significant figures, no exponent, no trailing zeros. */
+export function figures(value: number, wanted: number): string {
+  if (value === 0) return '0';
+  const decimals = Math.max(0, wanted - 1 - Math.floor(Math.log10(Math.abs(value))));
+  return signed(String(Number(value.toFixed(Math.min(12, decimals)))));
+}
+
+export function milliseconds(value: number): string {
+  return value < 1000 ? `${fixed(value, value < 9.5 ? 1 : 0)}${THIN_SPACE}ms` : `${fixed(value / 1000, 1)}${THIN_SPACE}s`;
+}
+
+export function duration(seconds: number): string {
+  if (seconds < 100) return `${fixed(Math.floor(seconds), 0)}${THIN_SPACE}s`;
+  if (seconds < 6000) return `${fixed(Math.floor(seconds / 60), 0)}${THIN_SPACE}min`;
+  return `${fixed(Math.floor(seconds / 3600), 0)}${THIN_SPACE}h`;
+}
+
+/** How exact the picture is, in words. */
+export function accuracyWords(accuracy: { position_mm?: number | null; colour_levels?: number | null } | undefined): string | null {
+  if (accuracy === undefined) return null;
+  const parts: string[] = [];
+  if (accuracy.position_mm != null) parts.push(`within ${length(accuracy.position_mm / 1000)}`);
+  if (accuracy.colour_levels != null) {
+    const off = accuracy.colour_levels >= 256 ? 0 : 128 / accuracy.colour_levels;
+    parts.push(off === 0 ? 'colours exact' : `colours ±${figures(off, 2)} of 255`);
+  }
+  return parts.length === 0 ? null : parts.join(', ');
+}

@@ -1,0 +1,13 @@
+import { svelte } from '@sveltejs/vite-plugin-svelte';
+import { defineConfig } from 'vitest/config';
+
+const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
+
+export default defineConfig({
+  plugins: [svelte()],
+  base: './',
+  build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0 },
+  worker: { format: 'es' },
+  server: { proxy: { '/ws': { target: server, ws: true, changeOrigin: true }, '/api': server } },
+  test: { include: ['src/**/*.test.ts'], environment: 'node' },
+});
