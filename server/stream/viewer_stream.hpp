@@ -58,6 +58,7 @@ struct StreamStats {
   double throughput_bytes_per_s = 0;
   std::uint64_t queued_bytes = 0;
   std::uint64_t skipped_frames = 0;
+  std::uint64_t failed_tiles = 0;  ///< Tiles that could not be encoded; the log names them.
   double position_mm = 0;
   int colour_levels = 256;
   double pixel_error = 0;
@@ -70,14 +71,14 @@ class FrameCache {
   explicit FrameCache(std::size_t capacity_bytes);
   ~FrameCache();
   std::size_t size_bytes() const;
-  std::uint64_t hit_count() const;
-  std::uint64_t miss_count() const;
+  std::uint64_t hit_count() const;   ///< Colour frames that were there when a viewer needed them.
+  std::uint64_t miss_count() const;  ///< Encodings (geometry or colours) that had to be made.
 
-  struct State;  // Seen by server/stream only.
-  State& state() { return *state_; }
+  struct State;  ///< Seen by server/stream only; outlives the cache while a job of a stream still uses it.
+  const std::shared_ptr<State>& state() { return state_; }
 
  private:
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 /// What one viewer is sent: decides the order, asks the cache and the workers for frames, keeps to the sending window,

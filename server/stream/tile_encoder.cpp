@@ -1,0 +1,42 @@
+#include "server/stream/tile_encoder.hpp"
+
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "protocol/draco_codec.hpp"
+#include "server/stream/lattice.hpp"
+
+namespace spectra::server {
+
+protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed) {
+  BOOST_OUTCOME_TRY(auto lattice, tile_lattice(tile, position_step_m));
+  BOOST_OUTCOME_TRY(auto geometry,
+                    protocol::encoded_geometry(lattice.points, tile.triangles, position_step_m, encoder_speed));
+  return EncodedTile{.revision = 0,
+                     .position_step_m = position_step_m,
+                     .origin_m = lattice.origin_m,
+                     .input_of_decoded = std::move(geometry.input_of_decoded),
+                     .payload = std::make_shared<const std::vector<std::byte>>(std::move(geometry.payload))};
+}
+
+protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
+                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed) {
+  std::vector<float> no_temperature;
+  std::span<const float> temperature = tile.temperature_celsius;
+  if (temperature.empty()) {
+    no_temperature.assign(tile.visible.size(), std::numeric_limits<float>::quiet_NaN());
+    temperature = no_temperature;
+  }
+  std::vector<fusion::Rgb8> fused(tile.visible.size());
+  plan.fuse(temperature, tile.visible, fused);
+  std::vector<protocol::ColourBytes> colours(geometry.input_of_decoded.size());
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];
+    colours[i] = {colour.r, colour.g, colour.b};
+  }
+  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed));
+  return std::make_shared<const std::vector<std::byte>>(std::move(payload));
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+#include "protocol/rpc_error.hpp"
+#include "server/scene/scene_snapshot.hpp"
+
+namespace spectra::server {
+
+using Payload = std::shared_ptr<const std::vector<std::byte>>;
+
+/// The geometry of a tile as it goes over the wire, and how to put colours into its decoded order. Immutable.
+struct EncodedTile {
+  std::uint32_t revision = 0;  ///< Names this encoding and no other; the tile revision of the wire. From 1.
+  float position_step_m = 0;
+  std::array<float, 3> origin_m{};
+  std::vector<std::uint32_t> input_of_decoded;  ///< Vertex of the Tile for each decoded vertex.
+  Payload payload;
+};
+
+/// Encodes the geometry of a tile; the revision is left to the cache.
+protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed);
+
+/// Fuses a tile and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile.
+protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
+                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed);
+
+}  // namespace spectra::server

@@ -1,0 +1,607 @@
+#include "server/stream/viewer_stream.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "server/stream/frame_cache.hpp"
+#include "server/stream/lattice.hpp"
+#include "server/stream/sending_window.hpp"
+#include "server/stream/tile_encoder.hpp"
+
+namespace spectra::server {
+namespace {
+
+using protocol::FrameKind;
+using protocol::TileFrameHeader;
+using protocol::TileId;
+
+// How much may wait, encoded, for the window of one viewer. Enough to bridge the making of the next tile, little
+// enough that a viewer who stopped reading costs nothing.
+constexpr std::size_t kPreparedBytes = 1u << 20;
+
+// What one viewer has and needs of one tile.
+struct Slot {
+  enum class Work {
+    Idle,     // Nobody is at it.
+    Busy,     // A job of this viewer encodes it.
+    Waiting,  // A job of another viewer encodes it.
+    Ready,    // `geometry` and `colours` answer the present settings.
+  };
+
+  std::shared_ptr<const Tile> tile;
+  bool gone = false;
+  Work work = Work::Idle;
+  std::shared_ptr<const EncodedTile> geometry;  // While Ready.
+  Payload colours;
+
+  std::uint32_t held_revision = 0;  // Geometry given out last; 0 = none.
+  std::uint32_t held_vertex_count = 0;
+  std::uint64_t held_geometry_epoch = 0;  // The epochs that what was given out answers.
+  std::uint64_t held_colour_epoch = 0;
+  std::uint64_t failed_geometry_epoch = 0;
+  std::uint64_t failed_colour_epoch = 0;
+};
+
+// The settings in force, as a job needs them. An epoch rises with each change that makes frames of that kind stale.
+struct Demand {
+  std::uint64_t geometry_epoch = 1;
+  std::uint64_t colour_epoch = 1;
+  float position_step_m = 0;
+  int encoder_speed = 7;
+  int colour_bits = 8;
+  std::shared_ptr<const fusion::FusionPlan> plan;  // Null before the first set_plan().
+  std::shared_ptr<const PlanIdentity> plan_identity;
+};
+
+// One encoding that a job has claimed, and what came of it.
+struct Encoding {
+  std::shared_ptr<Slot> slot;
+  std::shared_ptr<const Tile> tile;
+  Demand demand;
+  std::shared_ptr<const EncodedTile> geometry = nullptr;  // Null: geometry is to be made; else the colours for it.
+  std::shared_ptr<const EncodedTile> made_geometry = nullptr;
+  Payload made_colours = nullptr;
+
+  GeometryKey geometry_key() const { return {Identity(tile), demand.position_step_m, demand.encoder_speed}; }
+  ColourKey colour_key() const { return {geometry->revision, demand.plan_identity, demand.colour_bits}; }
+};
+
+class Stream final : public ViewerStream, public CacheWaiter {
+ public:
+  Stream(std::shared_ptr<const SceneSnapshot> scene, std::shared_ptr<FrameCache::State> cache, WorkerPool& pool,
+         std::function<void()> wake)
+      : cache_(std::move(cache)), pool_(pool), wake_(std::move(wake)) {
+    adopt(std::move(scene));
+  }
+
+  void close() override {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      for (auto& [id, slot] : slots_) slot->gone = true;
+      slots_.clear();
+      order_.clear();
+      removed_.clear();
+    }
+    // Taking this lock waits for a wake that is being called right now; none follows.
+    const std::lock_guard lock(wake_mutex_);
+    wake_ = nullptr;
+  }
+
+  void set_scene(std::shared_ptr<const SceneSnapshot> scene) override {
+    change([&] { adopt(std::move(scene)); });
+  }
+
+  void subscribe(std::size_t in_flight_bytes) override {
+    change([&] {
+      window_.set_size(in_flight_bytes);
+      if (subscribed_) return;
+      subscribed_ = true;
+      is_complete_due_ = true;
+    });
+  }
+
+  void unsubscribe() override {
+    change([&] {
+      subscribed_ = false;
+      removed_.clear();
+      // Whoever subscribes again starts from nothing.
+      for (auto& [id, slot] : slots_) {
+        put_down(*slot);
+        slot->held_revision = 0;
+        slot->held_vertex_count = 0;
+        slot->held_geometry_epoch = 0;
+        slot->held_colour_epoch = 0;
+      }
+    });
+  }
+
+  std::uint32_t set_plan(fusion::FusionPlan plan) override {
+    auto shared_plan = std::make_shared<const fusion::FusionPlan>(std::move(plan));
+    std::uint32_t generation = 0;
+    change([&] {
+      generation = ++generation_;
+      demand_.plan_identity = cache_->plan_identity(*shared_plan, scene_);
+      demand_.plan = std::move(shared_plan);
+      ++demand_.colour_epoch;
+      is_complete_due_ = true;
+    });
+    return generation;
+  }
+
+  std::uint32_t generation() const override {
+    const std::lock_guard lock(mutex_);
+    return generation_;
+  }
+
+  void set_quality(const StreamQuality& quality) override {
+    change([&] {
+      if (quality.position_step_m != quality_.position_step_m) {
+        wanted_step_m_ = quality.position_step_m > 0 ? quality.position_step_m : 0;
+      }
+      quality_ = quality;
+      quality_.colour_bits = std::clamp(quality.colour_bits, 4, 8);
+      quality_.encoder_speed = std::clamp(quality.encoder_speed, 0, 10);
+      apply_quality();
+    });
+  }
+
+  const StreamQuality& quality() const override { return quality_; }
+
+  void set_camera(const Camera& camera) override {
+    const std::lock_guard lock(mutex_);
+    camera_ = camera;
+  }
+
+  void acknowledge(std::uint32_t sequence, double /*now_s*/) override {
+    change([&] { window_.on_acknowledged(sequence); });
+  }
+
+  std::optional<OutgoingFrame> next_frame(double /*now_s*/) override {
+    const std::lock_guard lock(mutex_);
+    wake_pending_ = false;
+    if (closed_ || !subscribed_) return std::nullopt;
+    if (!removed_.empty()) {
+      const TileFrameHeader header = removed_.front();
+      if (!window_.admits(protocol::kTileFrameHeaderSize)) return std::nullopt;
+      removed_.pop_front();
+      return given_out(header, nullptr);
+    }
+    while (Slot* slot = head()) {
+      if (slot->work == Slot::Work::Idle) look_up(*slot);
+      if (slot->work != Slot::Work::Ready) break;
+      if (slot->held_revision != slot->geometry->revision) {
+        auto header = header_of(*slot->tile, FrameKind::Geometry, *slot->geometry);
+        if (!window_.admits(frame_size(slot->geometry->payload))) return std::nullopt;
+        prepared_bytes_ -= slot->geometry->payload->size();
+        slot->held_revision = slot->geometry->revision;
+        slot->held_vertex_count = header.vertex_count;
+        slot->held_geometry_epoch = demand_.geometry_epoch;
+        slot->held_colour_epoch = 0;
+        return given_out(header, slot->geometry->payload);
+      }
+      slot->held_geometry_epoch = demand_.geometry_epoch;
+      std::optional<OutgoingFrame> frame;
+      if (slot->held_colour_epoch != demand_.colour_epoch) {
+        auto header = header_of(*slot->tile, FrameKind::Colours, *slot->geometry);
+        header.generation = generation_;
+        if (!window_.admits(frame_size(slot->colours))) return std::nullopt;
+        slot->held_colour_epoch = demand_.colour_epoch;
+        frame = given_out(header, slot->colours);
+      }
+      put_down(*slot);
+      if (frame) {
+        post_jobs();
+        return frame;
+      }
+    }
+    post_jobs();
+    return std::nullopt;
+  }
+
+  std::optional<StreamComplete> take_complete() override {
+    const std::lock_guard lock(mutex_);
+    wake_pending_ = false;
+    if (!is_complete()) return std::nullopt;
+    is_complete_due_ = false;
+    StreamComplete complete{.generation = generation_, .scene_revision = scene_->revision()};
+    for (const auto& slot : order_) {
+      if (slot->held_colour_epoch != demand_.colour_epoch) continue;
+      ++complete.tile_count;
+      complete.vertex_count += slot->held_vertex_count;
+    }
+    return complete;
+  }
+
+  StreamStats stats() const override {
+    const std::lock_guard lock(mutex_);
+    StreamStats stats;
+    stats.queued_bytes = window_.in_flight_bytes() + prepared_bytes_;
+    stats.skipped_frames = skipped_frame_count_;
+    stats.failed_tiles = failed_tile_count_;
+    stats.position_mm = static_cast<double>(demand_.position_step_m) * 500;
+    stats.colour_levels = 1 << demand_.colour_bits;
+    return stats;
+  }
+
+  void cache_changed() override {
+    change([&] {
+      for (const auto& slot : order_) {
+        if (slot->work == Slot::Work::Waiting) slot->work = Slot::Work::Idle;
+      }
+    });
+  }
+
+ private:
+  // Every change of state goes through here: afterwards superseded frames are dropped, jobs are posted for what is
+  // missing, and the session is woken when there is something for it.
+  template <class Action>
+  void change(const Action& action) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_) return;
+      const auto geometry_epoch = demand_.geometry_epoch;
+      const auto colour_epoch = demand_.colour_epoch;
+      action();
+      if (geometry_epoch != demand_.geometry_epoch || colour_epoch != demand_.colour_epoch) {
+        drop_superseded();
+      }
+      first_ = 0;
+      if (Slot* slot = head(); slot != nullptr && slot->work == Slot::Work::Idle) look_up(*slot);
+      post_jobs();
+      if (!has_news()) return;
+    }
+    wake();
+  }
+
+  void wake() {
+    if (wake_pending_.exchange(true)) return;
+    const std::lock_guard lock(wake_mutex_);
+    if (wake_) wake_();
+  }
+
+  // With the lock held: everything below, except where it says otherwise.
+
+  void adopt(std::shared_ptr<const SceneSnapshot> scene) {
+    scene_ = std::move(scene);
+    order_.clear();
+    std::map<TileId, std::shared_ptr<Slot>> slots;
+    for (const auto& tile : scene_->tiles()) {
+      if (tile->positions.empty()) continue;
+      std::shared_ptr<Slot> slot;
+      if (const auto known = slots_.find(tile->id); known != slots_.end()) {
+        if (known->second->tile == tile) {
+          slot = known->second;
+        } else {
+          slot = std::make_shared<Slot>();
+          slot->tile = tile;
+          slot->held_revision = known->second->held_revision;
+          forget(*known->second);
+        }
+        slots_.erase(known);
+      } else {
+        slot = std::make_shared<Slot>();
+        slot->tile = tile;
+      }
+      slots.emplace(tile->id, slot);
+      order_.push_back(std::move(slot));
+    }
+    for (auto& [id, slot] : slots_) {
+      if (slot->held_revision != 0) {
+        removed_.push_back({.kind = FrameKind::Remove, .tile = id, .revision = slot->held_revision});
+      }
+      forget(*slot);
+    }
+    slots_ = std::move(slots);
+    is_complete_due_ = true;
+    apply_quality();
+  }
+
+  void forget(Slot& slot) {
+    put_down(slot);
+    slot.gone = true;
+  }
+
+  void apply_quality() {
+    const float step = position_step_in_force(wanted_step_m_, scene_->suggested_position_step_m(), scene_->bounds());
+    quality_.position_step_m = step;
+    if (step != demand_.position_step_m || quality_.encoder_speed != demand_.encoder_speed) {
+      demand_.position_step_m = step;
+      demand_.encoder_speed = quality_.encoder_speed;
+      ++demand_.geometry_epoch;
+      is_complete_due_ = true;
+    }
+    if (quality_.colour_bits != demand_.colour_bits) {
+      demand_.colour_bits = quality_.colour_bits;
+      ++demand_.colour_epoch;
+      is_complete_due_ = true;
+    }
+  }
+
+  void drop_superseded() {
+    for (const auto& slot : order_) {
+      if (slot->work != Slot::Work::Ready) continue;
+      ++skipped_frame_count_;
+      put_down(*slot);
+    }
+  }
+
+  // Ready -> Idle.
+  void put_down(Slot& slot) {
+    if (slot.work != Slot::Work::Ready) return;
+    prepared_bytes_ -= prepared_size(slot);
+    slot.work = Slot::Work::Idle;
+    slot.geometry = nullptr;
+    slot.colours = nullptr;
+  }
+
+  void make_ready(Slot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours) {
+    slot.work = Slot::Work::Ready;
+    slot.geometry = std::move(geometry);
+    slot.colours = std::move(colours);
+    prepared_bytes_ += prepared_size(slot);
+  }
+
+  static std::size_t prepared_size(const Slot& slot) {
+    return slot.colours->size() + (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
+  }
+
+  bool is_satisfied(const Slot& slot) const {
+    if (slot.failed_geometry_epoch == demand_.geometry_epoch) return true;
+    if (slot.held_geometry_epoch != demand_.geometry_epoch) return false;
+    return slot.held_colour_epoch == demand_.colour_epoch || slot.failed_colour_epoch == demand_.colour_epoch;
+  }
+
+  // The first tile that is not as it should be; null when there is none, or no settings yet.
+  Slot* head() {
+    if (!demand_.plan) return nullptr;
+    while (first_ < order_.size() && is_satisfied(*order_[first_])) ++first_;
+    return first_ < order_.size() ? order_[first_].get() : nullptr;
+  }
+
+  bool is_complete() {
+    return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && removed_.empty() && head() == nullptr;
+  }
+
+  bool has_news() {
+    if (!subscribed_) return false;
+    if (!removed_.empty() || is_complete()) return true;
+    const Slot* slot = head();
+    return slot != nullptr && slot->work == Slot::Work::Ready;
+  }
+
+  // Takes what the cache has; leaves the slot idle when anything is missing.
+  void look_up(Slot& slot) {
+    const GeometryKey key{Identity(slot.tile), demand_.position_step_m, demand_.encoder_speed};
+    auto geometry = cache_->find_geometry(key);
+    if (!geometry) return;
+    auto colours = cache_->find_colours({geometry->revision, demand_.plan_identity, demand_.colour_bits});
+    if (colours) make_ready(slot, std::move(geometry), std::move(colours));
+  }
+
+  // One step of a slot towards Ready: the encoding that the caller has to do for it now, or nothing.
+  std::optional<Encoding> advance(const std::shared_ptr<Slot>& slot) {
+    if (!is_wanted(*slot)) return std::nullopt;
+    Encoding encoding{slot, slot->tile, demand_};
+    auto geometry = cache_->claim_geometry(encoding.geometry_key(), weak_waiter());
+    switch (geometry.kind) {
+      case Claim<EncodedTile>::Kind::Ready:
+        return advance_colours(std::move(encoding), std::move(geometry.value));
+      case Claim<EncodedTile>::Kind::Busy:
+        slot->work = Slot::Work::Waiting;
+        return std::nullopt;
+      case Claim<EncodedTile>::Kind::Yours:
+        break;
+    }
+    slot->work = Slot::Work::Busy;
+    return encoding;
+  }
+
+  std::optional<Encoding> advance_colours(Encoding encoding, std::shared_ptr<const EncodedTile> geometry) {
+    Slot& slot = *encoding.slot;
+    encoding.geometry = std::move(geometry);
+    auto colours = cache_->claim_colours(encoding.colour_key(), weak_waiter());
+    switch (colours.kind) {
+      case Claim<std::vector<std::byte>>::Kind::Ready:
+        make_ready(slot, std::move(encoding.geometry), std::move(colours.value));
+        return std::nullopt;
+      case Claim<std::vector<std::byte>>::Kind::Busy:
+        slot.work = Slot::Work::Waiting;
+        return std::nullopt;
+      case Claim<std::vector<std::byte>>::Kind::Yours:
+        break;
+    }
+    slot.work = Slot::Work::Busy;
+    return encoding;
+  }
+
+  // The next step after one that a job has done. What was made is used from here, not from the cache, which may
+  // have had no room for it.
+  std::optional<Encoding> advance_after(const Encoding& done) {
+    Slot& slot = *done.slot;
+    slot.work = Slot::Work::Idle;
+    if (!is_wanted(slot)) return std::nullopt;
+    if (done.demand.geometry_epoch == demand_.geometry_epoch) {
+      if (done.made_geometry) return advance_colours({done.slot, done.tile, demand_}, done.made_geometry);
+      if (done.made_colours && done.demand.colour_epoch == demand_.colour_epoch) {
+        make_ready(slot, done.geometry, done.made_colours);
+        return std::nullopt;
+      }
+      if (done.made_colours) return advance_colours({done.slot, done.tile, demand_}, done.geometry);
+    }
+    return advance(done.slot);
+  }
+
+  bool is_wanted(const Slot& slot) const { return !slot.gone && !closed_ && subscribed_ && !is_satisfied(slot); }
+
+  bool may_start(std::size_t index) const {
+    const Slot& slot = *order_[index];
+    return slot.work == Slot::Work::Idle && (index == first_ || prepared_bytes_ < kPreparedBytes) &&
+           !is_satisfied(slot);
+  }
+
+  std::optional<Encoding> next_encoding() {
+    if (closed_ || !subscribed_ || head() == nullptr) return std::nullopt;
+    for (std::size_t index = first_; index < order_.size(); ++index) {
+      if (!may_start(index)) continue;
+      if (auto encoding = advance(order_[index])) return encoding;
+    }
+    return std::nullopt;
+  }
+
+  // A job is a promise to do whatever is most urgent when its turn comes, so what was superseded while it waited
+  // costs nothing, few are enough, and viewers take turns tile by tile.
+  void post_jobs() {
+    if (closed_ || !subscribed_ || head() == nullptr) return;
+    const unsigned most = pool_.thread_count() + 1;
+    unsigned startable = 0;
+    std::size_t first_startable = 0;
+    for (std::size_t index = first_; index < order_.size() && startable < most; ++index) {
+      if (!may_start(index)) continue;
+      if (startable++ == 0) first_startable = index;
+    }
+    while (waiting_job_count_ < startable && waiting_job_count_ + running_job_count_ < most) {
+      ++waiting_job_count_;
+      pool_.post(
+          [weak = std::weak_ptr<ViewerStream>(shared_from_this())] {
+            if (const auto stream = weak.lock()) static_cast<Stream&>(*stream).run_job();
+          },
+          order_[first_startable]->tile->id.level);
+    }
+  }
+
+  std::weak_ptr<CacheWaiter> weak_waiter() {
+    return std::shared_ptr<CacheWaiter>(shared_from_this(), static_cast<CacheWaiter*>(this));
+  }
+
+  std::optional<OutgoingFrame> given_out(TileFrameHeader header, Payload payload) {
+    header.sequence = ++last_sequence_;
+    header.payload_size_bytes = payload ? static_cast<std::uint32_t>(payload->size()) : 0;
+    OutgoingFrame frame{protocol::encoded_header(header), std::move(payload)};
+    window_.on_sent(header.sequence, frame.size_bytes());
+    return frame;
+  }
+
+  static std::size_t frame_size(const Payload& payload) { return protocol::kTileFrameHeaderSize + payload->size(); }
+
+  static TileFrameHeader header_of(const Tile& tile, FrameKind kind, const EncodedTile& geometry) {
+    return {.kind = kind,
+            .child_mask = tile.child_mask,
+            .tile = tile.id,
+            .revision = geometry.revision,
+            .vertex_count = static_cast<std::uint32_t>(geometry.input_of_decoded.size()),
+            .origin_m = geometry.origin_m,
+            .position_step_m = geometry.position_step_m,
+            .geometric_error_m = tile.geometric_error_m,
+            .lowest_celsius = tile.lowest_celsius,
+            .highest_celsius = tile.highest_celsius};
+  }
+
+  // Without the lock: a job, on a worker.
+  void run_job() {
+    std::optional<Encoding> encoding;
+    {
+      const std::lock_guard lock(mutex_);
+      --waiting_job_count_;
+      ++running_job_count_;
+      encoding = next_encoding();
+    }
+    while (encoding) {
+      encode(*encoding);
+      const std::lock_guard lock(mutex_);
+      if (!encoding->made_geometry && !encoding->made_colours) note_failure(*encoding);
+      encoding = advance_after(*encoding);
+    }
+    change([&] { --running_job_count_; });
+  }
+
+  // Without the lock: encodes and puts the result into the cache, too.
+  void encode(Encoding& encoding) {
+    const Demand& demand = encoding.demand;
+    std::string reason;
+    try {
+      if (!encoding.geometry) {
+        auto result = encoded_tile(*encoding.tile, demand.position_step_m, demand.encoder_speed);
+        if (result.has_value()) {
+          encoding.made_geometry = cache_->store_geometry(encoding.geometry_key(), std::move(result).value());
+          return;
+        }
+        reason = result.error().message;
+      } else {
+        auto result = encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, demand.colour_bits,
+                                           demand.encoder_speed);
+        if (result.has_value()) {
+          encoding.made_colours = std::move(result).value();
+          cache_->store_colours(encoding.colour_key(), encoding.made_colours);
+          return;
+        }
+        reason = result.error().message;
+      }
+    } catch (const std::exception& exception) {
+      reason = exception.what();
+    }
+    if (encoding.geometry) {
+      cache_->abandon_colours(encoding.colour_key());
+    } else {
+      cache_->abandon_geometry(encoding.geometry_key());
+    }
+    if (cache_->is_first_failure(Identity(encoding.tile))) {
+      const TileId id = encoding.tile->id;
+      spdlog::error("tile {}/{}/{}/{} cannot be encoded and is left out: {}", id.level, id.x, id.y, id.z, reason);
+    }
+  }
+
+  void note_failure(const Encoding& encoding) {
+    ++failed_tile_count_;
+    if (encoding.geometry) {
+      encoding.slot->failed_colour_epoch = encoding.demand.colour_epoch;
+    } else {
+      encoding.slot->failed_geometry_epoch = encoding.demand.geometry_epoch;
+    }
+  }
+
+  const std::shared_ptr<FrameCache::State> cache_;
+  WorkerPool& pool_;
+
+  std::mutex wake_mutex_;
+  std::function<void()> wake_;
+  std::atomic<bool> wake_pending_{false};
+
+  mutable std::mutex mutex_;
+  bool closed_ = false;
+  bool subscribed_ = false;
+  bool is_complete_due_ = false;
+  std::shared_ptr<const SceneSnapshot> scene_;
+  std::map<TileId, std::shared_ptr<Slot>> slots_;
+  std::vector<std::shared_ptr<Slot>> order_;
+  std::size_t first_ = 0;  // Everything in order_ before it is satisfied.
+  std::deque<TileFrameHeader> removed_;
+  StreamQuality quality_;
+  float wanted_step_m_ = 0;
+  std::optional<Camera> camera_;
+  Demand demand_;
+  std::uint32_t generation_ = 0;
+  std::uint32_t last_sequence_ = 0;
+  SendingWindow window_;
+  std::size_t prepared_bytes_ = 0;
+  unsigned waiting_job_count_ = 0;
+  unsigned running_job_count_ = 0;
+  std::uint64_t skipped_frame_count_ = 0;
+  std::uint64_t failed_tile_count_ = 0;
+};
+
+}  // namespace
+
+std::shared_ptr<ViewerStream> ViewerStream::create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
+                                                   WorkerPool& pool, std::function<void()> wake) {
+  return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake));
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,95 @@
+#include "fake_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "fusion/settings.hpp"
+#include "fusion/statistics/temperature_statistics.hpp"
+
+namespace spectra::server::testing {
+
+std::shared_ptr<Tile> patch_tile(protocol::TileId id, int side, int column, float celsius) {
+  auto tile = std::make_shared<Tile>();
+  tile->id = id;
+  tile->lowest_celsius = celsius;
+  tile->highest_celsius = celsius + 5;
+  const auto spacing = 1.0F / static_cast<float>(side - 1);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const float u = static_cast<float>(x) * spacing;
+      const float v = static_cast<float>(y) * spacing;
+      tile->positions.push_back({static_cast<float>(column) + u, v, 0.1F * std::sin(9 * u) * std::cos(7 * v)});
+      const auto i = static_cast<std::uint32_t>(tile->positions.size() - 1);
+      tile->visible.push_back({static_cast<std::uint8_t>(i * 7), static_cast<std::uint8_t>(i * 13),
+                               static_cast<std::uint8_t>(column * 40)});
+      tile->temperature_celsius.push_back(celsius + 5 * u);
+      tile->source_vertex.push_back(i);
+    }
+  }
+  for (int y = 0; y + 1 < side; ++y) {
+    for (int x = 0; x + 1 < side; ++x) {
+      const auto corner = static_cast<std::uint32_t>(y * side + x);
+      const auto above = corner + static_cast<std::uint32_t>(side);
+      tile->triangles.push_back({corner, corner + 1, above + 1});
+      tile->triangles.push_back({corner, above + 1, above});
+    }
+  }
+  tile->owned_count = static_cast<std::uint32_t>(tile->positions.size());
+  tile->bounds = {{static_cast<float>(column), 0, -0.1F}, {static_cast<float>(column + 1), 1, 0.1F}};
+  return tile;
+}
+
+FakeScene::FakeScene(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision)
+    : revision_(revision), tiles_(std::move(tiles)) {
+  fusion::TemperatureAccumulator accumulator;
+  if (!tiles_.empty()) bounds_ = tiles_.front()->bounds;
+  for (const auto& tile : tiles_) {
+    accumulator.add(tile->temperature_celsius);
+    for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+      bounds_.min.*axis = std::min(bounds_.min.*axis, tile->bounds.min.*axis);
+      bounds_.max.*axis = std::max(bounds_.max.*axis, tile->bounds.max.*axis);
+    }
+  }
+  temperature_.summary = accumulator.summary();
+  temperature_.histogram = [](std::uint32_t bins) { return fusion::Histogram{0, 0, std::vector<std::uint64_t>(bins)}; };
+}
+
+std::uint64_t FakeScene::vertex_count() const {
+  std::uint64_t count = 0;
+  for (const auto& tile : tiles_) count += tile->positions.size();
+  return count;
+}
+
+std::uint64_t FakeScene::triangle_count() const {
+  std::uint64_t count = 0;
+  for (const auto& tile : tiles_) count += tile->triangles.size();
+  return count;
+}
+
+std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side) {
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  auto root = patch_tile({0, 0, 0, 0}, side, 0, 20);
+  root->child_mask = 1;
+  root->geometric_error_m = 0.1F;
+  root->bounds = {{0, 0, -0.1F}, {static_cast<float>(leaf_count), 1, 0.1F}};
+  tiles.push_back(root);
+  for (int i = 0; i < leaf_count; ++i) {
+    tiles.push_back(patch_tile({6, static_cast<std::uint32_t>(i), 0, 0}, side, i, 20 + static_cast<float>(i)));
+  }
+  return tiles;
+}
+
+std::shared_ptr<const SceneSnapshot> scene_of(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision) {
+  return std::make_shared<FakeScene>(std::move(tiles), revision);
+}
+
+fusion::FusionPlan plan_with_alpha(const SceneSnapshot& scene, double alpha) {
+  fusion::FusionChange change;
+  change.params["alpha"] = alpha;
+  return fusion::FusionPlan::prepare(fusion::with_change(fusion::default_settings(), change).value(),
+                                     scene.temperature())
+      .value();
+}
+
+}  // namespace spectra::server::testing

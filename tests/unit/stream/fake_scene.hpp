@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+#include "server/scene/scene_snapshot.hpp"
+
+namespace spectra::server::testing {
+
+/// A patch of bumpy surface of `side` x `side` vertices, one metre wide, `column` metres along x; all vertices distinct.
+std::shared_ptr<Tile> patch_tile(protocol::TileId id, int side, int column, float celsius);
+
+/// A snapshot made of tiles that the test supplies.
+class FakeScene : public SceneSnapshot {
+ public:
+  FakeScene(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision);
+
+  const std::string& name() const override { return name_; }
+  std::uint32_t revision() const override { return revision_; }
+  std::uint64_t vertex_count() const override;
+  std::uint64_t triangle_count() const override;
+  bool is_point_cloud() const override { return false; }
+  fusion::Vec3d origin() const override { return {}; }
+  const Bounds& bounds() const override { return bounds_; }
+  int level_count() const override { return 3; }
+  std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
+  const fusion::SceneTemperature& temperature() const override { return temperature_; }
+  std::optional<Probe> probe(fusion::Vec3f) const override { return std::nullopt; }
+  std::optional<Extreme> hottest() const override { return std::nullopt; }
+  std::optional<Extreme> coldest() const override { return std::nullopt; }
+  float suggested_position_step_m() const override { return 0.001F; }
+  fusion::MultispectralMesh whole_mesh() const override { return {}; }
+
+ private:
+  std::string name_ = "fake";
+  std::uint32_t revision_;
+  std::vector<std::shared_ptr<const Tile>> tiles_;
+  Bounds bounds_;
+  fusion::SceneTemperature temperature_;
+};
+
+/// A root and `leaf_count` leaves beneath it (at most 64), every tile of `side` x `side` vertices.
+std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side = 12);
+
+std::shared_ptr<const SceneSnapshot> scene_of(std::vector<std::shared_ptr<const Tile>> tiles,
+                                              std::uint32_t revision = 1);
+
+/// The default blend with that alpha, made ready for the scene.
+fusion::FusionPlan plan_with_alpha(const SceneSnapshot& scene, double alpha);
+
+}  // namespace spectra::server::testing

@@ -1,0 +1,169 @@
+#include "test_viewer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <limits>
+#include <stdexcept>
+
+namespace spectra::server::testing {
+namespace {
+
+// Only a stall lasts so long; no test depends on it otherwise.
+constexpr std::chrono::seconds kStall{20};
+
+}  // namespace
+
+TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool)
+    : stream_(ViewerStream::create(std::move(scene), cache, pool, [this] {
+        const std::lock_guard lock(mutex_);
+        ++wake_count_;
+        woken_.notify_all();
+      })) {}
+
+TestViewer::~TestViewer() {
+  stream_->close();
+}
+
+std::size_t TestViewer::wake_count() {
+  const std::lock_guard lock(mutex_);
+  return wake_count_;
+}
+
+std::size_t TestViewer::take() {
+  std::size_t taken = 0;
+  while (auto frame = stream_->next_frame(0)) {
+    receive(*frame);
+    ++taken;
+    if (acknowledges) acknowledge();
+  }
+  return taken;
+}
+
+void TestViewer::wait_and_take() {
+  {
+    std::unique_lock lock(mutex_);
+    if (!woken_.wait_for(lock, kStall, [this] { return wake_count_ != seen_wake_count_; })) {
+      throw std::runtime_error("the stream stalled");
+    }
+    seen_wake_count_ = wake_count_;
+  }
+  take();
+}
+
+StreamComplete TestViewer::complete() {
+  while (true) {
+    take();
+    if (const auto complete = stream_->take_complete()) {
+      completes.push_back(*complete);
+      return *complete;
+    }
+    wait_and_take();
+  }
+}
+
+void TestViewer::acknowledge() {
+  stream_->acknowledge(frames.back().sequence, 0);
+}
+
+std::size_t TestViewer::count(protocol::FrameKind kind) const {
+  std::size_t count = 0;
+  for (const auto& frame : frames) count += frame.kind == kind ? 1U : 0U;
+  return count;
+}
+
+void TestViewer::receive(const OutgoingFrame& outgoing) {
+  std::vector<std::byte> message(outgoing.header.begin(), outgoing.header.end());
+  if (outgoing.payload) message.insert(message.end(), outgoing.payload->begin(), outgoing.payload->end());
+  ASSERT_EQ(message.size(), outgoing.size_bytes());
+  const auto frame = protocol::decoded_frame(message);
+  ASSERT_TRUE(frame.has_value());
+  const protocol::TileFrameHeader& header = frame.value().header;
+  EXPECT_EQ(header.sequence, frames.size() + 1);
+  frames.push_back(header);
+  taken_bytes += message.size();
+  switch (header.kind) {
+    case protocol::FrameKind::Geometry: {
+      EXPECT_TRUE(revisions_.insert(header.revision).second) << "revision " << header.revision << " came twice";
+      const auto geometry = protocol::decoded_geometry(frame.value().payload);
+      ASSERT_TRUE(geometry.has_value());
+      HeldTile& tile = tiles[header.tile];
+      tile = {.geometry = header, .positions_m = geometry.value().positions_m, .generation = 0, .colours = {}};
+      ASSERT_EQ(tile.positions_m.size(), header.vertex_count);
+      for (auto& position : tile.positions_m) {
+        for (std::size_t axis = 0; axis < 3; ++axis) position[axis] += header.origin_m[axis];
+      }
+      break;
+    }
+    case protocol::FrameKind::Colours: {
+      const auto held = tiles.find(header.tile);
+      ASSERT_NE(held, tiles.end()) << "colours without geometry";
+      EXPECT_EQ(held->second.geometry.revision, header.revision);
+      EXPECT_EQ(held->second.geometry.vertex_count, header.vertex_count);
+      EXPECT_GE(header.generation, held->second.generation);
+      EXPECT_EQ(header.generation, stream_->generation());
+      held->second.generation = header.generation;
+      held->second.colours = protocol::decoded_colours(frame.value().payload).value();
+      EXPECT_EQ(held->second.colours.size(), header.vertex_count);
+      break;
+    }
+    case protocol::FrameKind::Remove:
+      EXPECT_EQ(tiles.erase(header.tile), 1U);
+      EXPECT_EQ(header.payload_size_bytes, 0U);
+      break;
+    default:
+      ADD_FAILURE() << "unexpected kind " << static_cast<int>(header.kind);
+  }
+}
+
+struct HeldWorkers::State {
+  std::mutex mutex;
+  std::condition_variable changed;
+  unsigned held = 0;
+  bool released = false;
+};
+
+HeldWorkers::HeldWorkers(WorkerPool& pool) : state_(std::make_shared<State>()) {
+  for (unsigned i = 0; i < pool.thread_count(); ++i) {
+    pool.post(
+        [state = state_] {
+          std::unique_lock lock(state->mutex);
+          ++state->held;
+          state->changed.notify_all();
+          state->changed.wait(lock, [&] { return state->released; });
+        },
+        std::numeric_limits<int>::min());
+  }
+  std::unique_lock lock(state_->mutex);
+  state_->changed.wait(lock, [&] { return state_->held == pool.thread_count(); });
+}
+
+void HeldWorkers::release() {
+  const std::lock_guard lock(state_->mutex);
+  state_->released = true;
+  state_->changed.notify_all();
+}
+
+void wait_until_idle(WorkerPool& pool) {
+  // Last in the queue on every thread: they meet only when no other job is left, neither waiting nor running.
+  std::mutex mutex;
+  std::condition_variable changed;
+  unsigned arrived = 0;
+  unsigned left = 0;
+  for (unsigned i = 0; i < pool.thread_count(); ++i) {
+    pool.post(
+        [&] {
+          std::unique_lock lock(mutex);
+          ++arrived;
+          changed.notify_all();
+          changed.wait(lock, [&] { return arrived == pool.thread_count(); });
+          ++left;
+          changed.notify_all();
+        },
+        std::numeric_limits<int>::max());
+  }
+  std::unique_lock lock(mutex);
+  changed.wait(lock, [&] { return left == pool.thread_count(); });
+}
+
+}  // namespace spectra::server::testing

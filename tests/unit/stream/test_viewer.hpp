@@ -1,0 +1,80 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <vector>
+
+#include "protocol/draco_codec.hpp"
+#include "protocol/tile_frame.hpp"
+#include "server/stream/viewer_stream.hpp"
+
+namespace spectra::server::testing {
+
+/// What a viewer holds of one tile.
+struct HeldTile {
+  protocol::TileFrameHeader geometry;
+  std::vector<std::array<float, 3>> positions_m;  ///< Relative to the scene origin.
+  std::uint32_t generation = 0;                   ///< Of the colours; 0 = none yet.
+  std::vector<protocol::ColourBytes> colours;
+};
+
+/// A client on a perfect link: takes the frames of a stream, decodes them and expects of each what the protocol says
+/// (rising sequence, colours only for the revision held, no revision twice, generations never falling).
+class TestViewer {
+ public:
+  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool);
+  ~TestViewer();
+  TestViewer(const TestViewer&) = delete;
+  TestViewer& operator=(const TestViewer&) = delete;
+
+  ViewerStream& stream() { return *stream_; }
+
+  /// Takes frames as they come, until the stream says complete. Fails the test when nothing comes for a long time.
+  StreamComplete complete();
+  /// Takes what can be had at once; returns the number of frames.
+  std::size_t take();
+  /// Waits until there may be something new, then takes it.
+  void wait_and_take();
+  /// Acknowledges everything that was taken.
+  void acknowledge();
+
+  bool acknowledges = true;  ///< After every frame.
+  std::map<protocol::TileId, HeldTile> tiles;
+  std::vector<protocol::TileFrameHeader> frames;  ///< All that was ever taken.
+  std::vector<StreamComplete> completes;
+  std::size_t taken_bytes = 0;
+  std::size_t wake_count();
+
+  std::size_t count(protocol::FrameKind kind) const;
+
+ private:
+  void receive(const OutgoingFrame& frame);
+
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  std::size_t wake_count_ = 0;
+  std::size_t seen_wake_count_ = 0;
+  std::set<std::uint32_t> revisions_;
+  std::shared_ptr<ViewerStream> stream_;
+};
+
+/// Holds every worker of a pool until it is released, so that nothing is encoded meanwhile.
+class HeldWorkers {
+ public:
+  explicit HeldWorkers(WorkerPool& pool);
+  ~HeldWorkers() { release(); }
+  void release();
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+/// Returns when the pool has nothing waiting and nothing running.
+void wait_until_idle(WorkerPool& pool);
+
+}  // namespace spectra::server::testing

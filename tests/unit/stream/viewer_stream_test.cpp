@@ -1,0 +1,500 @@
+#include "server/stream/viewer_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "fake_scene.hpp"
+#include "test_viewer.hpp"
+
+namespace spectra::server {
+namespace {
+
+using protocol::FrameKind;
+using testing::HeldTile;
+using testing::HeldWorkers;
+using testing::patch_tile;
+using testing::plan_with_alpha;
+using testing::scene_of;
+using testing::TestViewer;
+using testing::tiles_of_tree;
+using testing::wait_until_idle;
+
+constexpr std::size_t kRoomyCache = 64u << 20;
+
+class ViewerStreamTest : public ::testing::Test {
+ protected:
+  void show(TestViewer& viewer, double alpha) { viewer.stream().set_plan(plan_with_alpha(*scene_, alpha)); }
+
+  /// Expects that the viewer holds exactly the scene's tiles, in the colours of `alpha` at `colour_bits`.
+  void expect_picture(const TestViewer& viewer, const SceneSnapshot& scene, double alpha, int colour_bits = 8) {
+    const auto plan = plan_with_alpha(scene, alpha);
+    ASSERT_EQ(viewer.tiles.size(), scene.tiles().size());
+    for (const auto& tile : scene.tiles()) {
+      const auto held = viewer.tiles.find(tile->id);
+      ASSERT_NE(held, viewer.tiles.end());
+      EXPECT_EQ(held->second.geometry.child_mask, tile->child_mask);
+      EXPECT_EQ(held->second.geometry.geometric_error_m, tile->geometric_error_m);
+      expect_tile(held->second, *tile, plan, colour_bits);
+    }
+  }
+
+  static void expect_tile(const HeldTile& held, const Tile& tile, const fusion::FusionPlan& plan, int colour_bits) {
+    std::vector<fusion::Rgb8> fused(tile.positions.size());
+    plan.fuse(tile.temperature_celsius, tile.visible, fused);
+    const float half_step = held.geometry.position_step_m / 2 * 1.001F;
+    ASSERT_EQ(held.positions_m.size(), tile.positions.size());
+    ASSERT_EQ(held.colours.size(), held.positions_m.size());
+    for (std::size_t i = 0; i < held.positions_m.size(); ++i) {
+      const auto& p = held.positions_m[i];
+      const auto source = std::find_if(tile.positions.begin(), tile.positions.end(), [&](const fusion::Vec3f& q) {
+        return std::abs(p[0] - q.x) <= half_step && std::abs(p[1] - q.y) <= half_step &&
+               std::abs(p[2] - q.z) <= half_step;
+      });
+      ASSERT_NE(source, tile.positions.end());
+      const fusion::Rgb8 colour = fused[static_cast<std::size_t>(source - tile.positions.begin())];
+      const protocol::ColourBytes expected{protocol::rounded_channel(colour.r, colour_bits),
+                                           protocol::rounded_channel(colour.g, colour_bits),
+                                           protocol::rounded_channel(colour.b, colour_bits)};
+      ASSERT_EQ(held.colours[i], expected);
+    }
+  }
+
+  std::shared_ptr<const SceneSnapshot> scene_ = scene_of(tiles_of_tree(6));
+  FrameCache cache_{kRoomyCache};
+  WorkerPool pool_{2};
+};
+
+TEST_F(ViewerStreamTest, SendsTheWholeSceneAndThenCompletesOnce) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  const auto complete = viewer.complete();
+  EXPECT_EQ(complete.generation, 1U);
+  EXPECT_EQ(complete.scene_revision, 1U);
+  EXPECT_EQ(complete.tile_count, 7U);
+  EXPECT_EQ(complete.vertex_count, scene_->vertex_count());
+  expect_picture(viewer, *scene_, 0.3);
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+  EXPECT_FALSE(viewer.stream().take_complete().has_value());
+}
+
+TEST_F(ViewerStreamTest, SendsNothingBeforeItIsSubscribedAndHasSettings) {
+  TestViewer viewer(scene_, cache_, pool_);
+  show(viewer, 0.3);
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+  EXPECT_EQ(cache_.miss_count(), 0U);
+  EXPECT_FALSE(viewer.stream().take_complete().has_value());
+
+  TestViewer without_settings(scene_, cache_, pool_);
+  without_settings.stream().subscribe(0);
+  wait_until_idle(pool_);
+  EXPECT_EQ(without_settings.take(), 0U);
+  EXPECT_FALSE(without_settings.stream().take_complete().has_value());
+}
+
+TEST_F(ViewerStreamTest, OrdersCoarseBeforeFineAndGeometryBeforeColours) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  ASSERT_EQ(viewer.frames.size(), 14U);
+  for (std::size_t i = 0; i < viewer.frames.size(); i += 2) {
+    EXPECT_EQ(viewer.frames[i].kind, FrameKind::Geometry);
+    EXPECT_EQ(viewer.frames[i].generation, 0U);
+    EXPECT_EQ(viewer.frames[i + 1].kind, FrameKind::Colours);
+    EXPECT_EQ(viewer.frames[i + 1].tile, viewer.frames[i].tile);
+    EXPECT_EQ(viewer.frames[i].tile, scene_->tiles()[i / 2]->id);
+  }
+}
+
+TEST_F(ViewerStreamTest, AChangeOfSettingsSendsColoursOnly) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  show(viewer, 0.8);
+  EXPECT_EQ(viewer.complete().generation, 2U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 7U);
+  EXPECT_EQ(viewer.count(FrameKind::Colours), 14U);
+  expect_picture(viewer, *scene_, 0.8);
+}
+
+TEST_F(ViewerStreamTest, TheNewestSettingsOvertake) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0);
+  viewer.complete();
+  const auto misses_before = cache_.miss_count();
+  {
+    const HeldWorkers held(pool_);
+    for (int i = 1; i <= 60; ++i) show(viewer, i / 100.0);
+    EXPECT_EQ(viewer.take(), 0U);
+  }
+  EXPECT_EQ(viewer.complete().generation, 61U);
+  expect_picture(viewer, *scene_, 0.6);
+  // Nothing was made for the sixty that were overtaken while they waited.
+  EXPECT_EQ(cache_.miss_count() - misses_before, scene_->tiles().size());
+  EXPECT_EQ(viewer.completes.size(), 2U);
+}
+
+TEST_F(ViewerStreamTest, PreparedColoursOfOldSettingsAreDropped) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0);
+  viewer.complete();
+  show(viewer, 0.5);
+  wait_until_idle(pool_);  // Everything is encoded, nothing taken.
+  show(viewer, 0.9);
+  viewer.complete();
+  EXPECT_EQ(viewer.stream().stats().skipped_frames, scene_->tiles().size());
+  EXPECT_EQ(viewer.count(FrameKind::Colours), 2 * scene_->tiles().size());
+  expect_picture(viewer, *scene_, 0.9);
+}
+
+TEST_F(ViewerStreamTest, ManyChangesWhileFramesFlowEndInTheNewest) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  for (int i = 1; i <= 100; ++i) {
+    show(viewer, i / 200.0);
+    viewer.take();
+  }
+  EXPECT_EQ(viewer.complete().generation, 100U);
+  expect_picture(viewer, *scene_, 0.5);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), scene_->tiles().size());
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+  EXPECT_FALSE(viewer.stream().take_complete().has_value());
+}
+
+TEST_F(ViewerStreamTest, KeepsToTheWindow) {
+  constexpr std::size_t kWindow = 20'000;
+  scene_ = scene_of(tiles_of_tree(40, 30));
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.acknowledges = false;
+  viewer.stream().subscribe(kWindow);
+  show(viewer, 0.3);
+  wait_until_idle(pool_);
+  std::size_t stops = 0;
+  std::size_t acknowledged_bytes = 0;
+  while (!viewer.stream().take_complete()) {
+    viewer.take();
+    EXPECT_LE(viewer.taken_bytes - acknowledged_bytes, kWindow);
+    wait_until_idle(pool_);
+    if (viewer.take() == 0 && !viewer.frames.empty()) {
+      viewer.acknowledge();
+      acknowledged_bytes = viewer.taken_bytes;
+      ++stops;
+    }
+    ASSERT_LT(stops, 1'000U);
+  }
+  EXPECT_GE(stops, viewer.taken_bytes / kWindow);
+  expect_picture(viewer, *scene_, 0.3);
+}
+
+TEST_F(ViewerStreamTest, AFrameLargerThanTheWindowGoesAlone) {
+  scene_ = scene_of(tiles_of_tree(2, 150));
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.acknowledges = false;
+  viewer.stream().subscribe(1);
+  show(viewer, 0.3);
+  for (std::size_t i = 1; i <= 6; ++i) {
+    wait_until_idle(pool_);
+    EXPECT_EQ(viewer.take(), 1U);
+    wait_until_idle(pool_);
+    EXPECT_EQ(viewer.take(), 0U);
+    viewer.acknowledge();
+  }
+  expect_picture(viewer, *scene_, 0.3);
+}
+
+TEST_F(ViewerStreamTest, IgnoresAcknowledgementsThatMakeNoSense) {
+  scene_ = scene_of(tiles_of_tree(2, 150));
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.acknowledges = false;
+  viewer.stream().subscribe(1);
+  show(viewer, 0.3);
+  wait_until_idle(pool_);
+  ASSERT_EQ(viewer.take(), 1U);
+  wait_until_idle(pool_);
+  viewer.stream().acknowledge(4'000'000'000U, 0);
+  viewer.stream().acknowledge(2, 0);
+  viewer.stream().acknowledge(0, 0);
+  EXPECT_EQ(viewer.take(), 0U);
+  viewer.stream().acknowledge(1, 0);
+  EXPECT_EQ(viewer.take(), 1U);
+  viewer.stream().acknowledge(1, 0);
+  EXPECT_EQ(viewer.take(), 0U);
+}
+
+TEST_F(ViewerStreamTest, AViewerThatDoesNotReadHoldsLittle) {
+  scene_ = scene_of(tiles_of_tree(60, 100));
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  wait_until_idle(pool_);
+  const auto held_at_rest = viewer.stream().stats().queued_bytes;
+  EXPECT_GT(held_at_rest, 0U);
+  EXPECT_LE(held_at_rest, 2u << 20);
+  for (int i = 0; i < 50; ++i) {
+    show(viewer, i / 100.0);
+    wait_until_idle(pool_);
+    EXPECT_LE(viewer.stream().stats().queued_bytes, 2u << 20);
+  }
+}
+
+TEST_F(ViewerStreamTest, ViewersWithTheSameSettingsCostOneEncoding) {
+  std::vector<std::unique_ptr<TestViewer>> viewers;
+  {
+    const HeldWorkers held(pool_);
+    for (int i = 0; i < 16; ++i) {
+      viewers.push_back(std::make_unique<TestViewer>(scene_, cache_, pool_));
+      viewers.back()->stream().subscribe(0);
+      show(*viewers.back(), 0.3);
+    }
+  }
+  for (const auto& viewer : viewers) {
+    viewer->complete();
+    expect_picture(*viewer, *scene_, 0.3);
+  }
+  EXPECT_EQ(cache_.miss_count(), 2 * scene_->tiles().size());
+  EXPECT_EQ(cache_.hit_count(), 15 * scene_->tiles().size());
+}
+
+TEST_F(ViewerStreamTest, ViewersWithDifferentSettingsShareGeometry) {
+  TestViewer one(scene_, cache_, pool_);
+  TestViewer two(scene_, cache_, pool_);
+  one.stream().subscribe(0);
+  two.stream().subscribe(0);
+  show(one, 0.3);
+  show(two, 0.6);
+  one.complete();
+  two.complete();
+  expect_picture(one, *scene_, 0.3);
+  expect_picture(two, *scene_, 0.6);
+  EXPECT_EQ(cache_.miss_count(), 3 * scene_->tiles().size());
+}
+
+TEST_F(ViewerStreamTest, WorksWithACacheThatKeepsNothing) {
+  FrameCache tiny(0);
+  TestViewer one(scene_, tiny, pool_);
+  TestViewer two(scene_, tiny, pool_);
+  for (TestViewer* viewer : {&one, &two}) {
+    viewer->stream().subscribe(0);
+    show(*viewer, 0.3);
+  }
+  one.complete();
+  two.complete();
+  show(one, 0.7);
+  one.complete();
+  expect_picture(one, *scene_, 0.7);
+  expect_picture(two, *scene_, 0.3);
+  EXPECT_EQ(one.count(FrameKind::Geometry), scene_->tiles().size());
+  EXPECT_EQ(tiny.size_bytes(), 0U);
+}
+
+TEST_F(ViewerStreamTest, FewerColourBitsSendColoursOnly) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  StreamQuality quality = viewer.stream().quality();
+  quality.colour_bits = 5;
+  viewer.stream().set_quality(quality);
+  EXPECT_EQ(viewer.complete().generation, 1U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), scene_->tiles().size());
+  expect_picture(viewer, *scene_, 0.3, 5);
+  EXPECT_EQ(viewer.stream().stats().colour_levels, 32);
+}
+
+TEST_F(ViewerStreamTest, AnotherPositionStepSendsGeometryUnderANewRevision) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  StreamQuality quality = viewer.stream().quality();
+  EXPECT_EQ(quality.position_step_m, lattice_step(static_cast<double>(scene_->suggested_position_step_m())));
+  quality.position_step_m = lattice_step(0.01);
+  viewer.stream().set_quality(quality);
+  viewer.complete();
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 2 * scene_->tiles().size());
+  EXPECT_EQ(viewer.count(FrameKind::Colours), 2 * scene_->tiles().size());
+  for (const auto& [id, tile] : viewer.tiles) EXPECT_EQ(tile.geometry.position_step_m, lattice_step(0.01));
+  expect_picture(viewer, *scene_, 0.3);
+}
+
+TEST_F(ViewerStreamTest, QualityThatIsTheSameSendsNothing) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  viewer.stream().set_quality(viewer.stream().quality());
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+}
+
+TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+
+  auto tiles = tiles_of_tree(6);
+  const std::vector<std::shared_ptr<const Tile>> old(scene_->tiles().begin(), scene_->tiles().end());
+  tiles = old;
+  const auto gone = tiles[2]->id;
+  tiles[1] = patch_tile(tiles[1]->id, 14, 0, 30);
+  tiles.erase(tiles.begin() + 2);
+  tiles.push_back(patch_tile({6, 50, 0, 0}, 12, 9, 40));
+  const auto next = scene_of(tiles, 2);
+  viewer.stream().set_scene(next);
+  viewer.complete();
+  EXPECT_FALSE(viewer.tiles.contains(gone));
+  EXPECT_EQ(viewer.count(FrameKind::Remove), 1U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 7U + 2U);
+  EXPECT_EQ(viewer.count(FrameKind::Colours), 7U + 2U);
+
+  viewer.stream().set_plan(plan_with_alpha(*next, 0.3));
+  EXPECT_EQ(viewer.complete().scene_revision, 2U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 7U + 2U);
+  expect_picture(viewer, *next, 0.3);
+}
+
+TEST_F(ViewerStreamTest, AnEmptySceneIsComplete) {
+  const auto empty = scene_of({});
+  TestViewer viewer(empty, cache_, pool_);
+  viewer.stream().subscribe(0);
+  viewer.stream().set_plan(plan_with_alpha(*empty, 0.3));
+  EXPECT_EQ(viewer.complete().tile_count, 0U);
+}
+
+TEST_F(ViewerStreamTest, ATileWithoutTemperatureShowsItsVisibleColour) {
+  auto tile = patch_tile({}, 8, 0, 20);
+  tile->temperature_celsius.clear();
+  scene_ = scene_of({tile});
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 1);
+  viewer.complete();
+  tile->temperature_celsius.assign(tile->positions.size(), std::numeric_limits<float>::quiet_NaN());
+  expect_picture(viewer, *scene_, 0);
+}
+
+TEST_F(ViewerStreamTest, ATileThatCannotBeEncodedIsLeftOutAndCounted) {
+  std::vector<std::shared_ptr<const Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
+  auto broken = patch_tile(tiles[3]->id, 12, 2, 20);
+  broken->positions[5].x = std::numeric_limits<float>::infinity();
+  tiles[3] = broken;
+  scene_ = scene_of(tiles);
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  EXPECT_EQ(viewer.complete().tile_count, 6U);
+  EXPECT_EQ(viewer.stream().stats().failed_tiles, 1U);
+  show(viewer, 0.4);
+  EXPECT_EQ(viewer.complete().tile_count, 6U);
+  EXPECT_EQ(viewer.stream().stats().failed_tiles, 1U) << "tried again for every change of settings";
+}
+
+TEST_F(ViewerStreamTest, UnsubscribeStopsAndSubscribeStartsFromNothing) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  viewer.stream().unsubscribe();
+  show(viewer, 0.4);
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+  const auto frames_before = viewer.frames.size();
+  viewer.stream().subscribe(0);
+  while (!viewer.stream().take_complete()) {
+    const auto frame = viewer.stream().next_frame(0);
+    if (!frame) {
+      wait_until_idle(pool_);
+      continue;
+    }
+    const auto header = protocol::decoded_frame([&] {
+                          std::vector<std::byte> message(frame->header.begin(), frame->header.end());
+                          message.insert(message.end(), frame->payload->begin(), frame->payload->end());
+                          return message;
+                        }())
+                            .value()
+                            .header;
+    viewer.frames.push_back(header);
+  }
+  EXPECT_EQ(viewer.frames.size() - frames_before, 2 * scene_->tiles().size());
+}
+
+TEST_F(ViewerStreamTest, IsNeverWokenAfterClose) {
+  for (int round = 0; round < 50; ++round) {
+    FrameCache cache(kRoomyCache);
+    TestViewer viewer(scene_, cache, pool_);
+    viewer.stream().subscribe(0);
+    show(viewer, 0.3);
+    if (round % 2 == 1) viewer.wait_and_take();
+    viewer.stream().close();
+    const auto wakes = viewer.wake_count();
+    wait_until_idle(pool_);
+    EXPECT_EQ(viewer.wake_count(), wakes);
+    EXPECT_EQ(viewer.take(), 0U);
+    EXPECT_FALSE(viewer.stream().take_complete().has_value());
+  }
+}
+
+TEST_F(ViewerStreamTest, CloseLetsGoOfTheSceneAndTheCallback) {
+  const auto token = std::make_shared<int>(0);
+  auto stream = ViewerStream::create(scene_, cache_, pool_, [token] {});
+  EXPECT_EQ(token.use_count(), 2);
+  stream->close();
+  EXPECT_EQ(token.use_count(), 1);
+}
+
+TEST_F(ViewerStreamTest, ViewersOnManyThreadsAllGetTheirPicture) {
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 6; ++i) {
+    threads.emplace_back([this, i] {
+      TestViewer viewer(scene_, cache_, pool_);
+      viewer.stream().subscribe(i % 2 == 0 ? 0 : 10'000);
+      for (int step = 0; step <= 20; ++step) {
+        viewer.stream().set_plan(plan_with_alpha(*scene_, step / 40.0 + (i % 3) * 0.1));
+        if (step % 5 == 0) viewer.complete();
+        viewer.take();
+        if (step == 7) {
+          StreamQuality quality = viewer.stream().quality();
+          quality.colour_bits = 6;
+          viewer.stream().set_quality(quality);
+        }
+      }
+      expect_picture(viewer, *scene_, 0.5 + (i % 3) * 0.1, 6);
+    });
+  }
+  for (auto& thread : threads) thread.join();
+}
+
+TEST_F(ViewerStreamTest, SurvivesViewersThatLeaveInTheMiddle) {
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([this, i] {
+      for (int round = 0; round < 20; ++round) {
+        TestViewer viewer(scene_, cache_, pool_);
+        viewer.stream().subscribe(0);
+        show(viewer, (i * 20 + round) / 100.0);
+        for (int frame = 0; frame < round % 5; ++frame) viewer.take();
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  TestViewer last(scene_, cache_, pool_);
+  last.stream().subscribe(0);
+  show(last, 0.79);
+  last.complete();
+  expect_picture(last, *scene_, 0.79);
+}
+
+}  // namespace
+}  // namespace spectra::server
