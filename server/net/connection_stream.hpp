@@ -5,7 +5,6 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/basic_stream.hpp>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -35,10 +34,5 @@ using ConnectionStream = boost::beast::basic_stream<boost::asio::ip::tcp, boost:
 
 /// Completes with (error_code, result) instead of throwing.
 inline constexpr auto kAwait = boost::asio::as_tuple(boost::asio::use_awaitable);
-
-/// Seconds of the steady clock.
-inline double steady_now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace spectra::server

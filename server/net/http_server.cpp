@@ -43,7 +43,7 @@ constexpr std::chrono::milliseconds kStopPoll{20};
 
 std::string url_of(const asio::ip::address& address, std::uint16_t port) {
   const std::string host = address.is_v6() ? '[' + address.to_string() + ']' : address.to_string();
-  return "http://" + host + ':' + std::to_string(port) + '/';
+  return "http://" + host + ':' + std::to_string(port);
 }
 
 /// The addresses of all interfaces that are up, loopback first; link-local IPv6 ones are left out, for no browser takes

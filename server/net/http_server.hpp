@@ -40,7 +40,7 @@ class HttpServer {
 
   std::uint16_t port() const;
 
-  /// "http://ADDRESS:PORT/" for every address the server can be reached at, the one to show first in front.
+  /// "http://ADDRESS:PORT" for every address the server can be reached at, the one to show first in front.
   std::vector<std::string> urls() const;
 
   const NetMetrics& metrics() const;

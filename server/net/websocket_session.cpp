@@ -13,6 +13,8 @@
 #include <exception>
 #include <utility>
 
+#include "server/net/steady_seconds.hpp"
+
 namespace spectra::server {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
@@ -92,9 +94,9 @@ asio::awaitable<void> WebSocketSession::read_messages() {
     }
     buffer.consume(buffer.size());
     // A flood is slowed down by not reading on; the kernel's window then holds the sender.
-    while (!messages_.take(steady_now_s()) && !is_ended_) {
-      reader_timer_.expires_after(
-          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(messages_.wait_s(steady_now_s()))));
+    while (!messages_.take(steady_seconds()) && !is_ended_) {
+      reader_timer_.expires_after(std::chrono::duration_cast<Clock::duration>(
+          std::chrono::duration<double>(messages_.wait_s(steady_seconds()))));
       co_await reader_timer_.async_wait(kAwait);
     }
   }

@@ -1,0 +1,47 @@
+#include "server/app/command_output.hpp"
+
+#include <cstdio>
+#include <string>
+
+#include "server/app/commands.hpp"
+
+namespace spectra::server {
+namespace {
+
+/// One line in one write, so that lines of several threads do not mix.
+void print_line(std::string_view kind, std::string_view message) {
+  std::string line = "spectra: ";
+  line.append(kind).append(message);
+  for (char& c : line) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  line += '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+}  // namespace
+
+int fail(int status, std::string_view message) {
+  print_line("", message);
+  return status;
+}
+
+int fail(const fusion::Error& error) {
+  const bool is_usage = static_cast<int>(error.code) < static_cast<int>(fusion::ErrorCode::FileNotFound);
+  return fail(is_usage ? kWrongUsage : kJobFailed, error.message);
+}
+
+void warn(std::string_view message) {
+  print_line("warning: ", message);
+}
+
+void print_notes(const std::vector<fusion::Note>& notes) {
+  for (const auto& note : notes) print_line("note: ", note.message);
+}
+
+fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
+                                               const std::optional<std::filesystem::path>& thermal) {
+  return thermal ? fusion::read_ply_with_thermal(scene, *thermal) : fusion::read_ply(scene);
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "fusion/error.hpp"
+#include "fusion/mesh/ply_reader.hpp"
+
+namespace spectra::server {
+
+/// Writes "spectra: MESSAGE" to standard error and returns `status`.
+int fail(int status, std::string_view message);
+
+/// The same for an error of the fusion library: what was asked for wrongly is wrong usage, the rest a failed job.
+int fail(const fusion::Error& error);
+
+/// Writes "spectra: warning: MESSAGE" to standard error.
+void warn(std::string_view message);
+
+/// Writes what was repaired, left out or interpreted to standard error, one line each.
+void print_notes(const std::vector<fusion::Note>& notes);
+
+/// Reads a scene, with the temperatures of a second file where one is given.
+fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
+                                               const std::optional<std::filesystem::path>& thermal);
+
+}  // namespace spectra::server

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/app/settings_text.hpp"
+
+namespace spectra::server {
+
+/// Exit statuses of the program.
+inline constexpr int kDone = 0;
+inline constexpr int kJobFailed = 1;
+inline constexpr int kWrongUsage = 2;
+
+struct ServeOptions {
+  std::optional<std::filesystem::path> scene;  ///< Absent: the demo scene.
+  std::optional<std::filesystem::path> thermal;
+  std::string listen = "127.0.0.1:8080";
+  std::vector<std::string> allowed_hosts;
+  std::optional<std::filesystem::path> web;
+  unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
+};
+
+struct FuseOptions {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::optional<std::filesystem::path> thermal;
+  SettingsText settings;
+};
+
+struct InfoOptions {
+  std::filesystem::path input;
+  std::optional<std::filesystem::path> thermal;
+  bool as_json = false;
+};
+
+struct DemoSceneFileOptions {
+  std::filesystem::path output;
+  std::uint64_t vertex_count = 300'000;
+  std::uint64_t seed = 1;
+};
+
+/// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
+int run_serve(const ServeOptions& options);
+int run_fuse(const FuseOptions& options);
+int run_info(const InfoOptions& options);
+int run_methods(bool as_json);
+int run_demo_scene(const DemoSceneFileOptions& options);
+
+/// Parses the arguments, runs the command, returns the exit status. Catches everything.
+int run_program(int argc, const char* const* argv);
+
+}  // namespace spectra::server

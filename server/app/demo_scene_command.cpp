@@ -1,0 +1,15 @@
+#include "fusion/mesh/demo_scene.hpp"
+
+#include "fusion/mesh/ply_writer.hpp"
+#include "server/app/command_output.hpp"
+#include "server/app/commands.hpp"
+
+namespace spectra::server {
+
+int run_demo_scene(const DemoSceneFileOptions& options) {
+  const auto mesh = fusion::demo_scene({options.vertex_count, options.seed});
+  const auto written = fusion::write_ply(options.output, mesh, mesh.visible());
+  return written ? kDone : fail(written.error());
+}
+
+}  // namespace spectra::server

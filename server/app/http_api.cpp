@@ -1,0 +1,130 @@
+#include "server/app/http_api.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "fusion/fusion_plan.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "server/app/fused_file.hpp"
+#include "server/app/fusion_messages.hpp"
+#include "server/app/metrics_text.hpp"
+#include "server/app/settings_text.hpp"
+
+namespace spectra::server {
+namespace {
+
+constexpr int kMaxExports = 2;
+constexpr std::string_view kExportPrefix = "/api/v1/scene.";
+
+HttpReply json_error(unsigned status, std::string_view field, std::string_view message) {
+  const nlohmann::json body{{"error", {{"field", field}, {"message", message}}}};
+  return text_reply(status, body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
+                    "application/json");
+}
+
+HttpReply no_scene_reply() {
+  auto reply = json_error(503, "", "there is no scene yet");
+  reply.headers.emplace_back("Retry-After", "2");
+  return reply;
+}
+
+/// Counts one export for as long as it or its bytes exist.
+class ExportSlot {
+ public:
+  explicit ExportSlot(std::shared_ptr<std::atomic<int>> count) : count_(std::move(count)) { *count_ += 1; }
+  ~ExportSlot() { *count_ -= 1; }
+  ExportSlot(const ExportSlot&) = delete;
+  ExportSlot& operator=(const ExportSlot&) = delete;
+
+ private:
+  std::shared_ptr<std::atomic<int>> count_;
+};
+
+struct ExportBody {
+  std::shared_ptr<ExportSlot> slot;
+  std::string bytes;
+};
+
+SettingsText settings_text_of(const RequestTarget& target) {
+  SettingsText text;
+  for (const auto& [name, value] : target.query) {
+    if (name == "method") {
+      text.method = value;
+    } else if (name == "palette") {
+      text.palette = value;
+    } else if (name == "range") {
+      text.range = value;
+    } else if (name == "missing") {
+      text.missing = value;
+    } else {
+      text.params.emplace_back(name, value);
+    }
+  }
+  return text;
+}
+
+fusion::Result<std::string> fused_export(const SceneSnapshot& scene, const fusion::FusionSettings& settings,
+                                         SceneFileFormat format) {
+  BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene.temperature()));
+  const auto mesh = scene.whole_mesh();
+  return scene_file(mesh, fused_colours(mesh, plan), format);
+}
+
+}  // namespace
+
+HttpApi::HttpApi(ServedScene& served) : served_(served) {}
+
+void HttpApi::handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
+  const std::string& path = request.target.path;
+  if (path == "/healthz") return reply(text_reply(200, "alive\n"));
+  if (path == "/readyz") {
+    if (served_.scenes.current()) return reply(text_reply(200, "ready\n"));
+    return reply(text_reply(503, served_.progress.message().value_or("no scene") + "\n"));
+  }
+  if (path == "/metrics") {
+    return reply(text_reply(200, metrics_text(served_, *net_metrics_), "text/plain; version=0.0.4; charset=utf-8"));
+  }
+  if (path == "/api/v1/scene") {
+    const auto scene = served_.scenes.current();
+    if (!scene) return reply(no_scene_reply());
+    return reply(text_reply(200, protocol::to_json(to_message(*scene)).dump() + "\n", "application/json"));
+  }
+  if (path.starts_with(kExportPrefix)) return handle_export(request.target, reply);
+  reply(text_reply(404, "not found\n"));
+}
+
+void HttpApi::handle_export(const RequestTarget& target, const std::function<void(HttpReply)>& reply) {
+  const auto format = scene_file_format(target.path);
+  if (!format || target.path.size() != kExportPrefix.size() + 3) return reply(text_reply(404, "not found\n"));
+  const auto settings = settings_from_text(settings_text_of(target));
+  if (!settings) return reply(json_error(400, settings.error().field, settings.error().message));
+  const auto scene = served_.scenes.current();
+  if (!scene) return reply(no_scene_reply());
+  if (*exports_under_way_ >= kMaxExports) {
+    auto busy = json_error(503, "", "two exports are under way already");
+    busy.headers.emplace_back("Retry-After", "5");
+    return reply(std::move(busy));
+  }
+  const auto slot = std::make_shared<ExportSlot>(exports_under_way_);
+  served_.pool.post(
+      [slot, scene, settings = settings.value(), format = *format, reply, path = target.path] {
+        try {
+          auto bytes = fused_export(*scene, settings, format);
+          if (!bytes) return reply(json_error(400, bytes.error().field, bytes.error().message));
+          const auto body = std::make_shared<ExportBody>(ExportBody{slot, std::move(bytes).value()});
+          HttpReply done{200, std::string(content_type_of(format)), {body, &body->bytes}, {}};
+          done.headers.emplace_back("Content-Disposition",
+                                    "attachment; filename=\"" + path.substr(path.rfind('/') + 1) + '"');
+          reply(std::move(done));
+        } catch (const std::exception& error) {
+          spdlog::error("an export failed: {}", error.what());
+          reply(json_error(500, "", "the export failed"));
+        }
+      },
+      kExportPriority);
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,109 @@
+#include "server/app/metrics_text.hpp"
+
+#include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+#include "server/app/version.hpp"
+
+namespace spectra::server {
+namespace {
+
+class Families {
+ public:
+  void gauge(std::string name, std::string help, double value) {
+    add(std::move(name), std::move(help), prometheus::MetricType::Gauge).gauge.value = value;
+  }
+  void counter(std::string name, std::string help, double value) {
+    add(std::move(name), std::move(help), prometheus::MetricType::Counter).counter.value = value;
+  }
+  void info(std::string name, std::string help, std::string label, std::string text) {
+    auto& metric = add(std::move(name), std::move(help), prometheus::MetricType::Gauge);
+    metric.gauge.value = 1;
+    metric.label.push_back({std::move(label), std::move(text)});
+  }
+  std::string text() const { return prometheus::TextSerializer().Serialize(families_); }
+
+ private:
+  prometheus::ClientMetric& add(std::string name, std::string help, prometheus::MetricType type) {
+    families_.push_back({std::move(name), std::move(help), type, std::vector<prometheus::ClientMetric>(1)});
+    return families_.back().metric.front();
+  }
+  std::vector<prometheus::MetricFamily> families_;
+};
+
+double as_double(std::uint64_t count) {
+  return static_cast<double>(count);
+}
+
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  statm >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+double open_descriptors() {
+  std::error_code error;
+  double count = 0;
+  for (std::filesystem::directory_iterator it("/proc/self/fd", error), end; !error && it != end; it.increment(error)) {
+    count += 1;
+  }
+  return count > 0 ? count - 1 : 0;  // without the one that looks
+}
+
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+}  // namespace
+
+std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
+  Families out;
+  out.info("spectra_build_info", "The version that runs.", "version", std::string(kVersion));
+  out.gauge("spectra_viewers", "Viewers connected now.", static_cast<double>(net.viewers));
+  out.counter("spectra_viewers_total", "Viewers that have connected.", as_double(net.viewers_total));
+  out.counter("spectra_viewers_cut_total", "Viewers cut by a deadline or a full queue.", as_double(net.viewers_cut));
+  out.gauge("spectra_connections", "TCP connections open now.", static_cast<double>(net.connections_open));
+  out.counter("spectra_connections_total", "TCP connections accepted.", as_double(net.connections_accepted));
+  out.counter("spectra_connections_refused_total", "TCP connections over the limit.",
+              as_double(net.connections_refused));
+  out.counter("spectra_accept_failures_total", "Times that no descriptor was left for a connection.",
+              as_double(net.accept_failures));
+  out.counter("spectra_http_requests_total", "HTTP requests, upgrades included.", as_double(net.requests));
+  out.counter("spectra_http_requests_refused_total", "HTTP requests refused by a check.",
+              as_double(net.requests_refused));
+  out.counter("spectra_messages_received_total", "WebSocket messages from viewers.", as_double(net.messages_received));
+  out.counter("spectra_messages_sent_total", "JSON messages to viewers.", as_double(net.messages_sent));
+  out.counter("spectra_frames_sent_total", "Tile frames to viewers.", as_double(net.frames_sent));
+  out.counter("spectra_frame_bytes_sent_total", "Bytes of tile frames to viewers.", as_double(net.frame_bytes_sent));
+  out.gauge("spectra_frame_cache_bytes", "Encoded frames held for sharing.", as_double(served.cache.size_bytes()));
+  out.counter("spectra_frame_cache_hits_total", "Frames that were encoded already.",
+              as_double(served.cache.hit_count()));
+  out.counter("spectra_frame_cache_misses_total", "Frames that had to be encoded.",
+              as_double(served.cache.miss_count()));
+  if (const auto scene = served.scenes.current()) {
+    out.gauge("spectra_scene_revision", "Revision of the scene served.", scene->revision());
+    out.gauge("spectra_scene_vertices", "Vertices of the scene served.", as_double(scene->vertex_count()));
+    out.gauge("spectra_scene_triangles", "Triangles of the scene served.", as_double(scene->triangle_count()));
+    out.gauge("spectra_scene_tiles", "Tiles of the scene served.", as_double(scene->tiles().size()));
+  }
+  out.gauge("process_resident_memory_bytes", "Resident memory.", resident_bytes());
+  out.gauge("process_open_fds", "Open descriptors.", open_descriptors());
+  out.counter("process_cpu_seconds_total", "Processor time used.", cpu_seconds());
+  return out.text();
+}
+
+}  // namespace spectra::server

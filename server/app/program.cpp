@@ -1,0 +1,120 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <new>
+#include <string>
+
+#include "server/app/command_output.hpp"
+#include "server/app/commands.hpp"
+#include "server/app/version.hpp"
+
+namespace spectra::server {
+namespace {
+
+using Run = std::function<int()>;
+
+void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
+  auto* command = app.add_subcommand("serve", "Serve a scene to browsers");
+  auto* scene = command->add_option("scene", options.scene, "The scene, a PLY file; without one, the demo scene");
+  command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene")->needs(scene);
+  command->add_option("--listen", options.listen, "Where to listen, ADDRESS:PORT; port 0 picks a free one")
+      ->capture_default_str();
+  command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
+  command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
+      ->allow_extra_args(false);
+  command->add_option("--web", options.web, "Folder of the built web client");
+  command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
+      ->check(CLI::Range(0, 1024));
+  command->set_config("--config", "", "A TOML file with these options by their long names");
+  command->final_callback([&options, &run] { run = [&options] { return run_serve(options); }; });
+}
+
+void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& sets, Run& run) {
+  auto* command = app.add_subcommand("fuse", "Write a fused scene to a file");
+  command->add_option("input", options.input, "The scene, a PLY file")->required();
+  command->add_option("output", options.output, "The file to write: .ply, .glb or .drc")->required();
+  command->add_option("--method", options.settings.method, "The fusion method (see: spectra methods)")->required();
+  command->add_option("--set", sets, "A parameter of the method, name=value (may be repeated)")
+      ->allow_extra_args(false);
+  command->add_option("--palette", options.settings.palette, "The palette (see: spectra methods)");
+  command->add_option("--range", options.settings.range, "The temperature range: auto or LO:HI in degC");
+  command->add_option("--missing", options.settings.missing,
+                      "Colour of vertices without temperature: visible or #rrggbb");
+  command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  command->final_callback([&options, &sets, &run] {
+    for (const auto& set : sets) {
+      const auto equals = set.find('=');
+      if (equals == std::string::npos || equals == 0)
+        throw CLI::ValidationError("--set " + set, "name=value is wanted");
+      options.settings.params.emplace_back(set.substr(0, equals), set.substr(equals + 1));
+    }
+    run = [&options] { return run_fuse(options); };
+  });
+}
+
+void add_info(CLI::App& app, InfoOptions& options, Run& run) {
+  auto* command = app.add_subcommand("info", "Say what is in a scene");
+  command->add_option("input", options.input, "The scene, a PLY file")->required();
+  command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  command->add_flag("--json", options.as_json, "Write JSON");
+  command->final_callback([&options, &run] { run = [&options] { return run_info(options); }; });
+}
+
+void add_methods(CLI::App& app, bool& as_json, Run& run) {
+  auto* command = app.add_subcommand("methods", "List the fusion methods, their parameters, and the palettes");
+  command->add_flag("--json", as_json, "Write the methods as JSON");
+  command->final_callback([&as_json, &run] { run = [&as_json] { return run_methods(as_json); }; });
+}
+
+void add_demo_scene(CLI::App& app, DemoSceneFileOptions& options, Run& run) {
+  auto* command = app.add_subcommand("demo-scene", "Write the generated demo scene to a PLY file");
+  command->add_option("output", options.output, "The file to write")->required();
+  command->add_option("--vertices", options.vertex_count, "About how many vertices")
+      ->check(CLI::Range(std::uint64_t{1'000}, std::uint64_t{100'000'000}))
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Another number, another scene")->capture_default_str();
+  command->final_callback([&options, &run] { run = [&options] { return run_demo_scene(options); }; });
+}
+
+int parse_and_run(int argc, const char* const* argv) {
+  CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
+  app.set_version_flag("--version", "spectra " + std::string(kVersion));
+  app.require_subcommand(1);
+  ServeOptions serve;
+  FuseOptions fuse;
+  std::vector<std::string> sets;
+  InfoOptions info;
+  bool methods_as_json = false;
+  DemoSceneFileOptions demo_scene;
+  Run run;
+  bool is_demo = false;  // what is served without a scene anyway
+  add_serve(app, serve, is_demo, run);
+  add_fuse(app, fuse, sets, run);
+  add_info(app, info, run);
+  add_methods(app, methods_as_json, run);
+  add_demo_scene(app, demo_scene, run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::FileError& error) {
+    return fail(kJobFailed, error.what());
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return fail(kWrongUsage, std::string(error.what()) + " (see: spectra --help)");
+  }
+  return run();
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    return fail(kJobFailed, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(kJobFailed, error.what());
+  }
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,149 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+#include "fusion/mesh/demo_scene.hpp"
+#include "server/app/command_output.hpp"
+#include "server/app/commands.hpp"
+#include "server/app/http_api.hpp"
+#include "server/app/served_scene.hpp"
+#include "server/app/viewer_session.hpp"
+#include "server/net/http_server.hpp"
+
+namespace spectra::server {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
+
+/// The built web client: as asked for, installed beside the program, or in the source tree it was built from.
+fs::path web_root(const ServeOptions& options) {
+  if (options.web) return *options.web;
+  std::error_code error;
+  const auto program = fs::read_symlink("/proc/self/exe", error);
+  for (const fs::path& candidate : {program.parent_path() / "../share/spectra/web", fs::path(SPECTRA_WEB_DIST)}) {
+    if (fs::exists(candidate / "index.html", error)) return candidate;
+  }
+  return fs::path(SPECTRA_WEB_DIST);
+}
+
+/// Every viewer needs a descriptor, and the usual limit of 1024 is only a default.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < limit.rlim_max) {
+    limit.rlim_cur = limit.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &limit);
+  }
+}
+
+/// Reads and tiles the scene in a thread of its own, while the server already answers.
+class SceneLoader {
+ public:
+  SceneLoader(const ServeOptions& options, ServedScene& served, HttpServer& server)
+      : thread_([this, &options, &served, &server] {
+          try {
+            load(options, served);
+          } catch (const std::exception& error) {
+            failure_ = error.what();
+          }
+          is_done_ = true;
+          if (!failure_.empty()) server.stop();
+        }) {}
+
+  bool is_done() const { return is_done_; }
+
+  /// Why there is no scene; empty when there is. Waits for the end.
+  const std::string& failure() {
+    if (thread_.joinable()) thread_.join();
+    return failure_;
+  }
+
+ private:
+  static void load(const ServeOptions& options, ServedScene& served) {
+    const std::string name = options.scene ? options.scene->filename().string() : "the demo scene";
+    served.progress.set("Reading " + name);
+    fusion::LoadedScene loaded;
+    if (options.scene) {
+      auto read = load_scene(*options.scene, options.thermal);
+      if (!read) throw std::runtime_error(read.error().message);
+      loaded = std::move(read).value();
+    } else {
+      loaded.mesh = fusion::demo_scene({});
+    }
+    print_notes(loaded.notes);
+    served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
+                        " vertices)");
+    const auto scene = served.scenes.replace(std::move(loaded.mesh), served.pool);
+    served.progress.set(std::nullopt);
+    spdlog::info("serving {}: {} vertices, {} triangles, {} tiles", scene->name(), scene->vertex_count(),
+                 scene->triangle_count(), scene->tiles().size());
+  }
+
+  std::atomic<bool> is_done_{false};
+  std::string failure_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+int run_serve(const ServeOptions& options) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("spectra"));
+  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
+  const auto listen = parsed_listen_address(options.listen);
+  if (!listen) {
+    return fail(kWrongUsage,
+                "--listen " + options.listen + ": ADDRESS:PORT is wanted, such as 0.0.0.0:8080 or [::]:8080");
+  }
+  for (const auto& path : {options.scene, options.thermal}) {
+    if (path && !std::ifstream(*path)) return fail(kJobFailed, path->string() + ": cannot be opened");
+  }
+  if (options.web && !fs::exists(*options.web / "index.html")) {
+    return fail(kJobFailed, options.web->string() + ": there is no index.html in it");
+  }
+  raise_descriptor_limit();
+
+  NetOptions net;
+  net.address = listen->address;
+  net.port = listen->port;
+  net.allowed_hosts = options.allowed_hosts;
+  net.stop_on_signals = true;
+  const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
+  const auto served =
+      std::make_unique<ServedScene>(options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
+  HttpApi api(*served);
+  std::unique_ptr<HttpServer> server;
+  try {
+    server = std::make_unique<HttpServer>(
+        net, [&api](const HttpRequest& request, const auto& reply) { api.handle(request, reply); },
+        [&served, limits = net.limits](const std::shared_ptr<ViewerPeer>& peer) {
+          return std::make_shared<ViewerSession>(peer, *served, limits);
+        },
+        web_root(options));
+  } catch (const std::runtime_error& error) {
+    return fail(kJobFailed, error.what());
+  }
+  api.set_metrics(server->metrics());
+  for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
+  std::fflush(stdout);
+
+  SceneLoader loader(options, *served, *server);
+  server->run();
+  if (!loader.is_done()) {
+    // Reading cannot be interrupted, and nothing of it needs to be put in order.
+    spdlog::default_logger()->flush();
+    std::_Exit(kDone);
+  }
+  return loader.failure().empty() ? kDone : fail(kJobFailed, loader.failure());
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <string_view>
+
+namespace spectra::server {
+
+/// As CMake's project() says.
+inline constexpr std::string_view kVersion = SPECTRA_VERSION;
+
+}  // namespace spectra::server

@@ -1,0 +1,474 @@
+#include "server/app/viewer_session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <utility>
+
+#include "fusion/colour/palette.hpp"
+#include "fusion/registry.hpp"
+#include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "server/app/fusion_messages.hpp"
+#include "server/app/version.hpp"
+#include "server/net/steady_seconds.hpp"
+
+namespace spectra::server {
+using nlohmann::json;
+using protocol::refusal;
+using protocol::RpcErrorCode;
+
+namespace {
+
+/// Answers that one viewer may have computing at once, and changes it may have waiting.
+constexpr std::size_t kMaxComputing = 16;
+constexpr std::size_t kMaxWaiting = 512;
+
+std::string new_session_id() {
+  std::random_device random;
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string id;
+  for (int word = 0; word < 4; ++word) {
+    unsigned bits = random();
+    for (int digit = 0; digit < 8; ++digit, bits >>= 4U) id += kDigits[bits & 15U];
+  }
+  return id;
+}
+
+fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
+  return scene ? scene->temperature() : fusion::SceneTemperature{};
+}
+
+/// The error side of an answer.
+auto refused(protocol::RpcError error) {
+  return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(error));
+}
+
+auto no_scene() {
+  return refusal(RpcErrorCode::NoScene, "there is no scene yet");
+}
+
+std::optional<double> if_positive(double value) {
+  return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+/// One round on the pool: what goes in, and what comes out.
+struct ViewerSession::Preparation {
+  std::shared_ptr<const SceneSnapshot> scene;
+  bool is_new_scene = false;
+  fusion::FusionSettings settings;
+  std::vector<FusionRequest> requests;
+
+  std::optional<fusion::FusionPlan> plan;                   ///< Of the newest settings that hold.
+  std::vector<std::optional<protocol::RpcError>> refusals;  ///< One a request.
+  std::optional<std::string> reset_reason;                  ///< The settings did not fit the new scene.
+
+  void run() {
+    const auto temperature = temperature_of(scene);
+    if (is_new_scene) {
+      auto prepared = fusion::FusionPlan::prepare(settings, temperature);
+      if (!prepared) {
+        reset_reason = prepared.error().message;
+        settings = fusion::default_settings();
+        prepared = fusion::FusionPlan::prepare(settings, temperature);
+      }
+      if (prepared) plan = std::move(prepared).value();
+    }
+    for (const auto& request : requests) refusals.push_back(apply(request, temperature));
+  }
+
+  std::optional<protocol::RpcError> apply(const FusionRequest& request, const fusion::SceneTemperature& temperature) {
+    if (!request.change) return request.change.error();
+    auto changed = fusion::with_change(settings, request.change.value());
+    if (!changed) return to_rpc_error(changed.error());
+    auto prepared = fusion::FusionPlan::prepare(changed.value(), temperature);
+    if (!prepared) return to_rpc_error(prepared.error());
+    settings = std::move(changed).value();
+    plan = std::move(prepared).value();
+    return std::nullopt;
+  }
+};
+
+ViewerSession::ViewerSession(const std::shared_ptr<ViewerPeer>& peer, ServedScene& served, const NetLimits& limits)
+    : peer_(*peer),
+      weak_peer_(peer),
+      served_(served),
+      limits_(limits),
+      requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s) {}
+
+void ViewerSession::opened() {
+  served_.viewer_count += 1;
+  const auto weak_self = weak_from_this();
+  const auto post = [weak_peer = weak_peer_, weak_self](auto job) {
+    if (const auto peer = weak_peer.lock()) {
+      peer->post([weak_self, job = std::move(job)] {
+        if (const auto self = weak_self.lock()) job(*self);
+      });
+    }
+  };
+  scene_subscription_ = served_.scenes.subscribe([post](const std::shared_ptr<const SceneSnapshot>& scene) {
+    post([scene](ViewerSession& self) { self.take_scene(scene); });
+  });
+  progress_subscription_ = served_.progress.subscribe([post](const std::optional<std::string>& message) {
+    post([message](ViewerSession& self) { self.set_status("scene_loading", protocol::StatusLevel::Info, message); });
+  });
+
+  scene_ = served_.scenes.current();
+  // The default method looks at no histogram, so this takes microseconds.
+  plan_ = fusion::FusionPlan::prepare(fusion::default_settings(), temperature_of(scene_)).value();
+  if (scene_) begin_stream();
+
+  protocol::Hello hello;
+  hello.server = {"Spectra", std::string(kVersion)};
+  hello.session_id = new_session_id();
+  hello.role = protocol::Role::Operator;
+  hello.capabilities = {"histogram", "probe", "extremes", "exports"};
+  hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
+                  limits_.requests_per_s};
+  if (scene_) hello.scene = to_message(*scene_);
+  hello.methods = method_messages();
+  hello.palettes = palette_messages();
+  hello.fusion = to_message(*plan_, temperature_of(scene_).summary);
+  hello.quality = to_message(quality());
+  notify("hello", protocol::to_json(hello));
+  if (stream_) set_plan(*plan_);
+  if (const auto message = served_.progress.message()) {
+    set_status("scene_loading", protocol::StatusLevel::Info, message);
+  }
+}
+
+void ViewerSession::closed() {
+  if (stream_) stream_->close();
+  scene_subscription_ = {};
+  progress_subscription_.reset();
+  served_.viewer_count -= 1;
+}
+
+void ViewerSession::text_received(std::string_view text) {
+  protocol::JsonLimits json_limits;
+  json_limits.max_size_bytes = limits_.message_size_bytes;
+  const auto message = protocol::incoming_message(text, json_limits);
+  if (const auto* bad = std::get_if<protocol::RefusedMessage>(&message)) {
+    peer_.send(protocol::error_text(bad->id, bad->error));
+    return;
+  }
+  handle(std::get<protocol::IncomingMessage>(message));
+}
+
+void ViewerSession::binary_received() {
+  peer_.send(protocol::error_text(
+      std::nullopt, {RpcErrorCode::InvalidRequest, "binary messages are not accepted from a viewer", "", "JSON text"}));
+}
+
+void ViewerSession::handle(const protocol::IncomingMessage& message) {
+  const std::string& method = message.method;
+  const auto& params = message.params;
+  const Id& id = message.id;
+  if (method == "stream.ack") return answer(id, acknowledge(params));
+  if (method == "camera.set") return answer(id, set_camera(params));
+  if (!requests_.take(steady_seconds())) {
+    const auto allowed = static_cast<long>(limits_.requests_per_s);
+    return answer(id, refusal(RpcErrorCode::Busy, "too many requests", "", std::to_string(allowed) + " a second"));
+  }
+  if (method == "fusion.set") return fusion_set(id, params);
+  if (method == "fusion.get") return answer(id, fusion_get());
+  if (method == "scene.get") return answer(id, scene_get());
+  if (method == "scene.subscribe") return answer(id, subscribe(params));
+  if (method == "scene.unsubscribe") return answer(id, unsubscribe());
+  if (method == "quality.set") return answer(id, set_quality(params));
+  if (method == "scene.histogram") return histogram(id, params);
+  if (method == "scene.probe") return probe(id, params);
+  if (method == "scene.extremes") return extremes(id);
+  answer(id, refusal(RpcErrorCode::MethodNotFound, "there is no method \"" + method.substr(0, 64) + "\"", "method"));
+}
+
+void ViewerSession::answer(const Id& id, const Answer& answer) {
+  if (!answer) {
+    peer_.send(protocol::error_text(id, answer.error()));
+  } else if (id) {
+    peer_.send(protocol::result_text(*id, answer.value()));
+  }
+}
+
+void ViewerSession::notify(std::string_view method, const json& params) {
+  peer_.send(protocol::notification_text(method, params));
+}
+
+ViewerSession::Answer ViewerSession::scene_get() const {
+  if (!scene_) return no_scene();
+  return protocol::to_json(to_message(*scene_));
+}
+
+ViewerSession::Answer ViewerSession::subscribe(const json& params) {
+  BOOST_OUTCOME_TRY(const auto request, protocol::from_json<protocol::SubscribeRequest>(params));
+  for (const auto channel : request.channels) {
+    if (channel != protocol::Channel::Fused) {
+      return refusal(RpcErrorCode::InvalidParams, "this server streams the channel \"fused\" only", "channels",
+                     "fused");
+    }
+  }
+  is_subscribed_ = true;
+  in_flight_bytes_ = request.in_flight_bytes.value_or(0);
+  if (stream_) stream_->subscribe(in_flight_bytes_);
+  peer_.wake();
+  return json::object();
+}
+
+ViewerSession::Answer ViewerSession::unsubscribe() {
+  is_subscribed_ = false;
+  if (stream_) stream_->unsubscribe();
+  return json::object();
+}
+
+ViewerSession::Answer ViewerSession::fusion_get() const {
+  return protocol::to_json(fusion_reply());
+}
+
+ViewerSession::Answer ViewerSession::set_quality(const json& params) {
+  BOOST_OUTCOME_TRY(const auto change, protocol::from_json<protocol::QualityChange>(params));
+  BOOST_OUTCOME_TRY(const auto changed, with_change(quality(), change));
+  quality_ = changed;
+  if (stream_) stream_->set_quality(changed);
+  peer_.wake();
+  return protocol::to_json(protocol::QualityReply{to_message(quality())});
+}
+
+ViewerSession::Answer ViewerSession::set_camera(const json& params) {
+  BOOST_OUTCOME_TRY(const auto message, protocol::from_json<protocol::CameraSet>(params));
+  camera_ = from_message(message);
+  if (stream_) stream_->set_camera(*camera_);
+  peer_.wake();
+  return json::object();
+}
+
+ViewerSession::Answer ViewerSession::acknowledge(const json& params) {
+  BOOST_OUTCOME_TRY(const auto ack, protocol::from_json<protocol::StreamAck>(params));
+  if (stream_) stream_->acknowledge(ack.sequence, steady_seconds());
+  peer_.wake();
+  return json::object();
+}
+
+void ViewerSession::fusion_set(const Id& id, const json& params) {
+  if (waiting_.size() >= kMaxWaiting) {
+    return answer(
+        id, refusal(RpcErrorCode::Busy, "too many changes are waiting", "", std::to_string(kMaxWaiting) + " at once"));
+  }
+  auto message = protocol::from_json<protocol::FusionChange>(params);
+  if (message) {
+    waiting_.push_back({id, from_message(message.value())});
+  } else {
+    waiting_.push_back({id, refused(message.error())});
+  }
+  start_preparation();
+}
+
+void ViewerSession::answer_from_pool(const Id& id, std::function<Answer()> compute) {
+  if (computing_count_ >= kMaxComputing) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many answers are being computed", "",
+                              std::to_string(kMaxComputing) + " at once"));
+  }
+  computing_count_ += 1;
+  served_.pool.post(
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, compute = std::move(compute)] {
+        Answer computed = refusal(RpcErrorCode::InternalError, "the answer could not be computed");
+        try {
+          computed = compute();
+        } catch (const std::exception& error) {
+          spdlog::error("an answer failed: {}", error.what());
+        }
+        const auto peer = weak_peer.lock();
+        if (!peer) return;
+        peer->post([weak_self, id, computed = std::move(computed)] {
+          const auto self = weak_self.lock();
+          if (!self) return;
+          self->computing_count_ -= 1;
+          self->answer(id, computed);
+        });
+      },
+      kAnswerPriority);
+}
+
+void ViewerSession::histogram(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::HistogramRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  answer_from_pool(id, [scene = scene_, plan = *plan_, bins = request.value().bins]() -> Answer {
+    const auto& temperature = scene->temperature();
+    const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
+    return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted()));
+  });
+}
+
+void ViewerSession::probe(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::ProbeRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  const auto& p = request.value().position;
+  const fusion::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+  answer_from_pool(id, [scene = scene_, plan = *plan_, position]() -> Answer {
+    const auto found = scene->probe(position);
+    if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
+    const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
+    fusion::Rgb8 fused;
+    plan.fuse({&celsius, 1}, {&found->visible, 1}, {&fused, 1});
+    return protocol::to_json(to_message(*found, fused));
+  });
+}
+
+void ViewerSession::extremes(const Id& id) {
+  if (!scene_) return answer(id, no_scene());
+  answer_from_pool(id, [scene = scene_]() -> Answer { return protocol::to_json(extremes_message(*scene)); });
+}
+
+void ViewerSession::take_scene(const std::shared_ptr<const SceneSnapshot>& scene) {
+  const auto& newest = coming_scene_ ? coming_scene_ : scene_;
+  if (newest && scene->revision() <= newest->revision()) return;
+  coming_scene_ = scene;
+  start_preparation();
+}
+
+void ViewerSession::start_preparation() {
+  if (is_preparing_ || (waiting_.empty() && !coming_scene_)) return;
+  is_preparing_ = true;
+  const auto preparation = std::make_shared<Preparation>();
+  preparation->is_new_scene = coming_scene_ != nullptr;
+  preparation->scene = coming_scene_ ? std::exchange(coming_scene_, nullptr) : scene_;
+  preparation->settings = plan_->settings();
+  preparation->requests = std::exchange(waiting_, {});
+  served_.pool.post(
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), preparation] {
+        try {
+          preparation->run();
+        } catch (const std::exception& error) {
+          spdlog::error("settings could not be prepared: {}", error.what());
+          preparation->plan.reset();
+          preparation->refusals.assign(
+              preparation->requests.size(),
+              protocol::RpcError{RpcErrorCode::InternalError, "the settings could not be prepared", "", ""});
+        }
+        const auto peer = weak_peer.lock();
+        if (!peer) return;
+        peer->post([weak_self, preparation] {
+          if (const auto self = weak_self.lock()) self->finish_preparation(preparation);
+        });
+      },
+      kAnswerPriority);
+}
+
+void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
+  is_preparing_ = false;
+  if (preparation->is_new_scene && preparation->plan) {
+    scene_ = preparation->scene;
+    plan_ = preparation->plan;
+    begin_stream();
+    notify("scene.changed", protocol::to_json(protocol::SceneChanged{to_message(*scene_)}));
+  }
+  if (preparation->plan) set_plan(*preparation->plan);
+  if (preparation->is_new_scene && preparation->plan) {
+    notify("fusion.changed", protocol::to_json(fusion_reply()));
+    set_status("settings_reset", protocol::StatusLevel::Warning,
+               preparation->reset_reason
+                   ? std::optional("The settings did not fit the new scene and are at their defaults: " +
+                                   *preparation->reset_reason)
+                   : std::nullopt);
+  }
+  for (std::size_t i = 0; i < preparation->requests.size(); ++i) {
+    const auto& error = preparation->refusals[i];
+    const Id& id = preparation->requests[i].id;
+    answer(id, error ? Answer(refused(*error)) : fusion_get());
+  }
+  start_preparation();
+}
+
+void ViewerSession::begin_stream() {
+  if (stream_) {
+    stream_->set_scene(scene_);
+    return;
+  }
+  stream_ = ViewerStream::create(scene_, served_.cache, served_.pool, [weak_peer = weak_peer_] {
+    if (const auto peer = weak_peer.lock()) peer->wake();
+  });
+  if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
+  if (camera_) stream_->set_camera(*camera_);
+  if (is_subscribed_) stream_->subscribe(in_flight_bytes_);
+}
+
+void ViewerSession::set_plan(fusion::FusionPlan plan) {
+  plan_ = plan;
+  if (stream_) stream_->set_plan(std::move(plan));
+  peer_.wake();
+
+  const auto& settings = plan_->settings();
+  const fusion::Method* method = fusion::find_method(settings.method);
+  const bool lacks_temperature =
+      scene_ && method->needs_temperature && !scene_->temperature().summary.has_temperature();
+  set_status("no_temperature", protocol::StatusLevel::Warning,
+             lacks_temperature
+                 ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
+                 : std::nullopt);
+  const fusion::Palette* palette = fusion::find_palette(settings.palette);
+  const bool is_unsafe = settings.method == "intensity_hue" && palette != nullptr && !palette->fusion_safe;
+  set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
+             is_unsafe
+                 ? std::optional("The palette " + palette->label + " does not carry temperature by hue alone, so " +
+                                 method->label + " hides part of it; choose one that is marked as safe.")
+                 : std::nullopt);
+}
+
+protocol::FusionReply ViewerSession::fusion_reply() const {
+  return {stream_ ? stream_->generation() : 0, to_message(*plan_, temperature_of(scene_).summary)};
+}
+
+StreamQuality ViewerSession::quality() const {
+  return stream_ ? stream_->quality() : quality_;
+}
+
+std::optional<OutgoingFrame> ViewerSession::next_frame() {
+  if (!stream_) return std::nullopt;
+  auto frame = stream_->next_frame(steady_seconds());
+  if (!frame) {
+    if (const auto complete = stream_->take_complete()) {
+      notify("stream.complete", protocol::to_json(to_message(*complete)));
+    }
+  }
+  return frame;
+}
+
+void ViewerSession::ticked() {
+  if (!is_subscribed_ || !stream_) return;
+  const StreamStats stats = stream_->stats();
+  protocol::StreamStats message;
+  message.round_trip_ms = if_positive(stats.round_trip_ms);
+  if (!message.round_trip_ms) message.round_trip_ms = if_positive(peer_.round_trip_ms());
+  message.throughput_bytes_per_s = if_positive(stats.throughput_bytes_per_s);
+  message.queued_bytes = stats.queued_bytes + peer_.queued_bytes();
+  message.skipped_frames = stats.skipped_frames;
+  message.viewers = served_.viewer_count;
+  message.accuracy.position_mm = if_positive(stats.position_mm);
+  message.accuracy.colour_levels = stats.colour_levels;
+  if (message.accuracy.position_mm) message.accuracy.pixel_error = stats.pixel_error;
+  notify("stream.stats", protocol::to_json(message));
+  set_status("tiles_failed", protocol::StatusLevel::Error,
+             stats.failed_tiles > 0 ? std::optional(std::to_string(stats.failed_tiles) +
+                                                    " tiles of the scene could not be encoded and are not shown.")
+                                    : std::nullopt);
+}
+
+void ViewerSession::set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message) {
+  const auto told = statuses_.find(id);
+  if (!message) {
+    if (told == statuses_.end()) return;
+    statuses_.erase(told);
+  } else {
+    if (told != statuses_.end() && told->second == *message) return;
+    statuses_.insert_or_assign(id, *message);
+  }
+  notify("status", protocol::to_json(protocol::Status{id, level, std::move(message)}));
+}
+
+}  // namespace spectra::server
