@@ -183,7 +183,7 @@ Result<void> PlyBodyReader::finish_vertex_block(std::size_t count) {
     for (std::size_t i = 0; i < count; ++i, ++entry_) {
       for (const double value : {positions_[i].x, positions_[i].y, positions_[i].z}) {
         if (!(std::abs(value) <= kFloatMax)) {
-          return failure(ErrorCode::BadValue, where() + " has the coordinate " + std::to_string(value) +
+          return failure(ErrorCode::BadValue, where() + " has the coordinate " + number_text(value) +
                                                   "; positions must be finite and within the range of a float");
         }
       }
@@ -201,9 +201,10 @@ Result<void> PlyBodyReader::finish_vertex_block(std::size_t count) {
   const std::uint64_t first_vertex = entry_;
   entry_ += count;
   if (!handlers_.vertices) return success();
-  return handlers_.vertices({first_vertex, std::span(positions_).first(count),
-                             std::span<const Rgb8>(colours_).first(stream_.has_visible() ? count : 0),
-                             std::span<const float>(temperatures_).first(stream_.has_temperature() ? count : 0)});
+  return handed_on(
+      handlers_.vertices({first_vertex, std::span(positions_).first(count),
+                          std::span<const Rgb8>(colours_).first(stream_.has_visible() ? count : 0),
+                          std::span<const float>(temperatures_).first(stream_.has_temperature() ? count : 0)}));
 }
 
 Result<void> PlyBodyReader::convert_colours(std::size_t count) {
@@ -220,7 +221,7 @@ Result<void> PlyBodyReader::convert_colours(std::size_t count) {
       const auto byte = colour_byte(values[i], property.type);
       if (!byte) {
         entry_ += i;
-        return failure(ErrorCode::BadValue, where() + " has the colour value " + std::to_string(values[i]) + " in '" +
+        return failure(ErrorCode::BadValue, where() + " has the colour value " + number_text(values[i]) + " in '" +
                                                 property.name + "', which must be " +
                                                 (is_floating(property.type) ? "from 0 to 1 for a floating type"
                                                                             : "a whole number from 0 to 255"));
@@ -338,10 +339,15 @@ Result<void> PlyBodyReader::flush_triangles() {
   }
   facts_.triangle_count += triangles_.size();
   if (handlers_.triangles) {
-    BOOST_OUTCOME_TRY(handlers_.triangles(triangles_));
+    BOOST_OUTCOME_TRY(handed_on(handlers_.triangles(triangles_)));
   }
   triangles_.clear();
   return success();
+}
+
+Result<void> PlyBodyReader::handed_on(Result<void> result) {
+  handler_has_failed_ = !result;
+  return result;
 }
 
 Result<void> PlyBodyReader::skip_element(const PlyElement& element) {

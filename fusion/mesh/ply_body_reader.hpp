@@ -15,6 +15,8 @@ class PlyBodyReader {
  public:
   PlyBodyReader(PlyStream& stream, const PlyHandlers& handlers);
   Result<PlyBodyFacts> read();
+  /// The error of read() came from a handler: it is not about this file.
+  bool handler_has_failed() const { return handler_has_failed_; }
 
  private:
   Result<void> read_vertices(const PlyElement& element);
@@ -32,6 +34,8 @@ class PlyBodyReader {
   Result<void> add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c);
   Result<void> flush_triangles();
   Result<std::uint32_t> corner_index(std::int64_t value) const;
+
+  Result<void> handed_on(Result<void> result);
 
   Result<void> skip_element(const PlyElement& element);
   Result<void> skip_list(const PlyProperty& property);
@@ -64,6 +68,7 @@ class PlyBodyReader {
   std::vector<float> temperatures_;
 
   std::vector<Triangle> triangles_;
+  bool handler_has_failed_ = false;
   std::vector<std::uint64_t> is_referenced_;  ///< One bit a vertex.
 };
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "fusion/mesh/nearest_vertex.hpp"
 #include "fusion/mesh/ply_stream.hpp"
+#include "fusion/mesh/ply_values.hpp"
 #include "fusion/mesh/scene_origin.hpp"
 
 namespace spectra::fusion {
@@ -47,10 +47,7 @@ Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path)
 }
 
 std::string in_metres(double distance) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << distance << " m";
-  return text.str();
+  return number_text(distance) + " m";
 }
 
 Vec3d absolute_position(const MultispectralMesh& mesh, std::size_t vertex) {

@@ -234,7 +234,9 @@ std::uint64_t PlyStream::triangle_count_limit() const {
 
 Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
   file_.seek(header_.size_bytes);
-  return located(PlyBodyReader(*this, handlers).read(), name_);
+  PlyBodyReader reader(*this, handlers);
+  Result<PlyBodyFacts> facts = reader.read();
+  return reader.handler_has_failed() ? std::move(facts) : located(std::move(facts), name_);
 }
 
 std::vector<Note> PlyStream::notes(const PlyBodyFacts& facts) const {

@@ -1,8 +1,8 @@
 #include "fusion/mesh/ply_values.hpp"
 
+#include <array>
 #include <charconv>
 #include <cstdlib>
-#include <string>
 #include <system_error>
 
 namespace spectra::fusion {
@@ -15,6 +15,12 @@ std::string_view without_plus(std::string_view token) {
 }
 
 }  // namespace
+
+std::string number_text(double value) {
+  std::array<char, 32> text;
+  const auto [end, status] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
 
 std::optional<double> parse_number(std::string_view token) {
   token = without_plus(token);

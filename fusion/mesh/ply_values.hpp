@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -68,6 +69,8 @@ void load_column(PlyScalar type, const unsigned char* bytes, std::size_t stride,
   });
 }
 
+/// The shortest text that is read back as that number.
+std::string number_text(double value);
 /// A number as text files have it: "nan", "inf" and a leading '+' are numbers too. nullopt: not a number.
 std::optional<double> parse_number(std::string_view token);
 /// A whole number as text files have it.
