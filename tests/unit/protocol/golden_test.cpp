@@ -154,6 +154,30 @@ TEST(GoldenMessages, CoverEveryMethodOfTheSchema) {
   for (const auto& [method, passages] : kMethods) EXPECT_TRUE(named.contains(method)) << method;
 }
 
+TEST(ProtocolDocument, ShowsTheGoldenExamplesAndEveryMethod) {
+  const std::string document = content(fs::path(SPECTRA_PROTOCOL_DIR).parent_path() / "docs" / "protocol.md");
+  const std::string marker = "`protocol/golden/messages/";
+  const std::string fence = "```json\n";
+  int example_count = 0;
+  for (std::size_t at = document.find(marker); at != std::string::npos; at = document.find(marker, at)) {
+    at += marker.size();
+    const std::string name = document.substr(at, document.find('`', at) - at);
+    SCOPED_TRACE(name);
+    const std::size_t after = at + name.size();
+    if (document.compare(after, fence.size() + 3, "`:\n" + fence) != 0) {
+      EXPECT_TRUE(fs::exists(kGolden / "messages" / name));
+      continue;
+    }
+    const std::size_t begin = after + 3 + fence.size();
+    const std::string block = document.substr(begin, document.find("```", begin) - begin);
+    EXPECT_EQ(block, content(kGolden / "messages" / name));
+    ++example_count;
+  }
+  EXPECT_GE(example_count, 15);
+  for (const auto& [method, passages] : kMethods)
+    EXPECT_NE(document.find("### `" + method + "`"), std::string::npos) << method;
+}
+
 json number_or_null(float value) {
   return std::isnan(value) ? json(nullptr) : json(value);
 }
