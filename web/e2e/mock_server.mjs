@@ -9,7 +9,13 @@ import { WebSocketServer } from 'ws';
 const require = createRequire(import.meta.url);
 const draco = await require('draco3d').createEncoderModule({});
 
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm', '.svg': 'image/svg+xml' };
+const TYPES = {
+  '.html': 'text/html',
+  '.js': 'text/javascript',
+  '.css': 'text/css',
+  '.wasm': 'application/wasm',
+  '.svg': 'image/svg+xml',
+};
 export const POLICY =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'; img-src 'self' data: blob:; " +
   "style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -63,14 +69,10 @@ function generatedScene() {
   return { name: 'checkered hill', positions, colours, temperatures, faces: Uint32Array.from(faces) };
 }
 
-function encoded(build) {
-  const encoder = new draco.Encoder();
-  const out = new draco.DracoInt8Array();
-  const size = build(encoder, out);
+function bytesOf(out, size) {
   const bytes = Buffer.alloc(size);
   for (let i = 0; i < size; i += 1) bytes[i] = out.GetValue(i);
   draco.destroy(out);
-  draco.destroy(encoder);
   return bytes;
 }
 
@@ -79,11 +81,12 @@ function encodedGeometry(positions, faces) {
   const mesh = new draco.Mesh();
   builder.AddFacesToMesh(mesh, faces.length / 3, faces);
   builder.AddFloatAttributeToMesh(mesh, draco.POSITION, positions.length / 3, 3, positions);
-  const bytes = encoded((encoder, out) => {
-    encoder.SetEncodingMethod(draco.MESH_SEQUENTIAL_ENCODING);
-    encoder.SetAttributeQuantization(draco.POSITION, 16);
-    return encoder.EncodeMeshToDracoBuffer(mesh, out);
-  });
+  const encoder = new draco.Encoder();
+  encoder.SetEncodingMethod(draco.MESH_SEQUENTIAL_ENCODING);
+  encoder.SetAttributeQuantization(draco.POSITION, 16);
+  const out = new draco.DracoInt8Array();
+  const bytes = bytesOf(out, encoder.EncodeMeshToDracoBuffer(mesh, out));
+  draco.destroy(encoder);
   draco.destroy(mesh);
   draco.destroy(builder);
   return bytes;
@@ -93,10 +96,11 @@ function encodedColours(colours) {
   const builder = new draco.PointCloudBuilder();
   const cloud = new draco.PointCloud();
   builder.AddUInt8Attribute(cloud, draco.COLOR, colours.length / 3, 3, colours);
-  const bytes = encoded((encoder, out) => {
-    encoder.SetEncodingMethod(0);
-    return encoder.EncodePointCloudToDracoBuffer(cloud, false, out);
-  });
+  const encoder = new draco.ExpertEncoder(cloud);
+  encoder.SetEncodingMethod(0);
+  const out = new draco.DracoInt8Array();
+  const bytes = bytesOf(out, encoder.EncodeToDracoBuffer(false, out));
+  draco.destroy(encoder);
   draco.destroy(cloud);
   draco.destroy(builder);
   return bytes;
@@ -123,7 +127,13 @@ function tilesOf(scene) {
   return tiles;
 }
 
-const STOPS = [[8, 6, 40], [90, 15, 130], [190, 45, 90], [240, 120, 30], [255, 230, 120]];
+const STOPS = [
+  [8, 6, 40],
+  [90, 15, 130],
+  [190, 45, 90],
+  [240, 120, 30],
+  [255, 230, 120],
+];
 function table(stops) {
   return Array.from({ length: 256 }, (_, i) => {
     const at = (i / 255) * (stops.length - 1);
@@ -133,21 +143,89 @@ function table(stops) {
 }
 const PALETTES = [
   { id: 'iron', label: 'Iron', fusion_safe: false, colours: table(STOPS) },
-  { id: 'white_hot', label: 'White hot', fusion_safe: false, colours: table([[0, 0, 0], [255, 255, 255]]) },
-  { id: 'rainbow_safe', label: 'Rainbow, fusion safe', fusion_safe: true, colours: table([[60, 60, 255], [0, 220, 220], [40, 220, 40], [240, 220, 0], [255, 50, 40]]) },
-];
-const alpha = { name: 'alpha', label: 'Thermal share', help: '0 shows the visible colour, 1 the thermal one.', kind: 'number', default: 0.5, min: 0, max: 1, step: 0.01, unit: '' };
-const METHODS = [
-  { id: 'thermal_only', label: 'Thermal', summary: 'The palette colour of the temperature.', needs_temperature: true, uses_palette: true, params: [] },
-  { id: 'visible_only', label: 'Visible', summary: 'The visible colour alone.', needs_temperature: false, uses_palette: false, params: [] },
-  { id: 'thermal_visible_blend', label: 'Blend', summary: 'Both, mixed everywhere.', needs_temperature: true, uses_palette: true, params: [alpha] },
   {
-    id: 'colour_mapped_threshold', label: 'Threshold', summary: 'Thermal where it is warmer than a threshold.', needs_temperature: true, uses_palette: true,
+    id: 'white_hot',
+    label: 'White hot',
+    fusion_safe: false,
+    colours: table([
+      [0, 0, 0],
+      [255, 255, 255],
+    ]),
+  },
+  {
+    id: 'rainbow_safe',
+    label: 'Rainbow, fusion safe',
+    fusion_safe: true,
+    colours: table([
+      [60, 60, 255],
+      [0, 220, 220],
+      [40, 220, 40],
+      [240, 220, 0],
+      [255, 50, 40],
+    ]),
+  },
+];
+const alpha = {
+  name: 'alpha',
+  label: 'Thermal share',
+  help: '0 shows the visible colour, 1 the thermal one.',
+  kind: 'number',
+  default: 0.5,
+  min: 0,
+  max: 1,
+  step: 0.01,
+  unit: '',
+};
+const METHODS = [
+  {
+    id: 'thermal_only',
+    label: 'Thermal',
+    summary: 'The palette colour of the temperature.',
+    needs_temperature: true,
+    uses_palette: true,
+    params: [],
+  },
+  {
+    id: 'visible_only',
+    label: 'Visible',
+    summary: 'The visible colour alone.',
+    needs_temperature: false,
+    uses_palette: false,
+    params: [],
+  },
+  {
+    id: 'thermal_visible_blend',
+    label: 'Blend',
+    summary: 'Both, mixed everywhere.',
+    needs_temperature: true,
+    uses_palette: true,
+    params: [alpha],
+  },
+  {
+    id: 'colour_mapped_threshold',
+    label: 'Threshold',
+    summary: 'Thermal where it is warmer than a threshold.',
+    needs_temperature: true,
+    uses_palette: true,
     params: [
-      { name: 'threshold', label: 'Threshold', help: 'Where the thermal colour begins.', kind: 'temperature', default: null, unit: 'degC' },
+      {
+        name: 'threshold',
+        label: 'Threshold',
+        help: 'Where the thermal colour begins.',
+        kind: 'temperature',
+        default: null,
+        unit: 'degC',
+      },
       alpha,
       { name: 'invert', label: 'Invert', help: 'Show what is colder instead.', kind: 'toggle', default: false },
-      { name: 'sides', label: 'Sides', help: 'Which side of the range.', kind: 'choice', default: 'both', options: ['both', 'hot', 'cold'] },
+      {
+        name: 'sides',
+        label: 'Sides',
+        help: 'Which side of the range.',
+        kind: 'choice',
+        default: 'both',
+        options: ['both', 'hot', 'cold'],
+      },
       { name: 'bins', label: 'Bins', help: 'How many bins.', kind: 'integer', default: 64, min: 1, max: 4096 },
     ],
   },
@@ -176,8 +254,15 @@ export async function startMockServer({ ply, port = 0, root = new URL('../dist',
     bounds.max[i % 3] = Math.max(bounds.max[i % 3], x);
   });
   const description = {
-    name: scene.name, revision: 1, vertex_count: scene.temperatures.length, triangle_count: scene.faces.length / 3, point_cloud: false,
-    origin: [0, 0, 0], bounds, tile_count: tiles.length, levels: 1,
+    name: scene.name,
+    revision: 1,
+    vertex_count: scene.temperatures.length,
+    triangle_count: scene.faces.length / 3,
+    point_cloud: false,
+    origin: [0, 0, 0],
+    bounds,
+    tile_count: tiles.length,
+    levels: 1,
     temperature: thermal
       ? { min: lowest, max: highest, mean, sigma: Math.sqrt(variance), missing_count: scene.temperatures.length - finite.length }
       : { min: null, max: null, mean: null, sigma: null, missing_count: scene.temperatures.length },
@@ -202,24 +287,54 @@ export async function startMockServer({ ply, port = 0, root = new URL('../dist',
     let generation = 1;
     let sequence = 0;
     let subscribed = false;
-    let settings = { method: thermal ? 'thermal_visible_blend' : 'visible_only', params: thermal ? { alpha: 0.5 } : {}, palette: 'iron', range: { mode: 'auto', min: null, max: null }, missing: 'visible' };
+    let settings = {
+      method: thermal ? 'thermal_visible_blend' : 'visible_only',
+      params: thermal ? { alpha: 0.5 } : {},
+      palette: 'iron',
+      range: { mode: 'auto', min: null, max: null },
+      missing: 'visible',
+    };
     const fusion = () => {
-      const range = settings.range.mode === 'manual' ? settings.range : { mode: 'auto', min: thermal ? lowest : null, max: thermal ? highest : null };
+      const range =
+        settings.range.mode === 'manual'
+          ? settings.range
+          : { mode: 'auto', min: thermal ? lowest : null, max: thermal ? highest : null };
       const force = { ...settings.params };
-      if ('threshold' in force && force.threshold === null) force.threshold = thermal ? range.min + 0.75 * (range.max - range.min) : null;
+      if ('threshold' in force && force.threshold === null)
+        force.threshold = thermal ? range.min + 0.75 * (range.max - range.min) : null;
       return { ...settings, range, params_in_force: force };
     };
-    let quality = { mode: 'manual', position_step_mm: 1, colour_bits: 8, pixel_error: 1, encoder_speed: 7, latency_target_ms: 200 };
-    const say = (message) => setTimeout(() => socket.send(typeof message === 'string' || Buffer.isBuffer(message) ? message : JSON.stringify({ jsonrpc: '2.0', ...message })), delay_ms);
+    let quality = {
+      mode: 'manual',
+      position_step_mm: 1,
+      colour_bits: 8,
+      pixel_error: 1,
+      encoder_speed: 7,
+      latency_target_ms: 200,
+    };
+    const say = (message) =>
+      setTimeout(
+        () =>
+          socket.send(
+            typeof message === 'string' || Buffer.isBuffer(message) ? message : JSON.stringify({ jsonrpc: '2.0', ...message }),
+          ),
+        delay_ms,
+      );
     const fused = (v) => {
       const { method, params_in_force, range, palette } = fusion();
       const visible = [...scene.colours.subarray(v * 3, v * 3 + 3)];
       const t = scene.temperatures[v];
       if (method === 'visible_only') return visible;
-      if (!Number.isFinite(t)) return settings.missing === 'visible' ? visible : [1, 3, 5].map((i) => parseInt(settings.missing.slice(i, i + 2), 16));
+      if (!Number.isFinite(t))
+        return settings.missing === 'visible' ? visible : [1, 3, 5].map((i) => parseInt(settings.missing.slice(i, i + 2), 16));
       const u = Math.min(1, Math.max(0, (t - range.min) / (range.max - range.min)));
       const m = PALETTES.find((p) => p.id === palette).colours[Math.round(u * 255)];
-      const a = method === 'thermal_only' ? 1 : method === 'colour_mapped_threshold' && !(t > params_in_force.threshold !== params_in_force.invert) ? 0 : params_in_force.alpha;
+      const a =
+        method === 'thermal_only'
+          ? 1
+          : method === 'colour_mapped_threshold' && !(t > params_in_force.threshold !== params_in_force.invert)
+            ? 0
+            : params_in_force.alpha;
       return visible.map((c, k) => Math.min(255, Math.floor(a * m[k] + (1 - a) * c + 0.5)));
     };
     const frame = (kind, index, tile, payload) => {
@@ -250,16 +365,31 @@ export async function startMockServer({ ply, port = 0, root = new URL('../dist',
         frame(2, index, tile, encodedColours(colours));
         await new Promise((resolve) => setImmediate(resolve));
       }
-      say({ method: 'stream.complete', params: { generation, scene_revision: 1, tiles: tiles.length, vertices: description.vertex_count } });
-      say({ method: 'stream.stats', params: { round_trip_ms: 2, throughput_bytes_per_s: 1e6, queued_bytes: 0, skipped_frames: 0, viewers: sockets.clients.size, accuracy: { position_mm: 0.5, colour_levels: 1 << quality.colour_bits, pixel_error: 0 } } });
+      say({
+        method: 'stream.complete',
+        params: { generation, scene_revision: 1, tiles: tiles.length, vertices: description.vertex_count },
+      });
+      say({
+        method: 'stream.stats',
+        params: {
+          round_trip_ms: 2,
+          throughput_bytes_per_s: 1e6,
+          queued_bytes: 0,
+          skipped_frames: 0,
+          viewers: sockets.clients.size,
+          accuracy: { position_mm: 0.5, colour_levels: 1 << quality.colour_bits, pixel_error: 0 },
+        },
+      });
     };
     let sentGeometry = false;
-    const refuse = (id, field, reason) => say({ id, error: { code: -32602, message: 'invalid parameters', data: { field, reason } } });
+    const refuse = (id, field, reason) =>
+      say({ id, error: { code: -32602, message: 'invalid parameters', data: { field, reason } } });
     const nearest = ([x, y, z]) => {
       let best = 0;
       let distance = Infinity;
       for (let i = 0; i < description.vertex_count; i += 1) {
-        const d = (scene.positions[i * 3] - x) ** 2 + (scene.positions[i * 3 + 1] - y) ** 2 + (scene.positions[i * 3 + 2] - z) ** 2;
+        const d =
+          (scene.positions[i * 3] - x) ** 2 + (scene.positions[i * 3 + 1] - y) ** 2 + (scene.positions[i * 3 + 2] - z) ** 2;
         if (d < distance) [best, distance] = [i, d];
       }
       return { best, distance: Math.sqrt(distance) };
@@ -284,7 +414,8 @@ export async function startMockServer({ ply, port = 0, root = new URL('../dist',
             return refuse(id, `params.${name}`, `must be between ${entry.min} and ${entry.max}`);
           }
         }
-        const base = schema.id === settings.method ? settings.params : Object.fromEntries(schema.params.map((p) => [p.name, p.default]));
+        const base =
+          schema.id === settings.method ? settings.params : Object.fromEntries(schema.params.map((p) => [p.name, p.default]));
         settings = { ...settings, ...params, params: { ...base, ...params.params } };
         generation += 1;
         answer({ generation, fusion: fusion() });
@@ -297,22 +428,56 @@ export async function startMockServer({ ply, port = 0, root = new URL('../dist',
       } else if (method === 'scene.histogram') {
         const { bins } = params;
         const counts = new Array(bins).fill(0);
-        for (const i of finite) counts[Math.min(bins - 1, Math.floor(((scene.temperatures[i] - lowest) / (highest - lowest)) * bins))] += 1;
+        for (const i of finite)
+          counts[Math.min(bins - 1, Math.floor(((scene.temperatures[i] - lowest) / (highest - lowest)) * bins))] += 1;
         const { params_in_force: p, method: m } = fusion();
-        answer(thermal
-          ? { edges: Array.from({ length: bins + 1 }, (_, i) => lowest + (i / bins) * (highest - lowest)), counts, mean, sigma: Math.sqrt(variance), highlighted: m === 'colour_mapped_threshold' ? [p.invert ? [lowest, p.threshold] : [p.threshold, highest]] : [] }
-          : { edges: [], counts: [], mean: null, sigma: null, highlighted: [] });
+        answer(
+          thermal
+            ? {
+                edges: Array.from({ length: bins + 1 }, (_, i) => lowest + (i / bins) * (highest - lowest)),
+                counts,
+                mean,
+                sigma: Math.sqrt(variance),
+                highlighted: m === 'colour_mapped_threshold' ? [p.invert ? [lowest, p.threshold] : [p.threshold, highest]] : [],
+              }
+            : { edges: [], counts: [], mean: null, sigma: null, highlighted: [] },
+        );
       } else if (method === 'scene.probe') {
         const { best, distance } = nearest(params.position);
         const t = scene.temperatures[best];
-        answer({ vertex_index: best, position: at(best), temperature: Number.isFinite(t) ? t : null, visible: [...scene.colours.subarray(best * 3, best * 3 + 3)], fused: fused(best), distance });
+        answer({
+          vertex_index: best,
+          position: at(best),
+          temperature: Number.isFinite(t) ? t : null,
+          visible: [...scene.colours.subarray(best * 3, best * 3 + 3)],
+          fused: fused(best),
+          distance,
+        });
       } else if (method === 'scene.extremes') {
         const hot = finite.find((i) => scene.temperatures[i] === highest);
         const cold = finite.find((i) => scene.temperatures[i] === lowest);
-        answer({ hottest: thermal ? { position: at(hot), temperature: highest } : null, coldest: thermal ? { position: at(cold), temperature: lowest } : null });
+        answer({
+          hottest: thermal ? { position: at(hot), temperature: highest } : null,
+          coldest: thermal ? { position: at(cold), temperature: lowest } : null,
+        });
       } else if (id !== undefined) say({ id, error: { code: -32601, message: `no method ${method}` } });
     });
-    say({ method: 'hello', params: { protocol: 'spectra.v1', server: { name: 'mock', version: '0' }, session_id: String(connections), role: 'operator', capabilities: [], limits: { max_message_bytes: 65536, max_depth: 16, max_requests_per_s: 200 }, scene: description, methods: METHODS, palettes: PALETTES, fusion: fusion(), quality } });
+    say({
+      method: 'hello',
+      params: {
+        protocol: 'spectra.v1',
+        server: { name: 'mock', version: '0' },
+        session_id: String(connections),
+        role: 'operator',
+        capabilities: [],
+        limits: { max_message_bytes: 65536, max_depth: 16, max_requests_per_s: 200 },
+        scene: description,
+        methods: METHODS,
+        palettes: PALETTES,
+        fusion: fusion(),
+        quality,
+      },
+    });
   });
   await new Promise((resolve) => http.listen(port, '127.0.0.1', resolve));
   return {

@@ -1,4 +1,4 @@
-/** The messages of docs/protocol.md: their types and strict readers. Field names are the wire's. */
+/** The messages of docs/protocol.md: strict readers for what the server says. The types come from protocol/schema. */
 
 import {
   array,
@@ -16,10 +16,36 @@ import {
   record,
   string,
   triple,
-  unknown,
 } from './decode';
 
-export type Vec3 = [number, number, number];
+import type * as wire from './generated';
+
+export type Vec3 = wire.Vector3;
+export type Scene = wire.SceneDescription;
+export type Method = Omit<wire.MethodDescription, 'params'> & { params: Parameter[] };
+/** The kind is any word: one that this client does not know is said so in its form. */
+export type Parameter = Omit<wire.ParameterDescription, 'kind'> & { kind: string };
+/** The value of a method's parameter; null = automatic. */
+export type ParameterValue = wire.ParameterValue;
+export type Palette = wire.PaletteDescription;
+export type Range = wire.FusionRange;
+export type Fusion = wire.FusionState;
+export type FusionState = wire.FusionReply;
+/** A partial change for fusion.set; what is absent stays, parameters merge. */
+export type FusionChange = wire.FusionChange;
+export type Quality = wire.QualityState;
+export type QualityChange = wire.QualityChange;
+export type Hello = Omit<wire.Hello, 'methods'> & { methods: Method[] };
+export type Histogram = wire.HistogramReply;
+export type Probe = wire.ProbeReply;
+export type Extreme = wire.Extreme;
+export type Extremes = wire.ExtremesReply;
+export type StreamComplete = wire.StreamComplete;
+export type StreamStats = wire.StreamStats;
+export type Status = wire.Status;
+export type RpcErrorBody = wire.RpcError;
+export type RpcId = wire.RpcId;
+export type CameraPose = wire.CameraSet;
 
 export const temperatureSummary = object({
   min: nullable(number),
@@ -29,7 +55,7 @@ export const temperatureSummary = object({
   missing_count: count,
 });
 
-export const scene = object({
+export const scene: Decoder<Scene> = object({
   name: string,
   revision: count,
   vertex_count: count,
@@ -41,17 +67,13 @@ export const scene = object({
   tile_count: count,
   levels: count,
 });
-export type Scene = ReturnType<typeof scene>;
-
-/** The value of a method's parameter; null = automatic. */
-export type ParameterValue = number | boolean | string | null;
 
 const parameterValue: Decoder<ParameterValue> = (value, path) => {
   if (value === null || typeof value === 'boolean' || typeof value === 'string') return value;
   return number(value, path);
 };
 
-export const parameter = object({
+export const parameter: Decoder<Parameter> = object({
   name: string,
   label: string,
   help: string,
@@ -64,69 +86,53 @@ export const parameter = object({
   unit: optional(string),
   options: optional(array(string)),
 });
-export type Parameter = ReturnType<typeof parameter>;
 
-export const method = object({
+export const method: Decoder<Method> = object({
   id: string,
   label: string,
   summary: string,
-  needs_temperature: optional(boolean),
-  uses_palette: optional(boolean),
+  needs_temperature: boolean,
+  uses_palette: boolean,
   params: array(parameter),
 });
-export type Method = ReturnType<typeof method>;
 
-export const palette = object({
+export const palette: Decoder<Palette> = object({
   id: string,
   label: string,
   fusion_safe: boolean,
   colours: array(triple(number)),
 });
-export type Palette = ReturnType<typeof palette>;
 
-export const range = object({ mode: oneOf('auto', 'manual'), min: nullable(number), max: nullable(number) });
-export type Range = ReturnType<typeof range>;
+export const range: Decoder<Range> = object({ mode: oneOf('auto', 'manual'), min: nullable(number), max: nullable(number) });
 
-export const fusion = object({
+export const fusion: Decoder<Fusion> = object({
   method: string,
   params: dictionary(parameterValue),
-  params_in_force: optional(dictionary(parameterValue)),
+  params_in_force: dictionary(parameterValue),
   palette: string,
   range,
   missing: string,
 });
-export type Fusion = ReturnType<typeof fusion>;
 
-/** A partial change for fusion.set; what is absent stays, parameters merge. */
-export interface FusionChange {
-  method?: string;
-  params?: Record<string, ParameterValue>;
-  palette?: string;
-  range?: { mode: 'auto' } | { mode: 'manual'; min: number; max: number };
-  missing?: string;
-}
-
-export const quality = object({
+export const quality: Decoder<Quality> = object({
   mode: oneOf('auto', 'manual'),
   position_step_mm: number,
   colour_bits: count,
-  pixel_error: optional(number),
-  encoder_speed: optional(count),
-  latency_target_ms: optional(nullable(number)),
+  pixel_error: number,
+  encoder_speed: count,
+  latency_target_ms: number,
 });
-export type Quality = ReturnType<typeof quality>;
-export type QualityChange = Partial<Quality>;
 
-export const hello = object({
+export const hello: Decoder<Hello> = object({
   protocol: oneOf('spectra.v1'),
   server: object({ name: string, version: string }),
   session_id: string,
   role: oneOf('operator', 'viewer'),
   capabilities: array(string),
   limits: object({
-    max_message_bytes: optional(count),
-    max_depth: optional(count),
-    max_requests_per_s: optional(number),
+    max_message_bytes: count,
+    max_depth: count,
+    max_requests_per_s: number,
   }),
   scene: nullable(scene),
   methods: array(method),
@@ -134,23 +140,20 @@ export const hello = object({
   fusion,
   quality,
 });
-export type Hello = ReturnType<typeof hello>;
 
-export const fusionState = object({ generation: count, fusion });
-export type FusionState = ReturnType<typeof fusionState>;
+export const fusionState: Decoder<FusionState> = object({ generation: count, fusion });
 
 export const qualityState = object({ quality });
 
-export const histogram = object({
+export const histogram: Decoder<Histogram> = object({
   edges: array(number),
   counts: array(number),
   mean: nullable(number),
   sigma: nullable(number),
   highlighted: array(pair(number)),
 });
-export type Histogram = ReturnType<typeof histogram>;
 
-export const probe = object({
+export const probe: Decoder<Probe> = object({
   vertex_index: count,
   position: triple(number),
   temperature: nullable(number),
@@ -158,53 +161,47 @@ export const probe = object({
   fused: triple(number),
   distance: number,
 });
-export type Probe = ReturnType<typeof probe>;
 
 const extreme = object({ position: triple(number), temperature: number });
-export type Extreme = ReturnType<typeof extreme>;
-export const extremes = object({ hottest: nullable(extreme), coldest: nullable(extreme) });
-export type Extremes = ReturnType<typeof extremes>;
+export const extremes: Decoder<Extremes> = object({ hottest: nullable(extreme), coldest: nullable(extreme) });
 
 export const sceneChanged = object({ scene: nullable(scene) });
 
-export const streamComplete = object({ generation: count, scene_revision: count, tiles: count, vertices: count });
-export type StreamComplete = ReturnType<typeof streamComplete>;
-
-export const streamStats = object({
-  round_trip_ms: optional(nullable(number)),
-  throughput_bytes_per_s: optional(nullable(number)),
-  queued_bytes: optional(number),
-  skipped_frames: optional(count),
-  viewers: optional(count),
-  accuracy: optional(
-    object({
-      position_mm: optional(nullable(number)),
-      colour_levels: optional(nullable(number)),
-      pixel_error: optional(nullable(number)),
-    }),
-  ),
+export const streamComplete: Decoder<StreamComplete> = object({
+  generation: count,
+  scene_revision: count,
+  tiles: count,
+  vertices: count,
 });
-export type StreamStats = ReturnType<typeof streamStats>;
 
-export const status = object({
+export const streamStats: Decoder<StreamStats> = object({
+  round_trip_ms: nullable(number),
+  throughput_bytes_per_s: nullable(number),
+  queued_bytes: number,
+  skipped_frames: count,
+  viewers: count,
+  accuracy: object({ position_mm: nullable(number), colour_levels: number, pixel_error: nullable(number) }),
+});
+
+export const status: Decoder<Status> = object({
   id: string,
-  level: optional(oneOf('info', 'warning', 'error')),
+  level: oneOf('info', 'warning', 'error'),
   message: nullable(string),
 });
-export type Status = ReturnType<typeof status>;
 
-export const rpcError = object({
+export const rpcError: Decoder<RpcErrorBody> = object({
   code: number,
   message: string,
-  data: optional(nullable(object({ field: optional(nullable(string)), reason: optional(string), limits: optional(unknown) }))),
+  data: object({ field: string, reason: string, limits: optional(string) }),
 });
-export type RpcErrorBody = ReturnType<typeof rpcError>;
 
 /** What the server sends as text: an answer to a request of ours, or a notification. */
 export type ServerMessage =
-  | { type: 'result'; id: number; result: unknown }
-  | { type: 'error'; id: number | null; error: RpcErrorBody }
+  | { type: 'result'; id: RpcId; result: unknown }
+  | { type: 'error'; id: RpcId | null; error: RpcErrorBody }
   | { type: 'notification'; method: string; params: unknown };
+
+const rpcId: Decoder<RpcId> = (value, path) => (typeof value === 'string' ? value : count(value, path));
 
 /** Reads a text message; throws DecodeError or SyntaxError. */
 export function decodeServerMessage(text: string): ServerMessage {
@@ -214,8 +211,8 @@ export function decodeServerMessage(text: string): ServerMessage {
     return { type: 'notification', method: message['method'], params: message['params'] ?? {} };
   }
   if (message['error'] !== undefined) {
-    return { type: 'error', id: nullable(count)(message['id'] ?? null, 'id'), error: rpcError(message['error'], 'error') };
+    return { type: 'error', id: nullable(rpcId)(message['id'] ?? null, 'id'), error: rpcError(message['error'], 'error') };
   }
   if (!('result' in message)) throw new DecodeError('', 'a result, an error or a method', text);
-  return { type: 'result', id: count(message['id'], 'id'), result: message['result'] };
+  return { type: 'result', id: rpcId(message['id'], 'id'), result: message['result'] };
 }

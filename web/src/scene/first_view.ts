@@ -14,7 +14,7 @@ const LOWEST_ELEVATION = (14 * Math.PI) / 180;
 const HIGHEST_ELEVATION = (38 * Math.PI) / 180;
 const DEFAULT_AZIMUTH = (30 * Math.PI) / 180;
 /** Share of the outermost sample points that may lie outside the picture: stray points must not push the scene away. */
-const TRIMMED = 0.01;
+const TRIMMED = 0.004;
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a: Vec3, b: Vec3): Vec3 => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -117,7 +117,7 @@ export function fittedView(
   // In the camera's frame with depth measured from the scene's origin: x - edge * depth must lie on one side of the eye's.
   const bound = (axis: Vec3, edge: number, side: 1 | -1): number => {
     const values = points.map((point) => side * (dot(point, axis) + edge * dot(point, backward))).sort((a, b) => a - b);
-    return side * (values[Math.max(0, Math.ceil(values.length * (1 - TRIMMED / 4)) - 1)] ?? 0);
+    return side * (values[Math.max(0, Math.ceil(values.length * (1 - TRIMMED / 8)) - 1)] ?? 0);
   };
   // For an eye at (ex, ey, ez): x - ex <= right (ez - z)  <=>  x + right z <= ex + right ez, and so on.
   const r = bound(right, edges.right, 1);

@@ -108,7 +108,8 @@ export class TileSet {
       shown.drawable.setColours(rgba);
       return;
     }
-    if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation) return;
+    if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation)
+      return;
     entry.waitingColours = { revision: frame.revision, generation: frame.generation, rgba };
     this.#join(entry);
   }

@@ -17,24 +17,18 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { DecodedGeometry } from '../decode/messages';
-import type { Vec3 } from '../protocol/messages';
+import type { CameraPose, Vec3 } from '../protocol/messages';
 import { type Insets, UP, type UpAxis, type View } from './first_view';
 import { nearestHit } from './picking';
 import { TileDrawing } from './tile_drawing';
 
 // Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
 ColorManagement.enabled = false;
-CameraControls.install({ THREE: { Box3, MathUtils, Matrix4, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4 } });
+CameraControls.install({
+  THREE: { Box3, MathUtils, Matrix4, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4 },
+});
 
 export const FIELD_OF_VIEW_DEG = 45;
-
-export interface CameraPose {
-  eye: Vec3;
-  target: Vec3;
-  up: Vec3;
-  fov_y_deg: number;
-  viewport: [number, number];
-}
 
 export interface ViewportEvents {
   /** The camera has moved, or the window has changed its size. */
@@ -81,10 +75,13 @@ export class Viewport {
     for (const wake of ['control', 'controlstart', 'wake', 'transitionstart'] as const) {
       this.#controls.addEventListener(wake, () => this.invalidate());
     }
-    this.#resize = new ResizeObserver(() => this.#fitToElement());
+    this.#fitToElement();
+    this.#resize = new ResizeObserver(() => {
+      this.#fitToElement();
+      this.events.onCamera(this.pose);
+    });
     this.#resize.observe(canvas);
     canvas.addEventListener('webglcontextrestored', () => this.invalidate());
-    this.#fitToElement();
   }
 
   /** Pictures drawn so far. */
@@ -261,7 +258,6 @@ export class Viewport {
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
     this.#camera.updateProjectionMatrix();
-    this.events.onCamera(this.pose);
     // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
     this.#draw();
   }

@@ -28,8 +28,9 @@ export function withChange(fusion: Fusion, change: FusionChange | null, methods:
   if (change.palette !== undefined) next.palette = change.palette;
   if (change.missing !== undefined) next.missing = change.missing;
   if (change.range !== undefined) {
+    const { mode, min, max } = change.range;
     next.range =
-      change.range.mode === 'auto' ? { mode: 'auto', min: fusion.range.min, max: fusion.range.max } : { ...change.range };
+      mode === 'auto' ? { ...fusion.range, mode } : { mode, min: min ?? fusion.range.min, max: max ?? fusion.range.max };
   }
   return next;
 }
@@ -37,12 +38,11 @@ export function withChange(fusion: Fusion, change: FusionChange | null, methods:
 /** Everything of the settings, as a change: what a new connection is told. */
 export function wholeChange(fusion: Fusion): FusionChange {
   const { method, params, palette, range, missing } = fusion;
-  const manual = range.mode === 'manual' && range.min !== null && range.max !== null;
   return {
     method,
     params,
     palette,
     missing,
-    range: manual ? { mode: 'manual', min: range.min ?? 0, max: range.max ?? 0 } : { mode: 'auto' },
+    range: range.mode === 'manual' ? { ...range } : { mode: 'auto' },
   };
 }

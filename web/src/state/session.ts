@@ -2,6 +2,7 @@ import { DecodePool, Superseded } from '../decode/pool';
 import type { DecodeJob, DecodeResult } from '../decode/messages';
 import { decodeTileFrame, FrameKind, type TileFrame, tileKey } from '../protocol/frame';
 import {
+  type CameraPose,
   extremes,
   type Fusion,
   type FusionChange,
@@ -23,7 +24,7 @@ import {
 } from '../protocol/messages';
 import { fittedView, guessUpAxis, type Insets, meanNormal, samplePoints, type UpAxis, viewDirection } from '../scene/first_view';
 import { TileSet } from '../scene/tile_set';
-import { type CameraPose, FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
+import { FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
 import { Acknowledger } from '../transport/acknowledger';
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
@@ -360,8 +361,7 @@ export class Session {
   #setScene(next: Scene | null): void {
     const { store } = this;
     const before = store.scene;
-    const other =
-      !before || !next || before.name !== next.name || JSON.stringify(before.bounds) !== JSON.stringify(next.bounds);
+    const other = !before || !next || before.name !== next.name || JSON.stringify(before.bounds) !== JSON.stringify(next.bounds);
     store.scene = next;
     if (next === null) {
       this.tiles.clear();
@@ -571,10 +571,7 @@ export class Session {
     const geometries = [...this.tiles.shownGeometries()].map(({ geometry }) => geometry);
     const points = samplePoints(geometries, scene.bounds);
     const fov = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
-    this.viewport.setView(
-      fittedView(points, direction, this.store.upAxis, fov, this.viewport.aspect, this.#insets),
-      animated,
-    );
+    this.viewport.setView(fittedView(points, direction, this.store.upAxis, fov, this.viewport.aspect, this.#insets), animated);
   }
 
   #pick(place: { x: number; y: number }): Vec3 | null {

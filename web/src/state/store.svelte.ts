@@ -1,4 +1,5 @@
 import type {
+  CameraPose,
   Extremes,
   Fusion,
   FusionChange,
@@ -15,7 +16,6 @@ import type {
   Vec3,
 } from '../protocol/messages';
 import type { UpAxis } from '../scene/first_view';
-import type { CameraPose } from '../scene/viewport';
 import type { TileCounts } from '../scene/tile_set';
 import type { LinkState } from '../transport/connection';
 import { withChange } from './fusion_change';

@@ -9,10 +9,10 @@ export class RpcError extends Error {
   readonly field: string | null;
 
   constructor(body: RpcErrorBody) {
-    super(body.data?.reason ?? body.message);
+    super(body.data.reason || body.message);
     this.name = 'RpcError';
     this.code = body.code;
-    this.field = body.data?.field ?? null;
+    this.field = body.data.field === '' ? null : body.data.field;
   }
 }
 
@@ -25,9 +25,7 @@ export class ConnectionLost extends Error {
 }
 
 export type LinkState =
-  | { phase: 'connecting'; attempt: number }
-  | { phase: 'open' }
-  | { phase: 'waiting'; attempt: number; retry_at: number };
+  { phase: 'connecting'; attempt: number } | { phase: 'open' } | { phase: 'waiting'; attempt: number; retry_at: number };
 
 export interface ConnectionEvents {
   onHello: (message: Hello) => void;
@@ -164,12 +162,13 @@ export class Connection {
         else if (this.#greeted) this.events.onNotification(message.method, message.params);
         return;
       }
-      const request = message.id === null ? undefined : this.#requests.get(message.id);
+      const id = typeof message.id === 'number' ? message.id : -1;
+      const request = this.#requests.get(id);
       if (request === undefined) {
         if (message.type === 'error') this.events.onProtocolError(new RpcError(message.error));
         return;
       }
-      this.#requests.delete(message.id ?? -1);
+      this.#requests.delete(id);
       this.events.onRoundTrip(performance.now() - request.sent_at);
       if (message.type === 'result') request.resolve(message.result);
       else request.reject(new RpcError(message.error));

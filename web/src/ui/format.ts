@@ -71,7 +71,9 @@ export function duration(seconds: number): string {
 }
 
 /** How exact the picture is, in words. */
-export function accuracyWords(accuracy: { position_mm?: number | null; colour_levels?: number | null } | undefined): string | null {
+export function accuracyWords(
+  accuracy: { position_mm?: number | null; colour_levels?: number | null } | undefined,
+): string | null {
   if (accuracy === undefined) return null;
   const parts: string[] = [];
   if (accuracy.position_mm != null) parts.push(`within ${length(accuracy.position_mm / 1000)}`);

@@ -31,7 +31,9 @@ interface KeyActions {
 
 function isTyping(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
-  return target instanceof HTMLInputElement ? target.type !== 'range' && target.type !== 'checkbox' : target instanceof HTMLSelectElement;
+  return target instanceof HTMLInputElement
+    ? target.type !== 'range' && target.type !== 'checkbox'
+    : target instanceof HTMLSelectElement;
 }
 
 /** The keyboard of the instrument. */

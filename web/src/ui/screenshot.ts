@@ -13,7 +13,11 @@ function composed(session: Session, picture: HTMLCanvasElement): HTMLCanvasEleme
   const unit = picture.width / session.viewport.size[0];
   context.scale(unit, unit);
   const height = picture.height / unit;
-  const lines = [store.scene?.name ?? '', store.method?.label ?? '', new Date().toISOString().replace('T', ' ').slice(0, 19) + ' UTC'];
+  const lines = [
+    store.scene?.name ?? '',
+    store.method?.label ?? '',
+    new Date().toISOString().replace('T', ' ').slice(0, 19) + ' UTC',
+  ];
   context.font = '13px system-ui, sans-serif';
   const { palette, fusion } = store;
   const scaled = palette !== null && fusion?.range.min != null && store.method?.uses_palette !== false;

@@ -1,0 +1,558 @@
+// Made by `npm run generate` from protocol/schema. Not to be edited.
+
+/**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector3 = [number, number, number];
+export type Channel = "fused" | "temperature" | "visible";
+/**
+ * r, g, b, sRGB-encoded, 0..255.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Colour = [number, number, number];
+/**
+ * r, g, b.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type ColourBytes = [number, number, number];
+/**
+ * number, integer, toggle (boolean), choice (string) or temperature (degC; null = automatic).
+ */
+export type ParameterValue = number | string | boolean | null;
+export type RangeMode = "auto" | "manual";
+/**
+ * How vertices without temperature are shown: "visible" or a colour "#rrggbb".
+ */
+export type MissingDisplay = string;
+export type ParameterKind = "number" | "integer" | "toggle" | "choice" | "temperature";
+export type QualityMode = "auto" | "manual";
+/**
+ * Chosen by the client.
+ */
+export type RpcId = number | string;
+export type StatusLevel = "info" | "warning" | "error";
+
+export interface ProtocolDefinitions {
+  Bounds: Bounds;
+  CameraSet: CameraSet;
+  Channel: Channel;
+  Colour: Colour;
+  ColourBytes: ColourBytes;
+  Empty: Empty;
+  Extreme: Extreme;
+  ExtremesReply: ExtremesReply;
+  FusionChange: FusionChange;
+  FusionRange: FusionRange;
+  FusionReply: FusionReply;
+  FusionState: FusionState;
+  Hello: Hello;
+  HistogramReply: HistogramReply;
+  HistogramRequest: HistogramRequest;
+  Limits: Limits;
+  MethodDescription: MethodDescription;
+  MissingDisplay: MissingDisplay;
+  PaletteDescription: PaletteDescription;
+  ParameterDescription: ParameterDescription;
+  ParameterKind: ParameterKind;
+  ParameterValue: ParameterValue;
+  ParameterValues: ParameterValues;
+  ProbeReply: ProbeReply;
+  ProbeRequest: ProbeRequest;
+  QualityChange: QualityChange;
+  QualityMode: QualityMode;
+  QualityReply: QualityReply;
+  QualityState: QualityState;
+  RangeChange: RangeChange;
+  RangeMode: RangeMode;
+  RpcError: RpcError;
+  RpcErrorData: RpcErrorData;
+  RpcFailure: RpcFailure;
+  RpcId: RpcId;
+  RpcNotification: RpcNotification;
+  RpcRequest: RpcRequest;
+  RpcResult: RpcResult;
+  SceneChanged: SceneChanged;
+  SceneDescription: SceneDescription;
+  SceneTemperature: SceneTemperature;
+  ServerInfo: ServerInfo;
+  Status: Status;
+  StatusLevel: StatusLevel;
+  StreamAccuracy: StreamAccuracy;
+  StreamAck: StreamAck;
+  StreamComplete: StreamComplete;
+  StreamStats: StreamStats;
+  SubscribeRequest: SubscribeRequest;
+  Vector3: Vector3;
+}
+/**
+ * Smallest and largest coordinates, metres relative to the scene origin.
+ */
+export interface Bounds {
+  min: Vector3;
+  max: Vector3;
+}
+/**
+ * Params of the notification camera.set; metres relative to the scene origin.
+ */
+export interface CameraSet {
+  eye: Vector3;
+  target: Vector3;
+  up: Vector3;
+  fov_y_deg: number;
+  /**
+   * Width and height, pixels.
+   *
+   * @minItems 2
+   * @maxItems 2
+   */
+  viewport: [number, number];
+}
+/**
+ * An object of no known field.
+ */
+export interface Empty {}
+/**
+ * A place and its temperature, degC.
+ */
+export interface Extreme {
+  position: Vector3;
+  temperature: number;
+}
+/**
+ * Result of scene.extremes; null without thermal data.
+ */
+export interface ExtremesReply {
+  hottest: Extreme | null;
+  coldest: Extreme | null;
+}
+/**
+ * Params of fusion.set: any part of FUSION; what is absent stays.
+ */
+export interface FusionChange {
+  method?: string;
+  params?: ParameterValues;
+  palette?: string;
+  range?: RangeChange;
+  missing?: MissingDisplay;
+}
+/**
+ * Parameter name to value.
+ */
+export interface ParameterValues {
+  [k: string]: ParameterValue;
+}
+/**
+ * mode auto, or mode manual with min and max (degC, min <= max).
+ */
+export interface RangeChange {
+  mode: RangeMode;
+  min?: number | null;
+  max?: number | null;
+}
+/**
+ * The active temperature range, degC; null without thermal data and automatic range.
+ */
+export interface FusionRange {
+  mode: RangeMode;
+  min: number | null;
+  max: number | null;
+}
+/**
+ * Result of fusion.set and fusion.get; params of the notification fusion.changed.
+ */
+export interface FusionReply {
+  /**
+   * Number that the colour frames of these settings carry.
+   */
+  generation: number;
+  fusion: FusionState;
+}
+/**
+ * FUSION: the settings in force. params holds what was set (null = automatic), params_in_force the same with automatic temperatures as numbers (null when the scene has none).
+ */
+export interface FusionState {
+  method: string;
+  params: ParameterValues;
+  params_in_force: ParameterValues;
+  palette: string;
+  range: FusionRange;
+  missing: MissingDisplay;
+}
+/**
+ * Params of the notification hello, the first message of every connection.
+ */
+export interface Hello {
+  protocol: "spectra.v1";
+  server: ServerInfo;
+  session_id: string;
+  role: "operator" | "viewer";
+  /**
+   * Names of optional parts that this server has.
+   */
+  capabilities: string[];
+  limits: Limits;
+  /**
+   * null: no scene yet.
+   */
+  scene: SceneDescription | null;
+  methods: MethodDescription[];
+  palettes: PaletteDescription[];
+  fusion: FusionState;
+  quality: QualityState;
+}
+/**
+ * Who serves.
+ */
+export interface ServerInfo {
+  name: string;
+  version: string;
+}
+/**
+ * What a client must keep to.
+ */
+export interface Limits {
+  /**
+   * Largest text message from a client; a larger one closes with 1009.
+   */
+  max_message_bytes: number;
+  /**
+   * Deepest nesting of JSON.
+   */
+  max_depth: number;
+  /**
+   * More are answered with -32003.
+   */
+  max_requests_per_s: number;
+}
+/**
+ * SCENE: what is served. origin: metres, double precision, in the coordinates of the input file.
+ */
+export interface SceneDescription {
+  name: string;
+  /**
+   * Rises with every change of the scene.
+   */
+  revision: number;
+  vertex_count: number;
+  triangle_count: number;
+  point_cloud: boolean;
+  origin: Vector3;
+  bounds: Bounds;
+  temperature: SceneTemperature;
+  tile_count: number;
+  /**
+   * Levels of the tile tree.
+   */
+  levels: number;
+}
+/**
+ * Facts of all temperatures of the scene, degC; null without thermal data.
+ */
+export interface SceneTemperature {
+  min: number | null;
+  max: number | null;
+  mean: number | null;
+  /**
+   * Population standard deviation.
+   */
+  sigma: number | null;
+  /**
+   * Vertices without temperature.
+   */
+  missing_count: number;
+}
+/**
+ * METHOD.
+ */
+export interface MethodDescription {
+  id: string;
+  label: string;
+  summary: string;
+  needs_temperature: boolean;
+  uses_palette: boolean;
+  params: ParameterDescription[];
+}
+/**
+ * One parameter of a method; enough to build its form. A bound that is absent is none.
+ */
+export interface ParameterDescription {
+  name: string;
+  label: string;
+  help: string;
+  kind: ParameterKind;
+  default: ParameterValue;
+  /**
+   * Smallest value, allowed itself.
+   */
+  min?: number;
+  /**
+   * Largest value, allowed itself.
+   */
+  max?: number;
+  /**
+   * Lower bound that is itself refused.
+   */
+  exclusive_min?: number;
+  /**
+   * A sensible slider step.
+   */
+  step?: number;
+  unit?: string;
+  /**
+   * Ids of a choice.
+   */
+  options?: string[];
+}
+/**
+ * PALETTE.
+ */
+export interface PaletteDescription {
+  id: string;
+  label: string;
+  /**
+   * Carries temperature by hue alone.
+   */
+  fusion_safe: boolean;
+  /**
+   * Row 0 is the coldest.
+   */
+  colours: Colour[];
+}
+/**
+ * QUALITY: the knobs in force.
+ */
+export interface QualityState {
+  mode: QualityMode;
+  /**
+   * Lattice step; the largest error per axis is half of it.
+   */
+  position_step_mm: number;
+  colour_bits: number;
+  /**
+   * Largest error on the screen, pixels.
+   */
+  pixel_error: number;
+  /**
+   * Draco speed: 0 smallest, 10 fastest.
+   */
+  encoder_speed: number;
+  /**
+   * Aim of mode auto.
+   */
+  latency_target_ms: number;
+}
+/**
+ * Result of scene.histogram; without thermal data every list is empty, mean and sigma are null.
+ */
+export interface HistogramReply {
+  /**
+   * bins + 1 temperatures, degC.
+   */
+  edges: number[];
+  /**
+   * Vertices per bin.
+   */
+  counts: number[];
+  mean: number | null;
+  sigma: number | null;
+  /**
+   * Intervals [low, high] that the current method highlights, degC.
+   */
+  highlighted: [number, number][];
+}
+/**
+ * Params of scene.histogram.
+ */
+export interface HistogramRequest {
+  bins: number;
+}
+/**
+ * Result of scene.probe: the nearest vertex at full accuracy.
+ */
+export interface ProbeReply {
+  /**
+   * In the input's order.
+   */
+  vertex_index: number;
+  position: Vector3;
+  /**
+   * degC; null = missing.
+   */
+  temperature: number | null;
+  visible: ColourBytes;
+  fused: ColourBytes;
+  /**
+   * Metres.
+   */
+  distance: number;
+}
+/**
+ * Params of scene.probe.
+ */
+export interface ProbeRequest {
+  position: Vector3;
+}
+/**
+ * Params of quality.set; what is absent stays.
+ */
+export interface QualityChange {
+  mode?: QualityMode;
+  position_step_mm?: number;
+  colour_bits?: number;
+  pixel_error?: number;
+  encoder_speed?: number;
+  latency_target_ms?: number;
+}
+/**
+ * Result of quality.set.
+ */
+export interface QualityReply {
+  quality: QualityState;
+}
+/**
+ * A refusal; a refused request changes nothing.
+ */
+export interface RpcError {
+  /**
+   * -32700 parse, -32600 request, -32601 method, -32602 params, -32603 internal, -32001 unauthorised, -32002 forbidden, -32003 busy, -32004 no scene.
+   */
+  code: number;
+  message: string;
+  data: RpcErrorData;
+}
+/**
+ * What was wrong and what would be accepted.
+ */
+export interface RpcErrorData {
+  /**
+   * Path such as params.alpha; empty: the message itself.
+   */
+  field: string;
+  reason: string;
+  limits?: string;
+}
+/**
+ * Server to client.
+ */
+export interface RpcFailure {
+  jsonrpc: "2.0";
+  /**
+   * null: the message had no usable id.
+   */
+  id: number | string | null;
+  error: RpcError;
+}
+/**
+ * Either direction; never answered, except that one which cannot be carried out is reported by RpcFailure with id null.
+ */
+export interface RpcNotification {
+  jsonrpc: "2.0";
+  method: string;
+  params?: {};
+}
+/**
+ * Client to server; answered by RpcResult or RpcFailure of the same id.
+ */
+export interface RpcRequest {
+  jsonrpc: "2.0";
+  id: RpcId;
+  method: string;
+  params?: {};
+}
+/**
+ * Server to client.
+ */
+export interface RpcResult {
+  jsonrpc: "2.0";
+  id: RpcId;
+  result: {};
+}
+/**
+ * Params of the notification scene.changed.
+ */
+export interface SceneChanged {
+  scene: SceneDescription;
+}
+/**
+ * Params of the notification status; the same id replaces, message null clears.
+ */
+export interface Status {
+  id: string;
+  level: StatusLevel;
+  message: string | null;
+}
+/**
+ * What is on the screen now.
+ */
+export interface StreamAccuracy {
+  /**
+   * Largest error per axis.
+   */
+  position_mm: number | null;
+  /**
+   * Levels of a colour channel.
+   */
+  colour_levels: number;
+  pixel_error: number | null;
+}
+/**
+ * Params of the notification stream.ack.
+ */
+export interface StreamAck {
+  /**
+   * Every frame up to this one is decoded.
+   */
+  sequence: number;
+}
+/**
+ * Params of the notification stream.complete: all that camera and quality ask for has been sent.
+ */
+export interface StreamComplete {
+  generation: number;
+  scene_revision: number;
+  tiles: number;
+  vertices: number;
+}
+/**
+ * Params of the notification stream.stats.
+ */
+export interface StreamStats {
+  /**
+   * null: not measured yet.
+   */
+  round_trip_ms: number | null;
+  /**
+   * null: not measured yet.
+   */
+  throughput_bytes_per_s: number | null;
+  queued_bytes: number;
+  /**
+   * Superseded before they were sent.
+   */
+  skipped_frames: number;
+  /**
+   * Connected now.
+   */
+  viewers: number;
+  accuracy: StreamAccuracy;
+}
+/**
+ * Params of scene.subscribe.
+ */
+export interface SubscribeRequest {
+  /**
+   * @minItems 1
+   */
+  channels: [Channel, ...Channel[]];
+  /**
+   * Most frame bytes beyond the last stream.ack; absent: the server's choice.
+   */
+  in_flight_bytes?: number;
+}

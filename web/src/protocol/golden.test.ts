@@ -1,0 +1,114 @@
+import { readdirSync, readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import type { DecoderModule } from 'draco3d/draco_decoder_nodejs.js';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { decodeJob } from '../decode/draco';
+import { decodeTileFrame, FrameKind } from './frame';
+import * as messages from './messages';
+
+const golden = new URL('../../../protocol/golden/', import.meta.url);
+const list = (folder: string, ending: string) =>
+  readdirSync(new URL(folder, golden))
+    .filter((name) => name.endsWith(ending))
+    .sort();
+const text = (path: string) => readFileSync(new URL(path, golden), 'utf8');
+
+/** Which reader a golden message of the server needs; the key begins the file's name. */
+const readers: Record<string, (value: unknown, path: string) => unknown> = {
+  'hello.': messages.hello,
+  'scene.get.': messages.scene,
+  'scene.changed.': messages.sceneChanged,
+  'scene.histogram.': messages.histogram,
+  'scene.probe.': messages.probe,
+  'scene.extremes.': messages.extremes,
+  'fusion.': messages.fusionState,
+  'quality.set.': messages.qualityState,
+  'stream.complete.': messages.streamComplete,
+  'stream.stats.': messages.streamStats,
+  'status.': messages.status,
+  'scene.subscribe.': (value) => value,
+  'scene.unsubscribe.': (value) => value,
+};
+const fromServer = list('messages/', '.json').filter(
+  (name) => !name.includes('.request.') && !name.startsWith('camera.set') && !name.startsWith('stream.ack'),
+);
+
+describe('Golden messages', () => {
+  it('are there', () => {
+    expect(fromServer.length).toBeGreaterThan(15);
+  });
+
+  it.each(fromServer)('%s is read whole', (name) => {
+    const source = JSON.parse(text(`messages/${name}`)) as Record<string, unknown>;
+    const message = messages.decodeServerMessage(JSON.stringify(source));
+    if (message.type === 'error') {
+      expect(message.error).toEqual(source['error']);
+      return;
+    }
+    const reader = Object.entries(readers).find(([start]) => name.startsWith(start))?.[1];
+    expect(reader, `no reader for ${name}`).toBeDefined();
+    const body = message.type === 'result' ? message.result : message.params;
+    expect(reader?.(body, name)).toEqual(body);
+  });
+
+  it.each(fromServer.filter((name) => !name.startsWith('error.')))('%s is refused without one of its fields', (name) => {
+    const reader = Object.entries(readers).find(([start]) => name.startsWith(start))?.[1];
+    const source = JSON.parse(text(`messages/${name}`)) as { params?: object; result?: object };
+    const body = source.params ?? source.result ?? {};
+    for (const key of Object.keys(body)) {
+      const { [key as keyof typeof body]: _left, ...rest } = body;
+      expect(() => reader?.(rest, name), key).toThrow(key);
+    }
+  });
+});
+
+describe('Golden frames', () => {
+  let draco: DecoderModule;
+  beforeAll(async () => {
+    const require = createRequire(import.meta.url);
+    const create = require('draco3d/draco_decoder_nodejs.js') as (options: object) => Promise<DecoderModule>;
+    draco = await create({});
+  });
+
+  it.each(list('frames/', '.json'))('%s', (name) => {
+    const file = readFileSync(new URL(`frames/${name.replace('.json', '.bin')}`, golden));
+    const frame = decodeTileFrame(file.buffer.slice(file.byteOffset, file.byteOffset + file.byteLength) as ArrayBuffer);
+    const expected = JSON.parse(text(`frames/${name}`)) as {
+      header: Record<string, unknown> & { tile: number[]; origin_m: number[] };
+      positions_m?: number[][];
+      triangles?: number[][];
+      colours?: number[][];
+    };
+    const { payload, tile, ...fields } = frame;
+    const nullIfNone = (value: number) => (Number.isNaN(value) ? null : value);
+    expect({
+      ...fields,
+      lowest_celsius: nullIfNone(fields.lowest_celsius),
+      highest_celsius: nullIfNone(fields.highest_celsius),
+      tile: [tile.level, tile.x, tile.y, tile.z],
+      payload_size_bytes: payload.byteLength,
+    }).toEqual(expected.header);
+
+    if (frame.kind === FrameKind.geometry) {
+      const decoded = decodeJob(draco, { kind: 'geometry', payload, origin_m: frame.origin_m });
+      if (decoded.kind !== 'geometry') throw new Error('not a geometry');
+      const origin = expected.header.origin_m;
+      const positions = (expected.positions_m ?? []).flatMap((p) => p.map((value, axis) => value + (origin[axis] ?? 0)));
+      expect([...decoded.positions]).toEqual(positions);
+      expect([...(decoded.indices ?? [])]).toEqual((expected.triangles ?? []).flat());
+    } else if (frame.kind === FrameKind.colours) {
+      const decoded = decodeJob(draco, { kind: 'colours', payload });
+      if (decoded.kind !== 'colours') throw new Error('not colours');
+      expect([...decoded.rgba]).toEqual((expected.colours ?? []).flatMap((rgb) => [...rgb, 255]));
+    } else {
+      expect(frame.kind).toBe(FrameKind.remove);
+      expect(payload.byteLength).toBe(0);
+    }
+  });
+
+  it('say what is wrong with a payload that is not Draco', () => {
+    const payload = new Uint8Array([1, 2, 3, 4]);
+    expect(() => decodeJob(draco, { kind: 'colours', payload })).toThrow('Draco');
+    expect(() => decodeJob(draco, { kind: 'geometry', payload, origin_m: [0, 0, 0] })).toThrow('not a Draco stream');
+  });
+});

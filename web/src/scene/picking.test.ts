@@ -1,0 +1,38 @@
+import { describe, expect, it } from 'vitest';
+import type { DecodedGeometry } from '../decode/messages';
+import { nearestHit } from './picking';
+
+function square(z: number, indexed: boolean): DecodedGeometry {
+  return {
+    kind: 'geometry',
+    positions: Float32Array.from([-1, -1, z, 1, -1, z, 1, 1, z, -1, 1, z]),
+    indices: indexed ? Uint16Array.from([0, 1, 2, 0, 2, 3]) : null,
+    centre: [0, 0, z],
+    radius: Math.SQRT2,
+    bounds: { min: [-1, -1, z], max: [1, 1, z] },
+    normal_sum: [0, 0, 8],
+    area_sum: 8,
+  };
+}
+const downwards = (x: number, y: number) => ({
+  origin: [x, y, 10] as [number, number, number],
+  direction: [0, 0, -1] as [number, number, number],
+});
+
+describe('nearestHit', () => {
+  it('finds the nearest of several surfaces, front or back', () => {
+    const surfaces = [square(0, true), square(4, true), square(-3, true)];
+    expect(nearestHit(surfaces, downwards(0.2, 0.3), 0)).toBeCloseTo(6, 6);
+    expect(nearestHit(surfaces, { origin: [0.2, 0.3, -10], direction: [0, 0, 1] }, 0)).toBeCloseTo(7, 6);
+  });
+
+  it('misses beside the surface and behind the eye', () => {
+    expect(nearestHit([square(0, true)], downwards(1.2, 0), 0)).toBeNull();
+    expect(nearestHit([square(20, true)], downwards(0, 0), 0)).toBeNull();
+  });
+
+  it('finds a point of a cloud within the cone alone', () => {
+    expect(nearestHit([square(0, false)], downwards(0.98, 0.98), 0.01)).toBeCloseTo(10, 6);
+    expect(nearestHit([square(0, false)], downwards(0.5, 0.5), 0.01)).toBeNull();
+  });
+});

@@ -1,0 +1,74 @@
+import { describe, expect, it } from 'vitest';
+import type { Fusion, Method } from '../protocol/messages';
+import { mergedChange, wholeChange, withChange } from './fusion_change';
+
+const methods: Method[] = [
+  {
+    id: 'other',
+    label: '',
+    summary: '',
+    needs_temperature: true,
+    uses_palette: true,
+    params: [{ name: 'k', label: '', help: '', kind: 'number', default: 1 }],
+  },
+];
+const fusion: Fusion = {
+  method: 'blend',
+  params: { alpha: 0.5, gain: 2 },
+  params_in_force: { alpha: 0.5, gain: 2 },
+  palette: 'iron',
+  range: { mode: 'auto', min: 1, max: 9 },
+  missing: 'visible',
+};
+
+describe('mergedChange', () => {
+  it('keeps the latest value of every key', () => {
+    expect(mergedChange({ params: { alpha: 0.1, k: 1 }, palette: 'a' }, { params: { alpha: 0.2 } })).toEqual({
+      params: { alpha: 0.2, k: 1 },
+      palette: 'a',
+    });
+  });
+
+  it('forgets parameters of a method that is left', () => {
+    expect(mergedChange({ method: 'a', params: { alpha: 1 } }, { method: 'b' })).toEqual({ method: 'b' });
+    expect(mergedChange({ params: { alpha: 1 } }, { method: 'b', params: { k: 2 } })).toEqual({ method: 'b', params: { k: 2 } });
+  });
+
+  it('adds parameters to a new method', () => {
+    expect(mergedChange({ method: 'b' }, { params: { k: 2 } })).toEqual({ method: 'b', params: { k: 2 } });
+  });
+});
+
+describe('withChange', () => {
+  it('starts a new method at its defaults', () => {
+    expect(withChange(fusion, { method: 'other' }, methods).params).toEqual({ k: 1 });
+    expect(withChange(fusion, { method: 'other', params: { k: 3 } }, methods).params).toEqual({ k: 3 });
+  });
+
+  it('lays a manual range over the automatic one, and takes it off again', () => {
+    expect(withChange(fusion, { range: { mode: 'manual', min: 2, max: 3 } }, methods).range).toEqual({
+      mode: 'manual',
+      min: 2,
+      max: 3,
+    });
+    expect(withChange(fusion, { range: { mode: 'auto' } }, methods).range).toEqual({ mode: 'auto', min: 1, max: 9 });
+  });
+
+  it('leaves the settings alone', () => {
+    const before = structuredClone(fusion);
+    withChange(fusion, { params: { alpha: 1 }, palette: 'x' }, methods);
+    expect(fusion).toEqual(before);
+  });
+});
+
+describe('wholeChange', () => {
+  it('says everything that was set, and nothing that follows from it', () => {
+    expect(wholeChange(fusion)).toEqual({
+      method: 'blend',
+      params: { alpha: 0.5, gain: 2 },
+      palette: 'iron',
+      range: { mode: 'auto' },
+      missing: 'visible',
+    });
+  });
+});

@@ -1,0 +1,168 @@
+import { readFileSync } from 'node:fs';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { backoffDelay, Connection, ConnectionLost, type LinkState, RpcError, type SocketLike } from './connection';
+
+const helloText = readFileSync(new URL('../../../protocol/golden/messages/hello.notification.json', import.meta.url), 'utf8');
+
+class FakeSocket implements SocketLike {
+  binaryType: BinaryType = 'blob';
+  readyState = 1;
+  onopen = null;
+  onclose: ((event: CloseEvent) => void) | null = null;
+  onerror = null;
+  onmessage: ((event: MessageEvent) => void) | null = null;
+  sent: { id?: number; method: string; params: unknown }[] = [];
+  closed = false;
+  send(text: unknown): void {
+    this.sent.push(JSON.parse(String(text)) as { id?: number; method: string; params: unknown });
+  }
+  close(): void {
+    this.closed = true;
+    this.readyState = 3;
+  }
+  receive(data: unknown): void {
+    this.onmessage?.({ data } as MessageEvent);
+  }
+  answer(result: unknown): void {
+    this.receive(JSON.stringify({ jsonrpc: '2.0', id: this.sent.at(-1)?.id, result }));
+  }
+}
+
+function setUp() {
+  const sockets: FakeSocket[] = [];
+  const states: LinkState[] = [];
+  const frames: ArrayBuffer[] = [];
+  const notes: string[] = [];
+  const problems: string[] = [];
+  let hellos = 0;
+  const connection = new Connection(
+    'ws://robot/ws',
+    {
+      onHello: () => (hellos += 1),
+      onNotification: (method) => notes.push(method),
+      onFrame: (message) => frames.push(message),
+      onState: (state) => states.push(state),
+      onProtocolError: (error) => problems.push(error.message),
+      onRoundTrip: () => undefined,
+    },
+    () => {
+      const socket = new FakeSocket();
+      sockets.push(socket);
+      return socket;
+    },
+  );
+  connection.start();
+  const last = () => sockets.at(-1) as FakeSocket;
+  return { connection, sockets, states, frames, notes, problems, last, hellos: () => hellos };
+}
+
+describe('Connection', () => {
+  beforeEach(() => vi.useFakeTimers());
+  afterEach(() => vi.useRealTimers());
+
+  it('is open after hello, and asks and answers by id', async () => {
+    const { connection, states, last } = setUp();
+    await expect(connection.request('scene.get', {})).rejects.toBeInstanceOf(ConnectionLost);
+    last().receive(helloText);
+    expect(states.at(-1)).toEqual({ phase: 'open' });
+    const answer = connection.request('scene.get', {});
+    last().answer({ name: 'x' });
+    await expect(answer).resolves.toEqual({ name: 'x' });
+  });
+
+  it('turns a refusal into an error that names the field', async () => {
+    const { connection, last } = setUp();
+    last().receive(helloText);
+    const answer = connection.request('fusion.set', { params: { alpha: 7 } });
+    const id = last().sent.at(-1)?.id;
+    last().receive(
+      JSON.stringify({
+        jsonrpc: '2.0',
+        id,
+        error: { code: -32602, message: 'no', data: { field: 'params.alpha', reason: 'above 1' } },
+      }),
+    );
+    const error = await answer.catch((e: unknown) => e);
+    expect(error).toBeInstanceOf(RpcError);
+    expect(error).toMatchObject({ field: 'params.alpha', message: 'above 1', code: -32602 });
+  });
+
+  it('asks for a sign of life in silence and leaves a link that gives none', async () => {
+    const { sockets, states, last } = setUp();
+    last().receive(helloText);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(last().sent.map(({ method }) => method)).toEqual(['fusion.get']);
+    await vi.advanceTimersByTimeAsync(4000);
+    expect(sockets[0]?.closed).toBe(true);
+    expect(states.some(({ phase }) => phase === 'waiting')).toBe(true);
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(sockets.length).toBe(2);
+  });
+
+  it('stays with a link that answers', async () => {
+    const { sockets, last } = setUp();
+    last().receive(helloText);
+    for (let i = 0; i < 20; i += 1) {
+      await vi.advanceTimersByTimeAsync(1000);
+      const asked = last().sent.at(-1);
+      if (asked !== undefined) last().answer({});
+    }
+    expect(sockets.length).toBe(1);
+  });
+
+  it('takes frames as a sign of life', async () => {
+    const { sockets, frames, last } = setUp();
+    last().receive(helloText);
+    for (let i = 0; i < 10; i += 1) {
+      await vi.advanceTimersByTimeAsync(1000);
+      last().receive(new ArrayBuffer(8));
+    }
+    expect(frames).toHaveLength(10);
+    expect(last().sent).toEqual([]);
+    expect(sockets.length).toBe(1);
+  });
+
+  it('rejects what was asked when the link goes, and comes back', async () => {
+    const { connection, sockets, states, last, hellos } = setUp();
+    last().receive(helloText);
+    const answer = connection.request('scene.get', {});
+    last().onclose?.({} as CloseEvent);
+    await expect(answer).rejects.toBeInstanceOf(ConnectionLost);
+    expect(states.at(-1)?.phase).toBe('waiting');
+    await vi.advanceTimersByTimeAsync(400);
+    expect(sockets.length).toBe(2);
+    last().receive(helloText);
+    expect(hellos()).toBe(2);
+  });
+
+  it('gives up on a socket that never says hello', async () => {
+    const { sockets } = setUp();
+    await vi.advanceTimersByTimeAsync(6500);
+    expect(sockets[0]?.closed).toBe(true);
+    expect(sockets.length).toBe(2);
+  });
+
+  it('reports and survives messages that break the protocol', () => {
+    const { problems, notes, last } = setUp();
+    last().receive(helloText);
+    for (const text of ['no json', '[]', '{"jsonrpc":"1.0"}', '{"jsonrpc":"2.0","id":1}']) last().receive(text);
+    expect(problems).toHaveLength(4);
+    last().receive('{"jsonrpc":"2.0","method":"something.new","params":{}}');
+    expect(notes).toEqual(['something.new']);
+  });
+
+  it('waits longer from attempt to attempt, to a limit', () => {
+    const delays = Array.from({ length: 12 }, (_, i) => backoffDelay(i + 1));
+    expect(delays[0]).toBe(250);
+    expect(delays.at(-1)).toBe(5000);
+    for (let i = 1; i < delays.length; i += 1) expect(delays[i]).toBeGreaterThanOrEqual(delays[i - 1] ?? 0);
+  });
+
+  it('opens nothing after stop', async () => {
+    const { connection, sockets, last } = setUp();
+    last().receive(helloText);
+    connection.stop();
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(sockets.length).toBe(1);
+  });
+});

@@ -1,0 +1,48 @@
+import { describe, expect, it } from 'vitest';
+import { accuracyWords, bytes, celsius, count, duration, figures, length } from './format';
+
+const plain = (text: string | null) => text?.replaceAll('\u202f', ' ') ?? null;
+
+describe('Numbers', () => {
+  it('have SI prefixes for counts', () => {
+    expect([0, 7, 999, 1000, 40_200, 990_044, 999_600, 1_968_483].map((n) => plain(count(n)))).toEqual([
+      '0',
+      '7',
+      '999',
+      '1.00 k',
+      '40.2 k',
+      '990 k',
+      '1.00 M',
+      '1.97 M',
+    ]);
+    expect(plain(bytes(512))).toBe('512 B');
+    expect(plain(bytes(1_230_000))).toBe('1.23 MB');
+  });
+
+  it('have one decimal for temperatures and a real minus sign', () => {
+    expect(plain(celsius(-3.14))).toBe('−3.1 °C');
+    expect(plain(celsius(-0.04))).toBe('0.0 °C');
+    expect(celsius(null)).toBe('none');
+  });
+
+  it('have fitting lengths', () => {
+    expect([0.0005, 0.002, 0.25, 12.345, 4500].map((m) => plain(length(m)))).toEqual([
+      '0.5 mm',
+      '2 mm',
+      '25 cm',
+      '12.3 m',
+      '4.5 km',
+    ]);
+    expect(figures(0.000123456, 3)).toBe('0.000123');
+  });
+
+  it('have ages', () => {
+    expect([3.7, 99, 130, 7300].map((s) => plain(duration(s)))).toEqual(['3 s', '99 s', '2 min', '2 h']);
+  });
+
+  it('say how exact the picture is', () => {
+    expect(plain(accuracyWords({ position_mm: 2, colour_levels: 256 }))).toBe('within 2 mm, colours exact');
+    expect(plain(accuracyWords({ position_mm: null, colour_levels: 64 }))).toBe('colours ±2 of 255');
+    expect(accuracyWords(undefined)).toBeNull();
+  });
+});

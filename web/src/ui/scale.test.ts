@@ -1,0 +1,75 @@
+import { describe, expect, it } from 'vitest';
+import { positionOf, roundTicks, spreadApart, travelOf, valueAt } from './scale';
+
+const base = { label: '', help: '' };
+
+describe('roundTicks', () => {
+  it.each([
+    [8, 37, 10, 5, 0],
+    [20.02, 20.31, 6, 0.05, 2],
+    [-40, 1200, 8, 200, 0],
+  ])('of %d to %d are round', (lo, hi, wanted, step, decimals) => {
+    const ticks = roundTicks(lo, hi, wanted);
+    expect(ticks.step).toBeCloseTo(step, 12);
+    expect(ticks.decimals).toBe(decimals);
+    expect(ticks.values[0]).toBeGreaterThanOrEqual(lo - 1e-9);
+    expect(ticks.values.at(-1)).toBeLessThanOrEqual(hi + 1e-9);
+  });
+
+  it('of nothing are one', () => {
+    expect(roundTicks(5, 5, 8).values).toEqual([5]);
+  });
+});
+
+describe('Slider travel', () => {
+  it('is even where the default is not near an end', () => {
+    const travel = travelOf({ ...base, name: 'alpha', kind: 'number', default: 0.5, min: 0, max: 1, step: 0.01 });
+    expect(travel.power).toBe(1);
+    expect(valueAt(travel, 0.333)).toBe(0.33);
+    expect(valueAt(travel, 1)).toBe(1);
+  });
+
+  it('puts the default of a very wide range in the middle', () => {
+    const travel = travelOf({ ...base, name: 'k', kind: 'number', default: 1, exclusive_min: 0, max: 100, step: 0.01 });
+    expect(positionOf(travel, 1)).toBeCloseTo(0.5, 6);
+    expect(valueAt(travel, 0)).toBeGreaterThan(0);
+    expect(valueAt(travel, 1)).toBe(100);
+  });
+
+  it('gives whole numbers for integers', () => {
+    const travel = travelOf({ ...base, name: 'bins', kind: 'integer', default: 64, min: 1, max: 4096 });
+    for (let i = 0; i <= 20; i += 1) expect(Number.isInteger(valueAt(travel, i / 20))).toBe(true);
+    expect([valueAt(travel, 0), valueAt(travel, 1)]).toEqual([1, 4096]);
+  });
+
+  it('comes back to where it was', () => {
+    for (const parameter of [
+      { ...base, name: 'a', kind: 'number', default: 0, min: 0, max: 360 },
+      { ...base, name: 'b', kind: 'number', default: 0.6, min: 0, max: 4, step: 0.05 },
+      { ...base, name: 'c', kind: 'integer', default: 8, min: 0, max: 4096 },
+    ]) {
+      const travel = travelOf(parameter);
+      for (let i = 0; i <= 10; i += 1) {
+        const value = valueAt(travel, i / 10);
+        expect(valueAt(travel, positionOf(travel, value))).toBeCloseTo(value, 9);
+      }
+    }
+  });
+
+  it('gives an open end a sensible one', () => {
+    expect(travelOf({ ...base, name: 'k', kind: 'number', default: 1, min: 0 }).max).toBe(8);
+  });
+});
+
+describe('spreadApart', () => {
+  it('keeps order and distance', () => {
+    const placed = spreadApart([50, 48, 49, 200], 15, 0, 300);
+    const inOrder = [placed[1], placed[2], placed[0], placed[3]] as number[];
+    for (let i = 1; i < 4; i += 1) expect((inOrder[i] ?? 0) - (inOrder[i - 1] ?? 0)).toBeGreaterThanOrEqual(15);
+  });
+
+  it('stays inside', () => {
+    const placed = spreadApart([299, 298, 297], 15, 0, 300);
+    expect(Math.max(...placed)).toBeLessThanOrEqual(300);
+  });
+});
