@@ -32,8 +32,7 @@ class Reader {
   template <std::unsigned_integral T>
   T get() {
     std::uint64_t value = 0;
-    for (std::size_t i = 0; i < sizeof(T); ++i)
-      value |= std::to_integer<std::uint64_t>(in_[at_++]) << (8 * i);
+    for (std::size_t i = 0; i < sizeof(T); ++i) value |= std::to_integer<std::uint64_t>(in_[at_++]) << (8 * i);
     return static_cast<T>(value);
   }
   float get_float() { return std::bit_cast<float>(get<std::uint32_t>()); }
@@ -105,8 +104,7 @@ Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
 
   view.payload = message.subspan(header_size);
   if (view.payload.size() != header.payload_size_bytes)
-    return malformed("payload_size", "payload of " + std::to_string(view.payload.size()) +
-                                         " bytes, the header says " +
+    return malformed("payload_size", "payload of " + std::to_string(view.payload.size()) + " bytes, the header says " +
                                          std::to_string(header.payload_size_bytes));
   return view;
 }
