@@ -5,8 +5,31 @@
 // Source: Eq. 5. Cost: a comparison, a palette lookup and a mix. Missing temperature: the visible colour, or the fixed
 // colour that is set for it.
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/colour_mapped_threshold.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_colour_mapped(const ThermalTable& thermal, float threshold, bool invert, float alpha,
+                        const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  const Floats limit = all(threshold);
+  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    const auto passes = invert ? hn::Lt(vertices.temperature, limit) : hn::Gt(vertices.temperature, limit);
+    return palette.highlighted(hn::IfThenElseZero(passes, all(alpha)), vertices, i);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/methods/threshold.hpp"
-#include "fusion/methods/vertex_kernel.hpp"
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -31,16 +54,14 @@ ParameterSchema<ColourMapped> schema() {
   return entries;
 }
 
+HWY_EXPORT(fuse_colour_mapped);
+
 PreparedMethod prepare(const ColourMapped& params, const MethodContext& context) {
-  const float threshold = as_stored(*params.threshold);
-  const auto shade = [=, thermal = ThermalColour(context), alpha = params.alpha,
-                      invert = params.invert](const Vertex& vertex) -> Colour {
-    const float t = vertex.temperature_celsius;
-    if (!(invert ? t < threshold : t > threshold)) return vertex.visible;
-    return mixed(alpha, thermal(double{t}), vertex.visible);
+  const auto fuse = [thermal = ThermalTable(context), threshold = as_stored(*params.threshold), invert = params.invert,
+                     alpha = static_cast<float>(params.alpha)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_colour_mapped)(thermal, threshold, invert, alpha, span);
   };
-  return {vertex_kernel(shade, context.missing),
-          beyond_threshold(*params.threshold, params.invert, context.scene.summary)};
+  return {lane_kernel(context, fuse), beyond_threshold(*params.threshold, params.invert, context.scene.summary)};
 }
 
 }  // namespace
@@ -54,3 +75,5 @@ Method colour_mapped_threshold() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

@@ -7,10 +7,33 @@
 // bin low. Cost: a bin, a palette lookup and a mix, and once per plan a histogram. Missing temperature: the visible
 // colour, or the fixed colour that is set for it.
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/histogram_bin.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_histogram_bin(const ThermalTable& thermal, const HistogramBinning& bin, const float* weights,
+                        const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  BinStage bins(bin);
+  BothStages stages(palette, bins);
+  fuse_vertices(span, stages, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    return palette.highlighted(hn::GatherIndex(FloatTag(), weights, bins.bins(i)), vertices, i);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include <algorithm>
 #include <vector>
 
-#include "fusion/methods/vertex_kernel.hpp"
 #include "fusion/parameter_schema.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 
@@ -89,20 +112,24 @@ std::vector<TemperatureInterval> intervals(const std::vector<std::uint8_t>& flag
   return result;
 }
 
+HWY_EXPORT(fuse_histogram_bin);
+
 PreparedMethod prepare(const HistogramBin& params, const MethodContext& context) {
   Histogram histogram;
   if (context.scene.summary.has_temperature() && context.scene.histogram) {
     histogram = context.scene.histogram(static_cast<std::uint32_t>(params.bins));
   }
   histogram.counts.resize(static_cast<std::size_t>(params.bins));
-  std::vector<std::uint8_t> flags = highlighted_bins(params, histogram.counts);
+  const std::vector<std::uint8_t> flags = highlighted_bins(params, histogram.counts);
+  std::vector<float> weights;
+  for (const std::uint8_t flag : flags) weights.push_back(flag ? static_cast<float>(params.alpha) : 0.0F);
+  weights.push_back(0);  // the bin of what is missing
   std::vector<TemperatureInterval> highlighted = intervals(flags, histogram);
-  const auto shade = [thermal = ThermalColour(context), alpha = params.alpha, flags = std::move(flags),
-                      bin = HistogramBinning(histogram)](const Vertex& vertex) -> Colour {
-    if (!flags[bin(vertex.temperature_celsius)]) return vertex.visible;
-    return mixed(alpha, thermal(double{vertex.temperature_celsius}), vertex.visible);
+  const auto fuse = [thermal = ThermalTable(context), bin = HistogramBinning(histogram),
+                     weights = std::move(weights)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_histogram_bin)(thermal, bin, weights.data(), span);
   };
-  return {vertex_kernel(shade, context.missing), std::move(highlighted)};
+  return {lane_kernel(context, fuse), std::move(highlighted)};
 }
 
 }  // namespace
@@ -116,3 +143,5 @@ Method histogram_bin() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

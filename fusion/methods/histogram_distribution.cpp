@@ -6,7 +6,30 @@
 // Source: Eqs. 13-14 with the population mean and sigma of the data. Cost: two comparisons, a palette lookup and a mix.
 // Missing temperature: the visible colour, or the fixed colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/histogram_distribution.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_distribution(const ThermalTable& thermal, float first_inside, float last_inside, float weight_inside,
+                       float weight_outside, const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    const Floats t = vertices.temperature;
+    const auto inside = hn::And(hn::Ge(t, all(first_inside)), hn::Le(t, all(last_inside)));
+    return palette.highlighted(hn::IfThenElse(inside, all(weight_inside), all(weight_outside)), vertices, i);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -39,18 +62,18 @@ ParameterSchema<Distribution> schema() {
   return entries;
 }
 
+HWY_EXPORT(fuse_distribution);
+
 PreparedMethod prepare(const Distribution& params, const MethodContext& context) {
   const TemperatureSummary& data = context.scene.summary;
   const double lower = data.mean - params.k * data.sigma;
   const double upper = data.mean + params.k * data.sigma;
   const bool spread = data.sigma > 0;
-  const auto shade = [thermal = ThermalColour(context), alpha = params.alpha, invert = params.invert, spread,
-                      first_inside = smallest_at_least(lower),
-                      last_inside = largest_at_most(upper)](const Vertex& vertex) -> Colour {
-    const float t = vertex.temperature_celsius;
-    const bool inside = t >= first_inside && t <= last_inside;
-    if (!spread || inside != invert) return vertex.visible;
-    return mixed(alpha, thermal(double{t}), vertex.visible);
+  const auto alpha = static_cast<float>(spread ? params.alpha : 0);
+  const auto fuse = [thermal = ThermalTable(context), first_inside = smallest_at_least(lower),
+                     last_inside = largest_at_most(upper), weight_inside = params.invert ? alpha : 0.0F,
+                     weight_outside = params.invert ? 0.0F : alpha](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_distribution)(thermal, first_inside, last_inside, weight_inside, weight_outside, span);
   };
 
   std::vector<TemperatureInterval> highlighted;
@@ -62,7 +85,7 @@ PreparedMethod prepare(const Distribution& params, const MethodContext& context)
     if (minimum < lower) highlighted.push_back({minimum, lower});
     if (maximum > upper) highlighted.push_back({upper, maximum});
   }
-  return {vertex_kernel(shade, context.missing), std::move(highlighted)};
+  return {lane_kernel(context, fuse), std::move(highlighted)};
 }
 
 }  // namespace
@@ -76,3 +99,5 @@ Method histogram_distribution() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

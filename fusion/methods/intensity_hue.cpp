@@ -7,7 +7,37 @@
 // turns white and the second branch is dead. The HSV hue of M is kept exactly. Cost: one palette lookup, one luma.
 // Missing temperature: the visible colour, or the fixed colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/intensity_hue.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_intensity_hue(const ThermalTable& thermal, float k, const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    const Colours& v = vertices.visible;
+    // A thousand times the luma is a whole number that float32 holds exactly, and so is what it is above mid grey.
+    const Floats luma = hn::Add(hn::Add(hn::Mul(all(299), v.r), hn::Mul(all(587), v.g)), hn::Mul(all(114), v.b));
+    const Floats lightness = hn::Mul(hn::Sub(luma, all(127500)), all(k / 127500));
+    const Floats lighter = hn::Min(hn::Max(lightness, all(0)), all(1));
+    const Floats darker = hn::Max(hn::Min(lightness, all(0)), all(-1));
+    const Colours m = palette.colours(i);
+    const auto lit = [&](Floats channel) HWY_ATTR {
+      return hn::Add(hn::Add(channel, hn::Mul(darker, channel)), hn::Mul(lighter, hn::Sub(all(255), channel)));
+    };
+    return Colours{lit(m.r), lit(m.g), lit(m.b)};
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -28,18 +58,13 @@ ParameterSchema<IntensityHue> schema() {
   return entries;
 }
 
+HWY_EXPORT(fuse_intensity_hue);
+
 PreparedMethod prepare(const IntensityHue& params, const MethodContext& context) {
-  const auto shade = [thermal = ThermalColour(context), k = params.k](const Vertex& vertex) -> Colour {
-    const Colour& v = vertex.visible;
-    const double grey_thousandfold = 299 * v.r + 587 * v.g + 114 * v.b;
-    const double lightness = std::clamp(k * (2 * grey_thousandfold / 255000 - 1), -1.0, 1.0);
-    const Colour m = thermal(double{vertex.temperature_celsius});
-    if (lightness > 0) {
-      return {m.r + lightness * (255 - m.r), m.g + lightness * (255 - m.g), m.b + lightness * (255 - m.b)};
-    }
-    return {m.r + lightness * m.r, m.g + lightness * m.g, m.b + lightness * m.b};
+  const auto fuse = [thermal = ThermalTable(context), k = static_cast<float>(params.k)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_intensity_hue)(thermal, k, span);
   };
-  return {vertex_kernel(shade, context.missing), {}};
+  return {lane_kernel(context, fuse), {}};
 }
 
 }  // namespace
@@ -54,3 +79,5 @@ Method intensity_hue() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

@@ -7,7 +7,78 @@
 // Source: Eqs. 11-12; the print raises T - Tmax, which is not a number for a fractional k. Cost: a normalisation and a
 // power. Missing temperature: the visible colour, or the fixed colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/inverse_intensity_hue.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+/// t^k for t in [0, 1] and k > 0, to a relative error below 1e-9 wherever the result is above 1e-30.
+HWY_INLINE Doubles power(Doubles t, double k) {
+  const DoubleTag d;
+  const hn::RebindToSigned<DoubleTag> di;
+  const auto polynomial = [&](Doubles x, std::initializer_list<double> from_highest) HWY_ATTR {
+    Doubles sum = hn::Zero(d);
+    for (const double coefficient : from_highest) sum = hn::Add(hn::Mul(sum, x), hn::Set(d, coefficient));
+    return sum;
+  };
+  // t = 2^e m with m in [sqrt(1/2), sqrt(2)); subnormal t is lifted first.
+  const auto tiny = hn::Lt(t, hn::Set(d, 0x1p-1000));
+  const Doubles lifted = hn::IfThenElse(tiny, hn::Mul(t, hn::Set(d, 0x1p600)), t);
+  const auto bits = hn::BitCast(di, lifted);
+  const auto root_half = hn::Set(di, 0x3FE6A09E667F3BCDLL);
+  const auto exponent = hn::ShiftRight<52>(hn::Sub(bits, root_half));
+  const Doubles mantissa = hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<52>(exponent)));
+  // Whole numbers below 2^51 turn into doubles in the low bits of kWholeDouble.
+  const Doubles whole = hn::Set(d, kWholeDouble);
+  Doubles e = hn::Sub(hn::BitCast(d, hn::Add(exponent, hn::BitCast(di, whole))), whole);
+  e = hn::Sub(e, hn::IfThenElseZero(tiny, hn::Set(d, 600)));
+  // log2(m) = 2 / ln 2 * artanh(s), s = (m - 1) / (m + 1), |s| < 0.172.
+  const Doubles s = hn::Div(hn::Sub(mantissa, hn::Set(d, 1)), hn::Add(mantissa, hn::Set(d, 1)));
+  const Doubles s2 = hn::Mul(s, s);
+  const Doubles artanh = hn::Mul(s, polynomial(s2, {1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3, 1.0}));
+  const Doubles log2 = hn::Add(e, hn::Mul(artanh, hn::Set(d, 2.8853900817779268)));
+  // 2^y = 2^n e^(r ln 2), n whole, |r| <= 1/2.
+  const Doubles y = hn::Max(hn::Mul(log2, hn::Set(d, k)), hn::Set(d, -1000));
+  const Doubles shifted = hn::Add(y, whole);
+  const Doubles r = hn::Mul(hn::Sub(y, hn::Sub(shifted, whole)), hn::Set(d, 0.6931471805599453));
+  const Doubles scaled = polynomial(
+      r, {1.0 / 362880, 1.0 / 40320, 1.0 / 5040, 1.0 / 720, 1.0 / 120, 1.0 / 24, 1.0 / 6, 1.0 / 2, 1.0, 1.0});
+  const auto power_of_two = hn::ShiftLeft<52>(hn::BitCast(di, shifted));
+  const Doubles result = hn::BitCast(d, hn::Add(hn::BitCast(di, scaled), power_of_two));
+  return hn::IfThenElseZero(hn::Gt(t, hn::Zero(d)), result);
+}
+
+void fuse_inverse(const Ramp& normalised, double k, bool substitute, const VertexSpan& span) {
+  const auto intensity = [&](Doubles temperature) HWY_ATTR {
+    const Doubles t = on_ramp(normalised, temperature);
+    return k == 1 ? t : power(t, k);
+  };
+  ValueStage stage(intensity);
+  fuse_vertices(span, stage, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    const Colours& v = vertices.visible;
+    Floats scale = stage.values(i);
+    Floats grey = all(0);
+    if (substitute) {
+      const Floats value = hn::Mul(all(255), scale);
+      const Floats brightest = hn::Max(hn::Max(v.r, v.g), v.b);
+      const auto black = hn::Eq(brightest, all(0));
+      scale = hn::Div(value, hn::IfThenElse(black, all(1), brightest));
+      grey = hn::IfThenElseZero(black, value);
+    }
+    return Colours{hn::Add(grey, hn::Mul(scale, v.r)), hn::Add(grey, hn::Mul(scale, v.g)),
+                   hn::Add(grey, hn::Mul(scale, v.b))};
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -38,18 +109,14 @@ ParameterSchema<InverseIntensityHue> schema() {
   return entries;
 }
 
+HWY_EXPORT(fuse_inverse);
+
 PreparedMethod prepare(const InverseIntensityHue& params, const MethodContext& context) {
-  const Normalisation normalised(context.range_minimum, context.range_maximum);
-  const auto shade = [=, k = params.k, substitute = params.mode == Mode::Substitute](const Vertex& vertex) -> Colour {
-    const Colour& v = vertex.visible;
-    const double intensity = std::pow(normalised(double{vertex.temperature_celsius}), k);
-    if (!substitute) return {intensity * v.r, intensity * v.g, intensity * v.b};
-    const double brightest = std::max({v.r, v.g, v.b});
-    const double value = 255 * intensity;
-    if (!(brightest > 0)) return {value, value, value};
-    return {value * v.r / brightest, value * v.g / brightest, value * v.b / brightest};
+  const auto fuse = [normalised = normalisation(context), k = params.k,
+                     substitute = params.mode == Mode::Substitute](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_inverse)(normalised, k, substitute, span);
   };
-  return {vertex_kernel(shade, context.missing), {}};
+  return {lane_kernel(context, fuse), {}};
 }
 
 }  // namespace
@@ -64,3 +131,5 @@ Method inverse_intensity_hue() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

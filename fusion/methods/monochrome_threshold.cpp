@@ -8,8 +8,40 @@
 // Cost: a comparison, a normalisation and a mix. Missing temperature: the visible colour, or the fixed colour that is
 // set for it.
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/monochrome_threshold.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_monochrome(const Ramp& intensity, const float* pure_hue, float threshold, bool invert, float alpha,
+                     const VertexSpan& span) {
+  const auto on_intensity = [&](Doubles temperature) HWY_ATTR { return on_ramp(intensity, temperature); };
+  ValueStage stage(on_intensity);
+  const Floats limit = all(threshold);
+  fuse_vertices(span, stage, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    const Floats t = stage.values(i);
+    const Floats squared = hn::Mul(t, t);
+    const Floats pale = hn::Sub(t, squared);
+    const auto lit = [&](float pure) HWY_ATTR { return hn::Mul(all(255), hn::Add(pale, hn::Mul(squared, all(pure)))); };
+    const auto passes = invert ? hn::Lt(vertices.temperature, limit) : hn::Gt(vertices.temperature, limit);
+    const Floats weight = hn::IfThenElseZero(passes, all(alpha));
+    return mixed(weight, {lit(pure_hue[0]), lit(pure_hue[1]), lit(pure_hue[2])}, vertices.visible);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <array>
+#include <cmath>
+
 #include "fusion/methods/threshold.hpp"
-#include "fusion/methods/vertex_kernel.hpp"
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -42,31 +74,27 @@ ParameterSchema<Monochrome> schema() {
 }
 
 /// The fully saturated colour of a hue, channels in 0..1.
-Colour pure_hue(double degrees) {
+std::array<float, 3> pure_hue(double degrees) {
   double sextant = std::fmod(degrees, 360.0) / 60;
   if (sextant < 0) sextant += 6;
   const auto channel = [sextant](double offset) {
     const double k = std::fmod(offset + sextant, 6.0);
-    return 1 - std::clamp(std::min(k, 4 - k), 0.0, 1.0);
+    return static_cast<float>(1 - std::clamp(std::min(k, 4 - k), 0.0, 1.0));
   };
   return {channel(5), channel(3), channel(1)};
 }
 
+HWY_EXPORT(fuse_monochrome);
+
 PreparedMethod prepare(const Monochrome& params, const MethodContext& context) {
-  const Normalisation normalised(context.range_minimum, context.range_maximum);
-  const float threshold = as_stored(*params.threshold);
-  const auto shade = [=, alpha = params.alpha, invert = params.invert,
-                      hue = pure_hue(params.hue)](const Vertex& vertex) -> Colour {
-    const float t = vertex.temperature_celsius;
-    if (!(invert ? t < threshold : t > threshold)) return vertex.visible;
-    const double intensity = invert ? 1 - normalised(double{t}) : normalised(double{t});
-    const auto lit = [intensity](double pure) {
-      return 255 * (intensity * (1 - intensity) + intensity * intensity * pure);
-    };
-    return mixed(alpha, {lit(hue.r), lit(hue.g), lit(hue.b)}, vertex.visible);
+  const double low = context.range_minimum;
+  const double high = context.range_maximum;
+  const auto fuse = [intensity = params.invert ? Ramp::between(high, low, 1, 0.5) : Ramp::between(low, high, 1, 0.5),
+                     hue = pure_hue(params.hue), threshold = as_stored(*params.threshold), invert = params.invert,
+                     alpha = static_cast<float>(params.alpha)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_monochrome)(intensity, hue.data(), threshold, invert, alpha, span);
   };
-  return {vertex_kernel(shade, context.missing),
-          beyond_threshold(*params.threshold, params.invert, context.scene.summary)};
+  return {lane_kernel(context, fuse), beyond_threshold(*params.threshold, params.invert, context.scene.summary)};
 }
 
 }  // namespace
@@ -81,3 +109,5 @@ Method monochrome_threshold() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

@@ -8,7 +8,41 @@
 // thousands. Cost: two comparisons, a palette lookup and a mix. Missing temperature: the visible colour, or the fixed
 // colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/thermal_highlighting.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_highlighting(const ThermalTable& thermal, double hot_above, const Ramp& hot, double cold_below,
+                       const Ramp& cold, double k, const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  const auto weight = [&](Doubles temperature) HWY_ATTR {
+    const DoubleTag d;
+    const auto is_hot = hn::Gt(temperature, hn::Set(d, hot_above));
+    const auto is_cold = hn::Lt(temperature, hn::Set(d, cold_below));
+    const Doubles u =
+        hn::IfThenElse(is_hot, on_ramp(hot, temperature), hn::IfThenElseZero(is_cold, on_ramp(cold, temperature)));
+    return hn::Min(hn::Set(d, 1), hn::Mul(hn::Set(d, k), hn::Mul(u, u)));
+  };
+  ValueStage weights(weight);
+  BothStages stages(palette, weights);
+  fuse_vertices(span, stages, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    return palette.highlighted(weights.values(i), vertices, i);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <algorithm>
+#include <limits>
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -58,31 +92,20 @@ Result<void> check(const Highlighting& params) {
   return success();
 }
 
-/// How far a temperature is beyond a threshold, as a part of the way to the end of the range. Halves stay finite.
-double excess(double distance_halved, double span_halved) {
-  if (!(span_halved > 0)) return 1;
-  return distance_halved >= span_halved ? 1 : std::max(0.0, distance_halved / span_halved);
-}
+HWY_EXPORT(fuse_highlighting);
 
 PreparedMethod prepare(const Highlighting& params, const MethodContext& context) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
   const bool hot = params.sides != Sides::Cold;
   const bool cold = params.sides != Sides::Hot;
   const double low = *params.low;
   const double high = *params.high;
-  const double span_above = context.range_maximum / 2 - high / 2;
-  const double span_below = low / 2 - context.range_minimum / 2;
-  const auto shade = [=, thermal = ThermalColour(context), k = params.k, stored_low = as_stored(low),
-                      stored_high = as_stored(high)](const Vertex& vertex) -> Colour {
-    const double t = double{vertex.temperature_celsius};
-    double u = 0;
-    if (hot && vertex.temperature_celsius > stored_high) {
-      u = excess(t / 2 - high / 2, span_above);
-    } else if (cold && vertex.temperature_celsius < stored_low) {
-      u = excess(low / 2 - t / 2, span_below);
-    } else {
-      return vertex.visible;
-    }
-    return mixed(std::min(1.0, k * (u * u)), thermal(t), vertex.visible);
+  const Ramp up = high < context.range_maximum ? Ramp::between(high, context.range_maximum, 1, 1) : Ramp::constant(1);
+  const Ramp down = low > context.range_minimum ? Ramp::between(low, context.range_minimum, 1, 1) : Ramp::constant(1);
+  const auto fuse = [thermal = ThermalTable(context), up, down, k = params.k,
+                     hot_above = hot ? double{as_stored(high)} : kNever,
+                     cold_below = cold ? double{as_stored(low)} : -kNever](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_highlighting)(thermal, hot_above, up, cold_below, down, k, span);
   };
 
   const TemperatureSummary& data = context.scene.summary;
@@ -91,7 +114,7 @@ PreparedMethod prepare(const Highlighting& params, const MethodContext& context)
   std::vector<TemperatureInterval> highlighted;
   if (data.has_temperature() && cold && minimum < low) highlighted.push_back({minimum, std::min(low, maximum)});
   if (data.has_temperature() && hot && maximum > high) highlighted.push_back({std::max(high, minimum), maximum});
-  return {vertex_kernel(shade, context.missing), std::move(highlighted)};
+  return {lane_kernel(context, fuse), std::move(highlighted)};
 }
 
 }  // namespace
@@ -105,3 +128,5 @@ Method thermal_highlighting() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

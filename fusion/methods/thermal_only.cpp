@@ -5,7 +5,25 @@
 // Source: the thermal modality as the paper's figures show it. Cost: one palette lookup.
 // Missing temperature: the visible colour, or the fixed colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/thermal_only.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_thermal_only(const ThermalTable& thermal, const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  fuse_vertices(span, palette, [&](const Vertices&, std::size_t i) HWY_ATTR { return palette.colours(i); });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -13,11 +31,13 @@ namespace {
 
 struct ThermalOnly {};
 
+HWY_EXPORT(fuse_thermal_only);
+
 PreparedMethod prepare(const ThermalOnly&, const MethodContext& context) {
-  return {vertex_kernel([thermal = ThermalColour(context)](
-                            const Vertex& vertex) { return thermal(double{vertex.temperature_celsius}); },
-                        context.missing),
-          {}};
+  const auto fuse = [thermal = ThermalTable(context)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_thermal_only)(thermal, span);
+  };
+  return {lane_kernel(context, fuse), {}};
 }
 
 }  // namespace
@@ -31,3 +51,5 @@ Method thermal_only() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

@@ -5,7 +5,27 @@
 // Source: Eq. 1. Cost: one palette lookup and one mix.
 // Missing temperature: the visible colour, or the fixed colour that is set for it.
 
-#include "fusion/methods/vertex_kernel.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/thermal_visible_blend.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_blend(const ThermalTable& thermal, float alpha, const VertexSpan& span) {
+  PaletteStage palette(thermal);
+  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+    return mixed(all(alpha), palette.colours(i), vertices.visible);
+  });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -26,13 +46,14 @@ ParameterSchema<Blend> schema() {
   return entries;
 }
 
+HWY_EXPORT(fuse_blend);
+
 PreparedMethod prepare(const Blend& params, const MethodContext& context) {
-  return {vertex_kernel(
-              [thermal = ThermalColour(context), alpha = params.alpha](const Vertex& vertex) {
-                return mixed(alpha, thermal(double{vertex.temperature_celsius}), vertex.visible);
-              },
-              context.missing),
-          {}};
+  const auto fuse = [thermal = ThermalTable(context),
+                     alpha = static_cast<float>(params.alpha)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_blend)(thermal, alpha, span);
+  };
+  return {lane_kernel(context, fuse), {}};
 }
 
 }  // namespace
@@ -46,3 +67,5 @@ Method thermal_visible_blend() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

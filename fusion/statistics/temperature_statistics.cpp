@@ -40,14 +40,6 @@ double rounded_quotient(const cpp_int& numerator, const cpp_int& denominator, in
 
 }  // namespace
 
-double histogram_edge(const Histogram& histogram, std::size_t index) {
-  const double minimum = double{histogram.minimum};
-  const double maximum = double{histogram.maximum};
-  const std::size_t bins = histogram.counts.size();
-  if (bins == 0 || index >= bins) return maximum;
-  return minimum + (maximum - minimum) * (static_cast<double>(index) / static_cast<double>(bins));
-}
-
 TemperatureAccumulator::TemperatureAccumulator()
     : sum_by_exponent_(kExponents),
       square_low_by_exponent_(kExponents),
@@ -118,14 +110,6 @@ TemperatureSummary TemperatureAccumulator::summary() const {
     result.sigma = rounded_quotient(sqrt(spread), count, kUnitExponent - half_shift);
   }
   return result;
-}
-
-void add_to_histogram(std::span<const float> temperature_celsius, Histogram& histogram) {
-  if (histogram.counts.empty()) return;
-  const HistogramBinning bin_of(histogram);
-  for (const float value : temperature_celsius) {
-    if (std::isfinite(value)) ++histogram.counts[bin_of(value)];
-  }
 }
 
 }  // namespace spectra::fusion

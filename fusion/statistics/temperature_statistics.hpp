@@ -50,6 +50,10 @@ class HistogramBinning {
     return position > 0 ? static_cast<std::size_t>(std::min(position, bins_ - 1)) : 0;
   }
 
+  double minimum() const { return minimum_; }
+  double span() const { return span_; }
+  double bins() const { return bins_; }
+
  private:
   double minimum_;
   double span_;

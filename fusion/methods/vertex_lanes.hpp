@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "fusion/method.hpp"
+
+namespace spectra::fusion {
+
+/// clamp((T - origin) * slope + offset, 0, top): a linear part of the way between two temperatures, made so that it
+/// neither overflows nor loses a span of one float32 step. Double precision on the stored float32 values.
+struct Ramp {
+  double origin = 0;
+  double slope = 0;
+  double offset = 0;
+  double top = 1;
+
+  /// From 0 at `from` to `top` at `to`, which may be the lower one; where both are equal, `degenerate` for every T.
+  static Ramp between(double from, double to, double top, double degenerate);
+
+  /// The same value everywhere.
+  static Ramp constant(double value) { return {0, 0, value, value}; }
+};
+
+/// The palette over the active range, laid out for the kernels.
+struct ThermalTable {
+  explicit ThermalTable(const MethodContext& context);
+
+  Ramp position;  ///< T to 0..255.
+  /// Per row r, g, b and a pad, then the same of the step to the next row; 32 bytes, so that both halves load as one.
+  alignas(64) std::array<std::array<float, 8>, 256> rows{};
+};
+
+/// T to 0..1 over the active range, 0.5 where the range is one point.
+Ramp normalisation(const MethodContext& context);
+
+/// The nearest float32: how thresholds are compared. Infinite beyond the float32 range.
+float as_stored(double temperature_celsius);
+
+/// The float32 values just at or below and at or above a double: comparing with them is comparing with it.
+float largest_at_most(double value);
+float smallest_at_least(double value);
+
+/// The vertices that a kernel is given; colours are interleaved bytes r, g, b.
+struct VertexSpan {
+  const float* temperature_celsius = nullptr;
+  const std::uint8_t* visible = nullptr;
+  std::uint8_t* fused = nullptr;
+  std::size_t count = 0;
+  MissingDisplay missing;
+};
+
+/// A kernel that hands each span to fuse(const VertexSpan&).
+template <class Fuse>
+class LaneKernel final : public Kernel {
+ public:
+  LaneKernel(Fuse fuse, const MissingDisplay& missing) : fuse_(std::move(fuse)), missing_(missing) {}
+
+  void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
+            std::span<Rgb8> fused) const noexcept override {
+    if (fused.empty()) return;
+    fuse_(VertexSpan{temperature_celsius.data(), &visible.data()->r, &fused.data()->r, fused.size(), missing_});
+  }
+
+ private:
+  Fuse fuse_;
+  MissingDisplay missing_;
+};
+
+template <class Fuse>
+std::shared_ptr<const Kernel> lane_kernel(const MethodContext& context, Fuse fuse) {
+  return std::make_shared<LaneKernel<Fuse>>(std::move(fuse), context.missing);
+}
+
+}  // namespace spectra::fusion
