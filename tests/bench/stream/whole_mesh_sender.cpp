@@ -8,14 +8,15 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <draco/compression/expert_encode.h>
+#include <draco/mesh/mesh.h>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <draco/compression/expert_encode.h>
-#include <draco/mesh/mesh.h>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -35,24 +36,23 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
 }
 
 /// The mesh with its positions; colours are written into its second attribute before each encoding.
-draco::Mesh draco_mesh(const fusion::MultispectralMesh& mesh) {
-  draco::Mesh result;
+std::unique_ptr<draco::Mesh> draco_mesh(const fusion::MultispectralMesh& mesh) {
+  auto result = std::make_unique<draco::Mesh>();
   const auto count = static_cast<std::uint32_t>(mesh.vertex_count());
-  result.set_num_points(count);
+  result->set_num_points(count);
   draco::GeometryAttribute position;
   position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false, sizeof(fusion::Vec3f), 0);
   draco::GeometryAttribute colour;
   colour.Init(draco::GeometryAttribute::COLOR, nullptr, 3, draco::DT_UINT8, true, 3, 0);
-  const int position_id = result.AddAttribute(position, true, count);
-  result.AddAttribute(colour, true, count);
+  const int position_id = result->AddAttribute(position, true, count);
+  result->AddAttribute(colour, true, count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    result.attribute(position_id)->SetAttributeValue(draco::AttributeValueIndex(i), &mesh.positions()[i]);
+    result->attribute(position_id)->SetAttributeValue(draco::AttributeValueIndex(i), &mesh.positions()[i]);
   }
-  result.SetNumFaces(mesh.triangle_count());
+  result->SetNumFaces(mesh.triangle_count());
   for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
     const fusion::Triangle& t = mesh.triangles()[i];
-    result.SetFace(draco::FaceIndex(i),
-                   {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
+    result->SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
   }
   return result;
 }
@@ -89,7 +89,7 @@ int main(int argument_count, char** arguments) {
   if (!scene || !(step > 0)) return 1;
   const fusion::MultispectralMesh& mesh = scene.value().mesh;
   const fusion::SceneTemperature temperature = temperature_of(mesh);
-  draco::Mesh encoded_mesh = draco_mesh(mesh);
+  const std::unique_ptr<draco::Mesh> encoded_mesh = draco_mesh(mesh);
 
   fusion::Vec3f low = mesh.positions()[0], high = low;
   for (const fusion::Vec3f& p : mesh.positions()) {
@@ -97,7 +97,7 @@ int main(int argument_count, char** arguments) {
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-  const int bits = std::bit_width(static_cast<std::uint32_t>(std::ceil(extent / step)));
+  const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(std::ceil(extent / step))));
   const float range = static_cast<float>(step * ((1u << bits) - 1));
   const float origin[3] = {low.x, low.y, low.z};
 
@@ -118,16 +118,17 @@ int main(int argument_count, char** arguments) {
     const auto plan = fusion::FusionPlan::prepare(settings.value(), temperature);
     std::vector<fusion::Rgb8> fused(mesh.vertex_count());
     plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
-    std::memcpy(encoded_mesh.attribute(1)->buffer()->data(), fused.data(), fused.size() * sizeof(fusion::Rgb8));
+    std::memcpy(encoded_mesh->attribute(1)->buffer()->data(), fused.data(), fused.size() * sizeof(fusion::Rgb8));
 
-    draco::ExpertEncoder encoder(encoded_mesh);
+    draco::ExpertEncoder encoder(*encoded_mesh);
     encoder.SetSpeedOptions(kSpeed, kSpeed);
     encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
     encoder.SetAttributeExplicitQuantization(0, bits, 3, origin, range);
     draco::EncoderBuffer buffer;
     if (!encoder.EncodeToBuffer(&buffer).ok()) return 1;
     const auto size = static_cast<std::uint32_t>(buffer.size());
-    if (!write_all(client, reinterpret_cast<const char*>(&size), 4) || !write_all(client, buffer.data(), size)) return 1;
+    if (!write_all(client, reinterpret_cast<const char*>(&size), 4) || !write_all(client, buffer.data(), size))
+      return 1;
   }
   return 0;
 }
