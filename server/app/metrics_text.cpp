@@ -1,7 +1,5 @@
 #include "server/app/metrics_text.hpp"
 
-#include <prometheus/metric_family.h>
-#include <prometheus/text_serializer.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -11,31 +9,26 @@
 #include <vector>
 
 #include "server/app/version.hpp"
+#include "server/net/prometheus_text.hpp"
 
 namespace spectra::server {
 namespace {
 
-class Families {
+class Metrics {
  public:
   void gauge(std::string name, std::string help, double value) {
-    add(std::move(name), std::move(help), prometheus::MetricType::Gauge).gauge.value = value;
+    metrics_.push_back({std::move(name), std::move(help), value, false, "", ""});
   }
   void counter(std::string name, std::string help, double value) {
-    add(std::move(name), std::move(help), prometheus::MetricType::Counter).counter.value = value;
+    metrics_.push_back({std::move(name), std::move(help), value, true, "", ""});
   }
   void info(std::string name, std::string help, std::string label, std::string text) {
-    auto& metric = add(std::move(name), std::move(help), prometheus::MetricType::Gauge);
-    metric.gauge.value = 1;
-    metric.label.push_back({std::move(label), std::move(text)});
+    metrics_.push_back({std::move(name), std::move(help), 1, false, std::move(label), std::move(text)});
   }
-  std::string text() const { return prometheus::TextSerializer().Serialize(families_); }
+  std::string text() const { return prometheus_text(metrics_); }
 
  private:
-  prometheus::ClientMetric& add(std::string name, std::string help, prometheus::MetricType type) {
-    families_.push_back({std::move(name), std::move(help), type, std::vector<prometheus::ClientMetric>(1)});
-    return families_.back().metric.front();
-  }
-  std::vector<prometheus::MetricFamily> families_;
+  std::vector<Metric> metrics_;
 };
 
 double as_double(std::uint64_t count) {
@@ -71,7 +64,7 @@ double cpu_seconds() {
 }  // namespace
 
 std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
-  Families out;
+  Metrics out;
   out.info("spectra_build_info", "The version that runs.", "version", std::string(kVersion));
   out.gauge("spectra_viewers", "Viewers connected now.", static_cast<double>(net.viewers));
   out.counter("spectra_viewers_total", "Viewers that have connected.", as_double(net.viewers_total));

@@ -1,0 +1,296 @@
+#include "server/net/http_server.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/integration/raw_client.hpp"
+#include "tests/integration/test_server.hpp"
+
+namespace spectra::tests {
+namespace {
+
+using server::HttpReply;
+using server::HttpRequest;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+void answer_path(const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
+  reply(server::text_reply(200, request.target.path));
+}
+
+std::shared_ptr<server::ViewerClient> no_viewer(const std::shared_ptr<server::ViewerPeer>&) {
+  throw std::runtime_error("no viewer is expected here");
+}
+
+class HttpServerTest : public testing::Test {
+ protected:
+  HttpServerTest() {
+    web_ = std::filesystem::temp_directory_path() / ("spectra_web_" + std::to_string(getpid()));
+    std::filesystem::create_directories(web_ / "assets");
+    std::ofstream(web_ / "index.html") << "<!doctype html>client";
+    std::ofstream(web_ / "assets/app-1a2b3c.js") << "run()";
+    std::ofstream(web_ / "draco.wasm") << "wasm";
+    std::ofstream(web_.string() + ".secret") << "secret";
+    std::filesystem::create_symlink(web_.string() + ".secret", web_ / "link.txt");
+    server_ = std::make_unique<TestServer>(quick_options(), answer_path, no_viewer, web_);
+  }
+  ~HttpServerTest() override {
+    server_.reset();
+    std::filesystem::remove_all(web_);
+    std::filesystem::remove(web_.string() + ".secret");
+  }
+
+  std::string get(const std::string& target, const std::string& host = "localhost",
+                  const std::string& method = "GET") const {
+    return http_exchange(server_->port(),
+                         method + " " + target + " HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n\r\n");
+  }
+
+  std::filesystem::path web_;
+  std::unique_ptr<TestServer> server_;
+};
+
+TEST_F(HttpServerTest, AnswersThroughTheHandler) {
+  const auto response = get("/healthz");
+  EXPECT_EQ(status_of(response), 200);
+  EXPECT_TRUE(response.ends_with("\r\n\r\n/healthz"));
+}
+
+TEST_F(HttpServerTest, ServesFilesWithTypeAndSecurityHeaders) {
+  const auto index = get("/");
+  EXPECT_EQ(status_of(index), 200);
+  EXPECT_NE(index.find("Content-Type: text/html"), std::string::npos);
+  EXPECT_NE(index.find("Content-Security-Policy: default-src 'none'; script-src 'self' 'wasm-unsafe-eval'"),
+            std::string::npos);
+  EXPECT_NE(index.find("X-Content-Type-Options: nosniff"), std::string::npos);
+  EXPECT_NE(index.find("Cache-Control: no-cache"), std::string::npos);
+  EXPECT_TRUE(index.ends_with("client"));
+  EXPECT_NE(get("/draco.wasm").find("Content-Type: application/wasm"), std::string::npos);
+  EXPECT_NE(get("/assets/app-1a2b3c.js").find("immutable"), std::string::npos);
+}
+
+TEST_F(HttpServerTest, AnswersAnUnchangedFileWith304) {
+  const auto index = get("/");
+  const auto begin = index.find("ETag: ") + 6;
+  const auto etag = index.substr(begin, index.find("\r\n", begin) - begin);
+  const auto again = http_exchange(
+      server_->port(), "GET / HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: " + etag + "\r\nConnection: close\r\n\r\n");
+  EXPECT_EQ(status_of(again), 304);
+  EXPECT_TRUE(again.ends_with("\r\n\r\n"));
+}
+
+TEST_F(HttpServerTest, HeadHasTheHeadersOfGetAndNoBody) {
+  const auto response = get("/", "localhost", "HEAD");
+  EXPECT_EQ(status_of(response), 200);
+  EXPECT_NE(response.find("Content-Length: 21"), std::string::npos);
+  EXPECT_TRUE(response.ends_with("\r\n\r\n"));
+}
+
+TEST_F(HttpServerTest, RefusesOtherMethods) {
+  for (const auto* method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "CONNECT", "FROBNICATE"}) {
+    const auto response = get("/", "localhost", method);
+    EXPECT_EQ(status_of(response), 405) << method;
+    EXPECT_NE(response.find("Allow: GET, HEAD"), std::string::npos);
+  }
+}
+
+TEST_F(HttpServerTest, RefusesForeignHosts) {
+  for (const auto* host :
+       {"evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "192.168.77.1", "0", "2130706433", "[::2]",
+        "localhost:", "localhost:x", "local host", "localhost@evil.example"}) {
+    EXPECT_EQ(status_of(get("/", host)), 403) << host;
+  }
+  for (const auto* host : {"localhost", "LOCALHOST:80", "127.0.0.1", "127.0.0.1:1234", "[::1]", "[::1]:99"}) {
+    EXPECT_EQ(status_of(get("/", host)), 200) << host;
+  }
+}
+
+TEST_F(HttpServerTest, WantsExactlyOneHost) {
+  EXPECT_EQ(status_of(http_exchange(server_->port(), "GET / HTTP/1.1\r\nConnection: close\r\n\r\n")), 400);
+  EXPECT_EQ(status_of(http_exchange(
+                server_->port(), "GET / HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\nConnection: close\r\n\r\n")),
+            400);
+}
+
+TEST_F(HttpServerTest, GivesNothingFromOutsideItsFolder) {
+  const std::string secret = web_.filename().string() + ".secret";
+  const std::vector<std::string> targets{
+      "/../" + secret,
+      "/..%2f" + secret,
+      "/%2e%2e/" + secret,
+      "/%2e%2e%2f" + secret,
+      "/.%2e/" + secret,
+      "/%2E./" + secret,
+      "/..%5c" + secret,
+      "/..\\" + secret,
+      "/%252e%252e/" + secret,
+      "/%252e%252e%252f" + secret,
+      "/%c0%ae%c0%ae/" + secret,
+      "/%c0%af../" + secret,
+      "/..%c0%af" + secret,
+      "/%e0%80%ae%e0%80%ae/" + secret,
+      "/..%00/" + secret,
+      "/index.html%00/../" + secret,
+      "/index.html%00",
+      "/assets/../../" + secret,
+      "/assets/..%2f..%2f" + secret,
+      "/assets/%2e%2e/%2e%2e/" + secret,
+      "/assets/....//....//" + secret,
+      "/assets/..;/..;/" + secret,
+      "/./../" + secret,
+      "/././" + secret,
+      "//../" + secret,
+      "///" + secret,
+      "//etc/passwd",
+      "/../../../../../../etc/passwd",
+      "/..%2f..%2f..%2f..%2fetc%2fpasswd",
+      "/%2fetc/passwd",
+      "/etc/passwd",
+      "/proc/self/environ",
+      "/link.txt",
+      "/assets",
+      "/assets/",
+      "/assets/.",
+      "/?/../" + secret,
+      "/%",
+      "/%2",
+      "/%zz",
+      "/%0d%0aSet-Cookie:x=1",
+      "/~root/.ssh/id_rsa",
+      "/.git/config",
+      "file:///etc/passwd",
+      "http://localhost/../" + secret,
+      "*",
+      "/assets/app-1a2b3c.js/",
+      "/INDEX.HTML",
+  };
+  for (const auto& target : targets) {
+    const auto response = get(target);
+    const auto body = response.substr(std::min(response.size(), response.find("\r\n\r\n")));
+    EXPECT_EQ(body.find("secret"), std::string::npos) << target;
+    EXPECT_EQ(body.find("root:"), std::string::npos) << target;
+    const int status = status_of(response);
+    const bool is_index = target.starts_with("/?");
+    EXPECT_TRUE(is_index ? status == 200 : status == 400 || status == 404) << target << " gave " << status;
+  }
+}
+
+TEST_F(HttpServerTest, SaysHowToBuildAMissingClient) {
+  TestServer bare(quick_options(), answer_path, no_viewer);
+  const auto response = http_exchange(bare.port(), "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  EXPECT_EQ(status_of(response), 200);
+  EXPECT_NE(response.find("npm run build"), std::string::npos);
+}
+
+TEST_F(HttpServerTest, ServesARebuiltClientWithoutARestart) {
+  ASSERT_TRUE(get("/").ends_with("client"));
+  std::ofstream(web_ / "index.html") << "<!doctype html>rebuilt";
+  std::filesystem::last_write_time(web_ / "index.html",
+                                   std::filesystem::file_time_type::clock::now() + std::chrono::seconds(5));
+  EXPECT_TRUE(get("/").ends_with("rebuilt"));
+}
+
+TEST_F(HttpServerTest, RefusesABigHeader) {
+  const std::string big(9000, 'x');
+  const auto response = http_exchange(server_->port(), "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + big + "\r\n\r\n");
+  EXPECT_EQ(status_of(response), 431);
+}
+
+TEST_F(HttpServerTest, RefusesABigBody) {
+  const auto response =
+      http_exchange(server_->port(), "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2000000\r\n\r\nx");
+  EXPECT_EQ(status_of(response), 413);
+}
+
+TEST_F(HttpServerTest, AnswersGarbageWith400) {
+  EXPECT_EQ(status_of(http_exchange(server_->port(), "\x16\x03\x01\x02\r\n\r\n")), 400);
+  EXPECT_EQ(status_of(http_exchange(server_->port(), "GET / HTTP/9.9\r\nHost: localhost\r\n\r\n")), 400);
+  EXPECT_EQ(status_of(http_exchange(server_->port(), "GET /\r\n\r\n")), 400);
+}
+
+TEST_F(HttpServerTest, KeepsAConnectionForFurtherRequests) {
+  RawClient client(server_->port());
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+    EXPECT_EQ(status_of(client.receive_some().value_or("")), 200);
+  }
+}
+
+TEST_F(HttpServerTest, ClosesSlowHeadersWhileOthersAreServed) {
+  std::vector<RawClient> slow;
+  for (int i = 0; i < 50; ++i) {
+    slow.emplace_back(server_->port());
+    ASSERT_TRUE(slow.back().send("GET / HTTP/1.1\r\nHost: loc"));
+  }
+  EXPECT_EQ(status_of(get("/")), 200);
+  const auto begin = steady_clock::now();
+  for (auto& client : slow) EXPECT_TRUE(client.receive_all(milliseconds(5000)).has_value());
+  EXPECT_LT(steady_clock::now() - begin, milliseconds(5000));
+  EXPECT_TRUE(eventually([this] { return server_->metrics().connections_open == 0; }));
+}
+
+TEST_F(HttpServerTest, PicksAFreePortAndSaysWhenOneIsTaken) {
+  EXPECT_NE(server_->port(), 0);
+  auto options = quick_options();
+  options.port = server_->port();
+  try {
+    server::HttpServer second(options, answer_path, no_viewer, {});
+    FAIL() << "two servers on one port";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("in use"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find(std::to_string(options.port)), std::string::npos);
+  }
+}
+
+TEST_F(HttpServerTest, AnswersADroppedReplyWith503) {
+  TestServer silent(
+      quick_options(), [](const HttpRequest&, const std::function<void(HttpReply)>&) {}, no_viewer);
+  const auto response =
+      http_exchange(silent.port(), "GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  EXPECT_EQ(status_of(response), 503);
+}
+
+TEST_F(HttpServerTest, CutsWhoStopsReadingALongAnswer) {
+  const auto body = std::make_shared<const std::string>(64U * 1024 * 1024, 'x');
+  TestServer big(
+      quick_options(),
+      [&body](const HttpRequest&, const std::function<void(HttpReply)>& reply) {
+        reply({200, "text/plain", body, {}});
+      },
+      no_viewer);
+  RawClient client(big.port());
+  client.set_receive_buffer(4096);
+  ASSERT_TRUE(client.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+  ASSERT_TRUE(eventually([&big] { return big.metrics().connections_open == 1; }));
+  EXPECT_TRUE(eventually([&big] { return big.metrics().connections_open == 0; }));
+}
+
+TEST_F(HttpServerTest, SurvivesRunningOutOfDescriptors) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit low = before;
+  low.rlim_cur = 256;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
+  std::vector<int> fillers;
+  for (int descriptor = dup(0); descriptor >= 0; descriptor = dup(0)) fillers.push_back(descriptor);
+  ASSERT_FALSE(fillers.empty());
+  // The client takes the last descriptor, so that none is left to accept it with.
+  close(fillers.back());
+  fillers.pop_back();
+  RawClient client(server_->port());
+  EXPECT_TRUE(eventually([this] { return server_->metrics().accept_failures >= 2; }));
+  for (const int descriptor : fillers) close(descriptor);
+  setrlimit(RLIMIT_NOFILE, &before);
+  ASSERT_TRUE(client.send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+  EXPECT_EQ(status_of(client.receive_some().value_or("")), 200);
+}
+
+}  // namespace
+}  // namespace spectra::tests

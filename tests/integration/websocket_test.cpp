@@ -1,0 +1,333 @@
+// The WebSocket side of the server alone: a viewer whose application only echoes, over real sockets.
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "tests/integration/raw_client.hpp"
+#include "tests/integration/test_server.hpp"
+
+namespace spectra::tests {
+namespace {
+
+using server::OutgoingFrame;
+using std::chrono::milliseconds;
+
+/// What the tests see of all sessions together.
+struct Record {
+  std::atomic<int> opened{0};
+  std::atomic<int> closed{0};
+  std::atomic<int> binaries{0};
+  std::atomic<int> frames_left{0};
+  std::atomic<std::size_t> frame_size_bytes{1000};
+};
+
+/// Echoes texts; sends the record's frames as fast as they are taken.
+class EchoViewer final : public server::ViewerClient {
+ public:
+  EchoViewer(std::shared_ptr<server::ViewerPeer> peer, Record& record) : peer_(std::move(peer)), record_(record) {}
+  void opened() override {
+    record_.opened += 1;
+    peer_.lock()->send("hello");
+    peer_.lock()->wake();
+  }
+  void text_received(std::string_view text) override { peer_.lock()->send(std::string(text)); }
+  void binary_received() override { record_.binaries += 1; }
+  std::optional<OutgoingFrame> next_frame() override {
+    if (record_.frames_left <= 0) return std::nullopt;
+    record_.frames_left -= 1;
+    OutgoingFrame frame;
+    frame.payload = std::make_shared<const std::vector<std::byte>>(record_.frame_size_bytes);
+    return frame;
+  }
+  void ticked() override {}
+  void closed() override { record_.closed += 1; }
+
+ private:
+  std::weak_ptr<server::ViewerPeer> peer_;
+  Record& record_;
+};
+
+class WebSocketTest : public testing::Test {
+ protected:
+  explicit WebSocketTest(server::NetOptions options = quick_options()) { start(std::move(options)); }
+
+  void start(server::NetOptions options) {
+    server_ = std::make_unique<TestServer>(
+        std::move(options),
+        [](const server::HttpRequest&, const std::function<void(server::HttpReply)>& reply) {
+          reply(server::text_reply(200, "ok"));
+        },
+        [this](const std::shared_ptr<server::ViewerPeer>& peer) {
+          return std::make_shared<EchoViewer>(peer, record_);
+        });
+  }
+
+  std::uint16_t port() const { return server_->port(); }
+
+  Record record_;
+  std::unique_ptr<TestServer> server_;
+};
+
+TEST_F(WebSocketTest, GreetsFirstAndEchoes) {
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open()) << viewer.upgrade_response();
+  EXPECT_NE(viewer.upgrade_response().find("Sec-WebSocket-Protocol: spectra.v1"), std::string::npos);
+  EXPECT_EQ(viewer.receive_text(), "hello");
+  viewer.send_text("one");
+  EXPECT_EQ(viewer.receive_text(), "one");
+}
+
+TEST_F(WebSocketTest, OffersNoCompression) {
+  RawWebSocket viewer(port(), "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n");
+  ASSERT_TRUE(viewer.is_open());
+  EXPECT_EQ(viewer.upgrade_response().find("Sec-WebSocket-Extensions"), std::string::npos);
+}
+
+TEST_F(WebSocketTest, WantsItsSubprotocol) {
+  for (const auto* subprotocol : {"", "spectra.v2", "chat", "spectra", "SPECTRA.V1"}) {
+    RawWebSocket viewer(port(), "", subprotocol);
+    EXPECT_EQ(status_of(viewer.upgrade_response()), 400) << subprotocol;
+  }
+  EXPECT_TRUE(RawWebSocket(port(), "", "chat, spectra.v1").is_open());
+  EXPECT_EQ(record_.opened, 1);
+}
+
+TEST_F(WebSocketTest, WantsAnOriginOfItsList) {
+  for (const auto* origin :
+       {"http://evil.example", "https://localhost.evil.example", "null", "", "file://", "http://localhost:x",
+        "ftp://localhost", "http://", "localhost", "http://localhost@evil.example", "http://localhost/"}) {
+    RawWebSocket viewer(port(), "Origin: " + std::string(origin) + "\r\n");
+    EXPECT_EQ(status_of(viewer.upgrade_response()), 403) << origin;
+  }
+  EXPECT_EQ(
+      status_of(RawWebSocket(port(), "Origin: http://localhost\r\nOrigin: http://localhost\r\n").upgrade_response()),
+      403);
+  for (const auto* origin : {"http://localhost", "http://127.0.0.1:8080", "https://[::1]:99"}) {
+    EXPECT_TRUE(RawWebSocket(port(), "Origin: " + std::string(origin) + "\r\n").is_open()) << origin;
+  }
+  EXPECT_TRUE(RawWebSocket(port()).is_open()) << "a client that is no browser sends none";
+}
+
+TEST_F(WebSocketTest, AnswersABadUpgradeWithAnError) {
+  const auto status = [this](const std::string& lines) {
+    return status_of(
+        http_exchange(port(), "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + lines + "\r\n"));
+  };
+  EXPECT_EQ(status(""), 426);
+  const std::string upgrade =
+      "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+      "Sec-WebSocket-Protocol: spectra.v1\r\n";
+  EXPECT_EQ(status_of(http_exchange(port(), upgrade + "Sec-WebSocket-Version: 12\r\nSec-WebSocket-Key: "
+                                                      "dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n")) /
+                100,
+            4);
+  EXPECT_EQ(status_of(http_exchange(port(), upgrade + "Sec-WebSocket-Version: 13\r\n\r\n")) / 100, 4);
+  EXPECT_EQ(record_.opened, 0);
+}
+
+TEST_F(WebSocketTest, AcceptsAMessageAtTheLimitAndClosesBeyondIt) {
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  const std::string largest(64 * 1024, 'x');
+  viewer.send_text(largest);
+  EXPECT_EQ(viewer.receive_text(), largest);
+  viewer.send_text(largest + "x");
+  EXPECT_EQ(viewer.receive_close_code(), 1009U);
+  EXPECT_TRUE(eventually([this] { return record_.closed == 1; }));
+}
+
+TEST_F(WebSocketTest, CountsFragmentsTogether) {
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  viewer.send_frame(1, "frag", false);
+  viewer.send_frame(9, "between");
+  viewer.send_frame(0, "ments", true);
+  EXPECT_EQ(viewer.receive_text(), "fragments");
+  viewer.send_frame(1, std::string(40 * 1024, 'x'), false);
+  viewer.send_frame(0, std::string(40 * 1024, 'x'), true);
+  EXPECT_EQ(viewer.receive_close_code(), 1009U);
+}
+
+TEST_F(WebSocketTest, AnswersBrokenFramesWithTheirCloseCodes) {
+  struct Case {
+    const char* what;
+    std::string bytes;
+    unsigned code;
+  };
+  const std::vector<Case> cases{
+      {"not masked", std::string("\x81\x02hi", 4), 1002},
+      {"reserved bit", std::string("\xC1\x82\0\0\0\0hi", 8), 1002},
+      {"reserved opcode", masked_frame(3, "hi"), 1002},
+      {"reserved control opcode", masked_frame(11, "hi"), 1002},
+      {"continuation of nothing", masked_frame(0, "hi"), 1002},
+      {"message inside a message", masked_frame(1, "hi", false) + masked_frame(1, "hi"), 1002},
+      {"ping in fragments", masked_frame(9, "hi", false), 1002},
+      {"ping too long", masked_frame(9, std::string(126, 'x')), 1002},
+      {"text that is not UTF-8", masked_frame(1, "\xff\xfe"), 1007},
+      {"text that ends inside a character", masked_frame(1, "\xe2\x82"), 1007},
+      {"close with half a code", masked_frame(8, "\x03"), 1002},
+      {"close with a reserved code", masked_frame(8, std::string("\x03\xed", 2)), 1002},
+      {"close with a reason that is not UTF-8", masked_frame(8, std::string("\x03\xe8\xff", 3)), 1007},
+      {"close as it should be", masked_frame(8, std::string("\x03\xe8", 2)), 1000},
+  };
+  for (const auto& [what, bytes, code] : cases) {
+    RawWebSocket viewer(port());
+    ASSERT_EQ(viewer.receive_text(), "hello");
+    viewer.client().send(bytes);
+    EXPECT_EQ(viewer.receive_close_code(), code) << what;
+  }
+  EXPECT_TRUE(eventually([&] { return record_.closed == static_cast<int>(cases.size()); }));
+}
+
+TEST_F(WebSocketTest, AnswersPings) {
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  viewer.send_frame(9, "are you there");
+  const auto pong = viewer.receive();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->opcode, 10U);
+  EXPECT_EQ(pong->payload, "are you there");
+}
+
+TEST_F(WebSocketTest, HandsBinaryMessagesOn) {
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  viewer.send_frame(2, "bytes");
+  EXPECT_TRUE(eventually([this] { return record_.binaries == 1; }));
+  viewer.send_text("still here");
+  EXPECT_EQ(viewer.receive_text(), "still here");
+}
+
+TEST_F(WebSocketTest, SendsAFrameAsOneBinaryMessage) {
+  record_.frames_left = 3;
+  record_.frame_size_bytes = 200'000;
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = viewer.receive();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->opcode, 2U);
+    EXPECT_TRUE(frame->is_final);
+    EXPECT_EQ(frame->payload.size(), 200'072U);
+  }
+}
+
+TEST_F(WebSocketTest, SurvivesADisconnectInsideAFrame) {
+  record_.frames_left = 1000;
+  record_.frame_size_bytes = 1'000'000;
+  for (int i = 0; i < 20; ++i) {
+    RawWebSocket viewer(port());
+    ASSERT_TRUE(viewer.is_open());
+    viewer.client().receive_some();
+  }
+  EXPECT_TRUE(eventually([this] { return record_.closed == 20; }));
+  EXPECT_TRUE(eventually([this] { return server_->metrics().viewers == 0; }));
+  EXPECT_TRUE(RawWebSocket(port()).is_open());
+}
+
+TEST_F(WebSocketTest, CutsAViewerThatReadsNoFrames) {
+  record_.frames_left = 1000;
+  record_.frame_size_bytes = 1'000'000;
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open());
+  viewer.client().set_receive_buffer(4096);
+  EXPECT_TRUE(eventually([this] { return server_->metrics().viewers_cut == 1; }));
+  EXPECT_TRUE(eventually([this] { return record_.closed == 1; }));
+}
+
+TEST_F(WebSocketTest, CutsAViewerThatTalksButNeverReads) {
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open());
+  const std::string message = masked_frame(1, std::string(60'000, 'x'));
+  const auto begin = std::chrono::steady_clock::now();
+  while (record_.closed == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(10)) {
+    viewer.client().send_some(message);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(record_.closed, 1);
+  EXPECT_GE(server_->metrics().viewers_cut, 1U);
+}
+
+TEST_F(WebSocketTest, KeepsAViewerThatReadsSlowlyAndSaysNothing) {
+  record_.frames_left = 3;
+  record_.frame_size_bytes = 400'000;
+  RawClient slow(port());
+  slow.set_receive_buffer(8192);
+  slow.send(
+      "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+      "Sec-WebSocket-Protocol: spectra.v1\r\n\r\n");
+  std::size_t received = 0;
+  // About 1.2 MB at 600 kB/s: several times the write timeout of this test, but never still.
+  while (received < 1'200'000) {
+    char bytes[6000];
+    const auto count = recv(slow.descriptor(), bytes, sizeof bytes, 0);
+    ASSERT_GT(count, 0) << "after " << received << " bytes";
+    received += static_cast<std::size_t>(count);
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  EXPECT_EQ(server_->metrics().viewers_cut, 0U);
+}
+
+TEST_F(WebSocketTest, CutsASilentPeer) {
+  auto options = quick_options();
+  options.limits.idle_timeout = milliseconds(200);
+  start(std::move(options));
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  EXPECT_TRUE(eventually([this] { return server_->metrics().viewers_cut == 1; }));
+}
+
+TEST_F(WebSocketTest, PingsAndMeasuresTheRoundTrip) {
+  auto options = quick_options();
+  options.limits.ping_interval = milliseconds(40);
+  options.limits.idle_timeout = milliseconds(400);
+  start(std::move(options));
+  RawWebSocket viewer(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  for (int i = 0; i < 15; ++i) {
+    const auto frame = viewer.receive();
+    ASSERT_TRUE(frame) << "a peer that answers pings is never cut";
+    ASSERT_EQ(frame->opcode, 9U);
+    viewer.send_frame(10, frame->payload);
+  }
+  EXPECT_EQ(server_->metrics().viewers_cut, 0U);
+}
+
+TEST_F(WebSocketTest, ClosesPolitelyOnStop) {
+  RawWebSocket viewer(port());
+  RawClient idle(port());
+  ASSERT_EQ(viewer.receive_text(), "hello");
+  std::thread stopper([this] { server_->stop(); });
+  EXPECT_EQ(viewer.receive_close_code(), 1001U);
+  viewer.send_frame(8, std::string("\x03\xe9", 2));
+  stopper.join();
+  EXPECT_EQ(record_.closed, 1);
+}
+
+TEST_F(WebSocketTest, StopsInTimeWithPeersThatDoNotAnswer) {
+  record_.frames_left = 1000;
+  record_.frame_size_bytes = 1'000'000;
+  std::vector<RawWebSocket> deaf;
+  for (int i = 0; i < 5; ++i) deaf.emplace_back(port());
+  const auto begin = std::chrono::steady_clock::now();
+  server_->stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  EXPECT_EQ(record_.closed, 5);
+}
+
+TEST_F(WebSocketTest, GivesEverythingBackAfterManyConnections) {
+  for (int i = 0; i < 500; ++i) {
+    RawWebSocket viewer(port());
+    ASSERT_TRUE(viewer.is_open());
+  }
+  EXPECT_TRUE(eventually([this] { return record_.closed == 500; }));
+  EXPECT_TRUE(eventually([this] { return server_->metrics().connections_open == 0; }));
+}
+
+}  // namespace
+}  // namespace spectra::tests

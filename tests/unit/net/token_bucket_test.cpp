@@ -1,0 +1,31 @@
+#include "server/net/token_bucket.hpp"
+
+#include <gtest/gtest.h>
+
+namespace spectra::server {
+namespace {
+
+TEST(TokenBucket, LetsABurstThroughAndThenTheRate) {
+  TokenBucket bucket(10, 5);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(bucket.take(100)) << i;
+  EXPECT_FALSE(bucket.take(100));
+  EXPECT_NEAR(bucket.wait_s(100), 0.1, 1e-9);
+  EXPECT_TRUE(bucket.take(100.11));
+  EXPECT_FALSE(bucket.take(100.11));
+}
+
+TEST(TokenBucket, KeepsNoMoreThanItsBurst) {
+  TokenBucket bucket(10, 5);
+  int taken = 0;
+  while (bucket.take(1e6)) ++taken;
+  EXPECT_EQ(taken, 5);
+  EXPECT_EQ(bucket.wait_s(2e6), 0);
+}
+
+TEST(TokenBucket, NeverRefusesASliderAtItsPace) {
+  TokenBucket bucket(300, 600);
+  for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(bucket.take(i / 120.0));
+}
+
+}  // namespace
+}  // namespace spectra::server
