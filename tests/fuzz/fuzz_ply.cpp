@@ -1,0 +1,84 @@
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/mesh/ply_writer.hpp"
+#include "fusion/mesh/topology.hpp"
+
+namespace {
+
+using namespace spectra::fusion;
+
+void check(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// A file in memory that is filled again and again.
+class MemoryFile {
+ public:
+  MemoryFile() : descriptor_(::memfd_create("fuzz.ply", MFD_CLOEXEC)) { check(descriptor_ >= 0); }
+  void fill(std::string_view bytes) const {
+    check(::ftruncate(descriptor_, 0) == 0);
+    check(::pwrite(descriptor_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
+  }
+  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+std::string written(const MultispectralMesh& mesh) {
+  std::ostringstream out;
+  check(write_ply(out, mesh, mesh.visible()).has_value());
+  return out.str();
+}
+
+void check_scene(const LoadedScene& scene) {
+  const MultispectralMesh& mesh = scene.mesh;
+  check(mesh.vertex_count() > 0);
+  check(mesh.visible().size() == mesh.vertex_count());
+  check(mesh.temperature_celsius().size() == mesh.vertex_count());
+  for (const Vec3f& p : mesh.positions()) check(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+  for (const float celsius : mesh.temperature_celsius()) check(!std::isinf(celsius));
+  for (const auto& [a, b, c] : mesh.triangles()) {
+    check(std::max({a, b, c}) < mesh.vertex_count() && a != b && b != c && c != a);
+  }
+  for (const Note& note : scene.notes) check(!note.id.empty() && note.count > 0 && !note.message.empty());
+}
+
+}  // namespace
+
+/// Any bytes as a scene: what is accepted is sound, and comes back the same when it is written and read again.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const MemoryFile file;
+  file.fill({reinterpret_cast<const char*>(data), size});
+  const auto scene = read_ply(file.path());
+  if (!scene) {
+    check(!scene.error().message.empty() && !scene.error().field.empty());
+    return 0;
+  }
+  check_scene(scene.value());
+  const MultispectralMesh& mesh = scene.value().mesh;
+  const TopologyFacts facts = topology_facts(mesh);
+  check(facts.boundary_edge_count <= 3 * mesh.triangle_count() && facts.component_count <= mesh.triangle_count());
+
+  const std::string bytes = written(mesh);
+  file.fill(bytes);
+  const auto again = read_ply(file.path());
+  check(again.has_value());
+  check_scene(again.value());
+  check(again.value().mesh.triangles() == mesh.triangles());
+  check(again.value().mesh.vertex_count() == mesh.vertex_count());
+  // Doubles are rounded to the precision of the scene's extent, which may move the origin.
+  if (!mesh.double_positions) check(written(again.value().mesh) == bytes);
+  return 0;
+}
