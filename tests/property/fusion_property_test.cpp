@@ -1,0 +1,463 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <thread>
+
+#include "fusion/registry.hpp"
+#include "tests/property/generators.hpp"
+#include "tests/property/instruction_sets.hpp"
+#include "tests/property/reference.hpp"
+
+namespace spectra::fusion {
+namespace {
+
+using test::Case;
+using test::FusionReference;
+
+/// Every property holds for every registered method.
+class EveryMethod : public testing::TestWithParam<const Method*> {};
+
+INSTANTIATE_TEST_SUITE_P(Fusion, EveryMethod,
+                         testing::ValuesIn(std::vector<const Method*>(all_methods().begin(), all_methods().end())),
+                         [](const testing::TestParamInfo<const Method*>& one) { return one.param->id; });
+
+/// The plan of a case, or nothing when low and high contradict each other.
+std::optional<FusionPlan> plan_of(const Case& one) {
+  auto plan = FusionPlan::prepare(one.settings, one.facts(), one.palette);
+  if (plan.has_value()) return plan.value();
+  RC_ASSERT(plan.error().code == ErrorCode::Inconsistent);
+  return std::nullopt;
+}
+
+std::vector<Rgb8> fused(const FusionPlan& plan, std::span<const float> temperature, std::span<const Rgb8> visible) {
+  std::vector<Rgb8> result(temperature.size());
+  plan.fuse(temperature, visible, result);
+  return result;
+}
+
+std::array<std::uint8_t, 3> channels(Rgb8 colour) {
+  return {colour.r, colour.g, colour.b};
+}
+
+TEST_P(EveryMethod, EqualsTheExactAnswer) {
+  EXPECT_TRUE(rc::check([this] {
+    const Case one = *test::cases(*GetParam());
+    const auto plan = plan_of(one);
+    if (!plan) return;
+    const auto answer = fused(*plan, one.temperature, one.visible);
+    const FusionReference reference(one.settings, one.palette, one.facts().summary, one.temperature);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      const auto exact = reference.fused(one.temperature[i], one.visible[i]);
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (test::within_accuracy(channels(answer[i])[c], exact[c])) continue;
+        RC_LOG() << "vertex " << i << " channel " << c << " at " << std::hexfloat << one.temperature[i] << ": "
+                 << std::defaultfloat << int{channels(answer[i])[c]} << " for " << static_cast<double>(exact[c]);
+        RC_FAIL("outside the promised accuracy");
+      }
+    }
+  }));
+}
+
+TEST_P(EveryMethod, EveryInstructionSetGivesTheSameBytes) {
+  EXPECT_TRUE(rc::check([this] {
+    const Case one = *test::cases(*GetParam());
+    std::optional<std::vector<Rgb8>> first;
+    for (const std::int64_t target : test::instruction_sets()) {
+      const test::UsingInstructionSet use(target);
+      const auto plan = plan_of(one);
+      if (!plan) return;
+      const auto answer = fused(*plan, one.temperature, one.visible);
+      if (!first) first = answer;
+      RC_ASSERT(answer == *first);
+    }
+  }));
+}
+
+TEST_P(EveryMethod, EveryLengthGivesTheSameBytes) {
+  const Case one = [this] {
+    Case room;
+    std::mt19937 engine(5);
+    std::uniform_real_distribution<float> celsius(15, 40);
+    for (int i = 0; i < 600; ++i) {
+      room.temperature.push_back(i % 11 ? celsius(engine) : std::numeric_limits<float>::quiet_NaN());
+      const auto bits = static_cast<std::uint32_t>(engine());
+      room.visible.push_back({static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
+                              static_cast<std::uint8_t>(bits >> 16)});
+    }
+    FusionChange change;
+    change.method = GetParam()->id;
+    room.settings = with_change(default_settings(), change).value();
+    room.palette = find_palette("iron")->table;
+    return room;
+  }();
+  for (const std::int64_t target : test::instruction_sets()) {
+    const test::UsingInstructionSet use(target);
+    const FusionPlan plan = FusionPlan::prepare(one.settings, one.facts(), one.palette).value();
+    const auto whole = fused(plan, one.temperature, one.visible);
+    for (std::size_t length = 0; length <= one.temperature.size(); ++length) {
+      const std::span temperature = std::span(one.temperature).last(length);
+      const std::span visible = std::span(one.visible).last(length);
+      // One colour more than is asked for, to see that nothing is written behind the end.
+      std::vector<Rgb8> answer(length + 1, Rgb8{1, 2, 3});
+      plan.fuse(temperature, visible, std::span(answer).first(length));
+      ASSERT_EQ(answer.back(), (Rgb8{1, 2, 3})) << test::name_of(target) << " " << length;
+      ASSERT_TRUE(std::equal(answer.begin(), answer.end() - 1, whole.end() - static_cast<std::ptrdiff_t>(length)))
+          << test::name_of(target) << " " << length;
+    }
+  }
+}
+
+TEST_P(EveryMethod, FusingInPlaceIsAllowed) {
+  EXPECT_TRUE(rc::check([this] {
+    Case one = *test::cases(*GetParam());
+    const auto plan = plan_of(one);
+    if (!plan) return;
+    const auto answer = fused(*plan, one.temperature, one.visible);
+    plan->fuse(one.temperature, one.visible, one.visible);
+    RC_ASSERT(one.visible == answer);
+  }));
+}
+
+TEST_P(EveryMethod, ThreadsAndSplitsGiveTheSameBytes) {
+  EXPECT_TRUE(rc::check([this] {
+    const Case one = *test::cases(*GetParam());
+    const auto plan = plan_of(one);
+    if (!plan) return;
+    const auto whole = fused(*plan, one.temperature, one.visible);
+    std::vector<Rgb8> pieces(whole.size());
+    std::vector<std::thread> threads;
+    const std::size_t count = *rc::gen::inRange<std::size_t>(1, 5);
+    const std::size_t piece = whole.size() / count + 1;
+    for (std::size_t begin = 0; begin < whole.size(); begin += piece) {
+      const std::size_t size = std::min(piece, whole.size() - begin);
+      threads.emplace_back([&, begin, size] {
+        plan->fuse(std::span(one.temperature).subspan(begin, size), std::span(one.visible).subspan(begin, size),
+                   std::span(pieces).subspan(begin, size));
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    RC_ASSERT(pieces == whole);
+  }));
+}
+
+TEST_P(EveryMethod, PermutingVerticesPermutesColours) {
+  EXPECT_TRUE(rc::check([this] {
+    const Case one = *test::cases(*GetParam());
+    const auto plan = plan_of(one);
+    if (!plan) return;
+    const auto answer = fused(*plan, one.temperature, one.visible);
+    std::vector<std::size_t> order(answer.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::shuffle(order.begin(), order.end(), std::mt19937(*rc::gen::arbitrary<std::uint32_t>()));
+    Case moved = one;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      moved.temperature[i] = one.temperature[order[i]];
+      moved.visible[i] = one.visible[order[i]];
+    }
+    // The facts of the scene are gathered anew: they must not depend on the order either.
+    const auto again = fused(plan_of(moved).value(), moved.temperature, moved.visible);
+    for (std::size_t i = 0; i < order.size(); ++i) RC_ASSERT(again[i] == answer[order[i]]);
+  }));
+}
+
+TEST_P(EveryMethod, AnyBitsAsTemperatureAreAllowedBesideTheScene) {
+  // The plan is made for one scene and given the vertices of another.
+  EXPECT_TRUE(rc::check([this] {
+    const Case one = *test::cases(*GetParam());
+    const auto plan = plan_of(one);
+    if (!plan) return;
+    const auto foreign = *rc::gen::container<std::vector<std::uint32_t>>(rc::gen::arbitrary<std::uint32_t>());
+    std::vector<float> temperature;
+    for (const std::uint32_t bits : foreign) temperature.push_back(std::bit_cast<float>(bits));
+    const auto visible = *test::colours(temperature.size());
+    const auto answer = fused(*plan, temperature, visible);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      if (std::isfinite(temperature[i]) || one.settings.method == "visible_only") continue;
+      RC_ASSERT(answer[i] == one.settings.missing.value_or(visible[i]));
+    }
+  }));
+}
+
+TEST_P(EveryMethod, AlphaZeroIsVisibleAndAlphaOneIsThermal) {
+  const auto& parameters = GetParam()->parameters;
+  const bool has_alpha =
+      std::any_of(parameters.begin(), parameters.end(), [](const Parameter& p) { return p.name == "alpha"; });
+  if (!has_alpha) GTEST_SKIP() << GetParam()->id << " has no alpha";
+  EXPECT_TRUE(rc::check([this] {
+    Case one = *test::cases(*GetParam());
+    one.settings.missing.reset();
+    one.settings.params["alpha"] = 0.0;
+    RC_ASSERT(fused(plan_of(one).value(), one.temperature, one.visible) == one.visible);
+    if (!GetParam()->uses_palette) return;
+    one.settings.params["alpha"] = 1.0;
+    const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+    FusionChange change;
+    change.method = "thermal_only";
+    Case thermal = one;
+    thermal.settings = with_change(one.settings, change).value();
+    const auto colours = fused(plan_of(thermal).value(), one.temperature, one.visible);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      RC_ASSERT(answer[i] == colours[i] || answer[i] == one.visible[i]);
+    }
+  }));
+}
+
+/// A scene of whole multiples of 1/64 degC, which can be shifted by 256 and doubled without any rounding.
+Case exact_case(const Method& method) {
+  Case one;
+  one.temperature = *rc::gen::nonEmpty(rc::gen::container<std::vector<float>>(rc::gen::map(
+      rc::gen::inRange(0, 64 * 100), [](int sixty_fourths) { return static_cast<float>(sixty_fourths) / 64; })));
+  one.visible = *test::colours(one.temperature.size());
+  one.settings = *test::settings_of(method, one.temperature);
+  one.settings.range = {};
+  for (const Parameter& parameter : method.parameters) {
+    if (parameter.kind == ParameterKind::Temperature) one.settings.params[parameter.name] = Automatic{};
+  }
+  one.palette = *test::palettes();
+  return one;
+}
+
+TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
+  EXPECT_TRUE(rc::check([this] {
+    const Case celsius = exact_case(*GetParam());
+    const auto answer = fused(plan_of(celsius).value(), celsius.temperature, celsius.visible);
+    Case doubled = celsius;
+    for (float& value : doubled.temperature) value *= 2;
+    RC_ASSERT(fused(plan_of(doubled).value(), doubled.temperature, doubled.visible) == answer);
+    // A shift rounds mean and sigma anew, which may move a vertex that lies exactly on the border.
+    if (GetParam()->id == "histogram_distribution") return;
+    Case shifted = celsius;
+    for (float& value : shifted.temperature) value += 256;
+    const FusionReference reference(shifted.settings, shifted.palette, shifted.facts().summary, shifted.temperature);
+    const auto moved = fused(plan_of(shifted).value(), shifted.temperature, shifted.visible);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      const auto exact = reference.fused(shifted.temperature[i], shifted.visible[i]);
+      for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(test::within_accuracy(channels(answer[i])[c], exact[c]));
+      for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(test::within_accuracy(channels(moved[i])[c], exact[c]));
+    }
+  }));
+}
+
+/// A palette and visible colours that cannot be mistaken for each other, so that a highlight can be seen.
+Case telling_case(const Method& method) {
+  Case one = *test::cases(method);
+  one.settings.missing.reset();
+  for (auto& row : one.palette) row = {250, 10, 10};
+  one.visible.assign(one.temperature.size(), Rgb8{0, 200, 100});
+  if (one.settings.params.contains("alpha")) one.settings.params["alpha"] = 1.0;
+  return one;
+}
+
+std::vector<bool> highlighted(const Case& one) {
+  const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+  std::vector<bool> flags;
+  for (const Rgb8 colour : answer) flags.push_back(colour != Rgb8{0, 200, 100});
+  return flags;
+}
+
+class InvertibleMethod : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Fusion, InvertibleMethod,
+                         testing::Values("colour_mapped_threshold", "monochrome_threshold", "histogram_distribution"));
+
+TEST_P(InvertibleMethod, InvertComplementsExceptOnTheThreshold) {
+  EXPECT_TRUE(rc::check([this] {
+    Case one = telling_case(*find_method(GetParam()));
+    const bool distribution = std::string(GetParam()) == "histogram_distribution";
+    const double threshold = *rc::gen::map(rc::gen::inRange(-50, 500), [](int t) { return double(t); });
+    if (!distribution) one.settings.params["threshold"] = threshold;
+    one.settings.params["invert"] = false;
+    const auto plain = highlighted(one);
+    one.settings.params["invert"] = true;
+    const auto inverted = highlighted(one);
+    const bool spread = one.facts().summary.sigma > 0;
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const float t = one.temperature[i];
+      const bool either = std::isfinite(t) && (distribution ? spread : t != static_cast<float>(threshold));
+      RC_ASSERT(plain[i] + inverted[i] == (either ? 1 : 0));
+    }
+  }));
+}
+
+TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
+  for (const char* id : {"colour_mapped_threshold", "monochrome_threshold", "histogram_distribution", "histogram_bin",
+                         "thermal_highlighting"}) {
+    EXPECT_TRUE(rc::check([id] {
+      const Case one = telling_case(*find_method(id));
+      const auto plan = plan_of(one);
+      if (!plan) return;
+      const auto answer = fused(*plan, one.temperature, one.visible);
+      const auto& intervals = plan->highlighted();
+      for (std::size_t i = 0; i + 1 < intervals.size(); ++i) {
+        RC_ASSERT(intervals[i].high < intervals[i + 1].low || intervals[i].high == intervals[i + 1].low);
+      }
+      const TemperatureSummary data = one.facts().summary;
+      const double tolerance = 1e-6 * (std::abs(double{data.minimum}) + std::abs(double{data.maximum}));
+      for (const TemperatureInterval& interval : intervals) {
+        RC_ASSERT(interval.low <= interval.high);
+        RC_ASSERT(interval.low >= double{data.minimum} && interval.high <= double{data.maximum});
+      }
+      for (std::size_t i = 0; i < answer.size(); ++i) {
+        if (answer[i] == one.visible[i]) continue;
+        const double t = double{one.temperature[i]};
+        RC_ASSERT(std::any_of(intervals.begin(), intervals.end(), [&](const TemperatureInterval& interval) {
+          return t >= interval.low - tolerance && t <= interval.high + tolerance;
+        }));
+      }
+    })) << id;
+  }
+}
+
+/// Indices of the vertices with a temperature, coldest first.
+std::vector<std::size_t> by_temperature(const Case& one) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < one.temperature.size(); ++i) {
+    if (std::isfinite(one.temperature[i])) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return one.temperature[a] < one.temperature[b]; });
+  return order;
+}
+
+TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
+  for (const char* id :
+       {"thermal_only", "thermal_visible_blend", "inverse_intensity_hue", "intensity_hue", "thermal_highlighting"}) {
+    EXPECT_TRUE(rc::check([id] {
+      Case one = *test::cases(*find_method(id));
+      one.palette = find_palette("white_hot")->table;
+      one.visible.assign(one.temperature.size(), (*test::colours(1))[0]);
+      if (one.settings.params.contains("sides")) {
+        // Beyond the hot threshold the palette lightens what is black.
+        one.settings.params["sides"] = std::string("hot");
+        one.visible.assign(one.temperature.size(), Rgb8{0, 0, 0});
+      }
+      const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+      const auto order = by_temperature(one);
+      for (std::size_t i = 1; i < order.size(); ++i) {
+        const auto colder = channels(answer[order[i - 1]]);
+        const auto hotter = channels(answer[order[i]]);
+        for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(hotter[c] >= colder[c]);
+      }
+    })) << id;
+  }
+}
+
+TEST(IntensityHue, KeepsTheHueOfThePalette) {
+  EXPECT_TRUE(rc::check([] {
+    const Case one = *test::cases(*find_method("intensity_hue"));
+    FusionChange change;
+    change.method = "thermal_only";
+    const FusionSettings thermal = with_change(one.settings, change).value();
+    const FusionReference reference(thermal, one.palette, one.facts().summary, one.temperature);
+    const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      if (!std::isfinite(one.temperature[i])) continue;
+      // HSV hue is where the middle channel lies between the others; F = M + L (255 - M) and M + L M keep that.
+      const auto m = reference.fused(one.temperature[i], one.visible[i]);
+      const auto f = channels(answer[i]);
+      const auto [m_low, m_high] = std::minmax_element(m.begin(), m.end());
+      const auto [f_low, f_high] = std::minmax_element(f.begin(), f.end());
+      const double m_span = static_cast<double>(*m_high - *m_low);
+      const double f_span = static_cast<double>(*f_high - *f_low);
+      if (m_span < 1) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double m_place = static_cast<double>(m[c] - *m_low) / m_span;
+        // Three rounded channels: each within 0.5 level, and a little for the arithmetic.
+        RC_ASSERT(std::abs(m_place * f_span - (double(f[c]) - double(*f_low))) <= 2.01);
+      }
+    }
+  }));
+}
+
+TEST(Statistics, MatchExtendedPrecisionForAnyOrderAndSplit) {
+  EXPECT_TRUE(rc::check([] {
+    const auto values = *test::temperatures();
+    TemperatureAccumulator whole;
+    whole.add(values);
+    TemperatureAccumulator merged;
+    const std::size_t piece = *rc::gen::inRange<std::size_t>(1, 300);
+    for (std::size_t end = values.size(); end > 0;) {
+      const std::size_t begin = end > piece ? end - piece : 0;
+      TemperatureAccumulator part;
+      part.add(std::span(values).subspan(begin, end - begin));
+      merged.merge(part);
+      end = begin;
+    }
+    const TemperatureSummary a = whole.summary();
+    const TemperatureSummary b = merged.summary();
+    RC_ASSERT(a.mean == b.mean && a.sigma == b.sigma && a.minimum == b.minimum && a.maximum == b.maximum);
+    RC_ASSERT(a.finite_count == b.finite_count && a.missing_count == b.missing_count);
+    RC_ASSERT(a.finite_count + a.missing_count == values.size());
+    if (!a.has_temperature()) return;
+    long double largest = 0;
+    long double sum = 0;
+    for (const float v : values) {
+      if (std::isfinite(v)) sum += v;
+      if (std::isfinite(v)) largest = std::max(largest, std::fabs(static_cast<long double>(v)));
+    }
+    const long double mean = sum / static_cast<long double>(a.finite_count);
+    long double squares = 0;
+    for (const float v : values) {
+      if (std::isfinite(v)) squares += (v - mean) * (v - mean);
+    }
+    const long double sigma = std::sqrt(squares / static_cast<long double>(a.finite_count));
+    RC_ASSERT(std::fabs(static_cast<long double>(a.mean) - mean) <= 1e-14L * largest);
+    RC_ASSERT(std::fabs(static_cast<long double>(a.sigma) - sigma) <= 1e-12L * sigma + 1e-16L * largest);
+    RC_ASSERT(a.mean >= double{a.minimum} && a.mean <= double{a.maximum});
+  }));
+}
+
+TEST(Statistics, HistogramFollowsTheFormulaOnEveryInstructionSet) {
+  EXPECT_TRUE(rc::check([] {
+    const auto values = *test::temperatures();
+    TemperatureAccumulator accumulator;
+    accumulator.add(values);
+    const TemperatureSummary summary = accumulator.summary();
+    const auto bins = *rc::gen::oneOf(rc::gen::inRange<std::size_t>(1, 100), rc::gen::inRange<std::size_t>(1, 4097));
+    std::vector<std::uint64_t> expected(bins);
+    const double low = double{summary.minimum};
+    const double high = double{summary.maximum};
+    for (const float value : values) {
+      if (!std::isfinite(value)) continue;
+      const double position = low == high ? 0 : std::floor((double{value} - low) / (high - low) * double(bins));
+      ++expected[static_cast<std::size_t>(std::min(position, double(bins) - 1))];
+    }
+    for (const std::int64_t target : test::instruction_sets()) {
+      const test::UsingInstructionSet use(target);
+      Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+      add_to_histogram(values, histogram);
+      RC_ASSERT(histogram.counts == expected);
+    }
+  }));
+}
+
+TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
+  Case one;
+  one.temperature.assign(1'000'000, 21.5F);
+  one.temperature[123'456] = 90.0F;
+  one.visible.assign(one.temperature.size(), Rgb8{60, 70, 80});
+  one.palette = find_palette("iron")->table;
+  for (const Method* method : all_methods()) {
+    FusionChange change;
+    change.method = method->id;
+    one.settings = with_change(default_settings(), change).value();
+    const SceneTemperature facts = one.facts();
+    const auto plan = FusionPlan::prepare(one.settings, facts, one.palette).value();
+    const auto answer = fused(plan, one.temperature, one.visible);
+    const FusionReference reference(one.settings, one.palette, facts.summary, one.temperature);
+    const auto ordinary = reference.fused(21.5F, one.visible[0]);
+    const auto outlier = reference.fused(90.0F, one.visible[0]);
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+      const auto& exact = i == 123'456 ? outlier : ordinary;
+      for (std::size_t c = 0; c < 3; ++c) {
+        ASSERT_TRUE(test::within_accuracy(channels(answer[i])[c], exact[c])) << method->id << " " << i;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace spectra::fusion

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+
+namespace spectra::fusion::test {
+
+/// The exact, unrounded fused colour of every vertex in extended precision, written straight from the equations of the
+/// methods and apart from the library: it shares the summary of the data and the settings, nothing else.
+class FusionReference {
+ public:
+  using Real = long double;
+  using Colour = std::array<Real, 3>;
+
+  /// `temperature` are all temperatures of the scene.
+  FusionReference(const FusionSettings& settings, const PaletteTable& palette, const TemperatureSummary& summary,
+                  std::span<const float> temperature);
+
+  Colour fused(float temperature, Rgb8 visible) const;
+
+ private:
+  double number(const char* name) const;
+  double temperature_or(const char* name, double part) const;
+  bool toggle(const char* name) const;
+  const std::string& choice(const char* name) const;
+  Real normalised(float temperature) const;
+  Colour thermal(float temperature) const;
+  std::size_t bin_of(float temperature) const;
+  void choose_bins(std::span<const float> temperature);
+
+  FusionSettings settings_;
+  PaletteTable palette_;
+  TemperatureSummary summary_;
+  double lo_ = 0;
+  double hi_ = 0;
+  std::vector<bool> chosen_bins_;
+};
+
+/// Whether a fused channel is within the accuracy that is promised: at most 1 level from the exact answer, and equal to
+/// it rounded half up unless the answer lies within 1e-3 of a rounding tie.
+bool within_accuracy(std::uint8_t fused, FusionReference::Real exact);
+
+}  // namespace spectra::fusion::test
