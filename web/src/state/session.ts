@@ -22,7 +22,16 @@ import {
   streamStats,
   type Vec3,
 } from '../protocol/messages';
-import { fittedView, guessUpAxis, type Insets, meanNormal, samplePoints, type UpAxis, viewDirection } from '../scene/first_view';
+import {
+  fittedView,
+  guessUpAxis,
+  type Insets,
+  meanNormal,
+  samplePoints,
+  type UpAxis,
+  type View,
+  viewDirection,
+} from '../scene/first_view';
 import { TileSet } from '../scene/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
 import { Acknowledger } from '../transport/acknowledger';
@@ -246,6 +255,12 @@ export class Session {
     this.#fit(scene, direction, true);
   }
 
+  /** Looks from a place the caller has chosen, and stays there. */
+  setView(view: View): void {
+    this.#userMoved = true;
+    this.viewport.setView(view, false);
+  }
+
   retryNow(): void {
     this.#connection.retryNow();
   }
@@ -314,7 +329,7 @@ export class Session {
       this.#fusionSender.flush();
     }
     if (returning && this.#qualityChanged && qualityBefore !== null) this.setQuality(qualityBefore);
-    this.#setScene(message.scene);
+    this.#setScene(message.scene, true);
     void this.#connection.request('scene.subscribe', { channels: ['fused'] }).catch((error: unknown) => this.#say(error));
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
@@ -333,7 +348,7 @@ export class Session {
     const { store } = this;
     switch (method) {
       case 'scene.changed':
-        this.#setScene(sceneChanged(params, method).scene);
+        this.#setScene(sceneChanged(params, method).scene, false);
         this.#markBehind();
         break;
       case 'fusion.changed': {
@@ -358,10 +373,9 @@ export class Session {
     }
   }
 
-  #setScene(next: Scene | null): void {
+  #setScene(next: Scene | null, fresh: boolean): void {
     const { store } = this;
     const before = store.scene;
-    const other = !before || !next || before.name !== next.name || JSON.stringify(before.bounds) !== JSON.stringify(next.bounds);
     store.scene = next;
     if (next === null) {
       this.tiles.clear();
@@ -370,14 +384,14 @@ export class Session {
       this.viewport.invalidate();
       return;
     }
-    if (other && before) {
-      this.tiles.clear();
-      store.pinned = null;
-    }
+    const same = before?.name === next.name;
+    // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
+    if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) this.tiles.clear();
     const { min, max } = next.bounds;
     const centre: Vec3 = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
     this.viewport.setSceneExtent(centre, Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2);
-    if (other) {
+    if (!same) {
+      store.pinned = null;
       this.#userMoved = false;
       this.#viewedScene = null;
       this.#firstView(next, false);

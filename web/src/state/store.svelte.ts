@@ -98,8 +98,9 @@ export class Store {
   readonly fusion = $derived(this.fusionInForce === null ? null : withChange(this.fusionInForce, this.wanted, this.methods));
   readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
   readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
-  readonly viewMode = $derived(viewModeOf(this.fusion?.method ?? ''));
   readonly hasThermal = $derived(this.scene?.temperature.min != null);
+  /** Without thermal data every method shows the visible colours. */
+  readonly viewMode = $derived<ViewMode>(this.hasThermal ? viewModeOf(this.fusion?.method ?? '') : 'visible');
   readonly connected = $derived(this.link.phase === 'open');
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));

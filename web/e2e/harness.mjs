@@ -1,0 +1,148 @@
+// What the end-to-end tests share: the server program, Chromium, and pixels of screenshots.
+import { spawn } from 'node:child_process';
+import { existsSync, mkdirSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { inflateSync } from 'node:zlib';
+import { chromium } from 'playwright-core';
+
+const here = (path) => fileURLToPath(new URL(path, import.meta.url));
+export const PROGRAM = process.env.SPECTRA_BIN ?? here('../../build/release/bin/spectra');
+const SHOTS = here('./screenshots/');
+
+/** Starts `spectra serve` with the built client and waits until it says where it listens. */
+export async function startServer(args, port = 0) {
+  if (!existsSync(PROGRAM)) throw new Error(`there is no server program at ${PROGRAM}; build it or set SPECTRA_BIN`);
+  const child = spawn(PROGRAM, ['serve', ...args, '--listen', `127.0.0.1:${port}`, '--web', here('../dist')], {
+    stdio: ['ignore', 'pipe', 'pipe'],
+  });
+  let output = '';
+  const exited = new Promise((resolve) => child.once('exit', resolve));
+  const url = await new Promise((resolve, reject) => {
+    const read = (chunk) => {
+      output += chunk;
+      const found = /listening on (http:\/\/127\.0\.0\.1:\d+)/.exec(output);
+      if (found) resolve(`${found[1]}/`);
+    };
+    child.stdout.on('data', read);
+    child.stderr.on('data', read);
+    child.once('exit', (code) => reject(new Error(`the server ended with ${code}:\n${output}`)));
+    child.once('error', reject);
+  });
+  return {
+    url,
+    port: Number(new URL(url).port),
+    stop: async () => {
+      child.kill('SIGTERM');
+      await exited;
+    },
+  };
+}
+
+export function startBrowser() {
+  mkdirSync(SHOTS, { recursive: true });
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking'],
+  });
+}
+
+/** Opens the client; `problems` collects what the browser complained about (a breach of the content policy among it). */
+export async function openClient(browser, url, viewport = { width: 1440, height: 900 }) {
+  const page = await browser.newPage({ viewport });
+  const problems = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error' || message.type() === 'warning') problems.push(message.text());
+  });
+  page.on('pageerror', (error) => problems.push(error.message));
+  await page.goto(url);
+  return { page, problems };
+}
+
+/** Waits until the picture shows the newest settings in full, and has been drawn. */
+export async function settled(page, timeout = 60_000) {
+  await page.waitForFunction(
+    () => {
+      const store = globalThis.spectra?.store;
+      return store?.connected && store.complete !== null && store.behindSince === null && store.wanted === null;
+    },
+    null,
+    { timeout },
+  );
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}
+
+export async function screenshot(page, name) {
+  return decodePng(await page.screenshot({ path: `${SHOTS}${name}.png` }));
+}
+
+/** Pixels of an 8-bit RGB or RGBA PNG that is not interlaced, as Chromium writes it. */
+export function decodePng(file) {
+  let width = 0;
+  let height = 0;
+  let channels = 4;
+  const parts = [];
+  for (let at = 8; at < file.length;) {
+    const size = file.readUInt32BE(at);
+    const type = file.toString('latin1', at + 4, at + 8);
+    const body = file.subarray(at + 8, at + 8 + size);
+    if (type === 'IHDR') {
+      width = body.readUInt32BE(0);
+      height = body.readUInt32BE(4);
+      channels = body[9] === 6 ? 4 : 3;
+    } else if (type === 'IDAT') parts.push(body);
+    at += size + 12;
+  }
+  const raw = inflateSync(Buffer.concat(parts));
+  const stride = width * channels;
+  const pixels = Buffer.alloc(stride * height);
+  for (let row = 0; row < height; row += 1) {
+    const filter = raw[row * (stride + 1)];
+    for (let i = 0; i < stride; i += 1) {
+      const left = i >= channels ? pixels[row * stride + i - channels] : 0;
+      const above = row > 0 ? pixels[(row - 1) * stride + i] : 0;
+      const corner = row > 0 && i >= channels ? pixels[(row - 1) * stride + i - channels] : 0;
+      let guess = 0;
+      if (filter === 1) guess = left;
+      else if (filter === 2) guess = above;
+      else if (filter === 3) guess = (left + above) >> 1;
+      else if (filter === 4) {
+        const p = left + above - corner;
+        const [a, b, c] = [Math.abs(p - left), Math.abs(p - above), Math.abs(p - corner)];
+        guess = a <= b && a <= c ? left : b <= c ? above : corner;
+      }
+      pixels[row * stride + i] = raw[row * (stride + 1) + 1 + i] + guess;
+    }
+  }
+  return {
+    width,
+    height,
+    at: (x, y) => {
+      const i = Math.round(y) * stride + Math.round(x) * channels;
+      return [pixels[i], pixels[i + 1], pixels[i + 2]];
+    },
+  };
+}
+
+const tests = [];
+/** Registers a test; `run` ends with runTests(). */
+export function test(name, body) {
+  tests.push({ name, body });
+}
+
+/** Runs all tests in order; ends the process with 1 when one has failed. */
+export async function runTests() {
+  const start = Date.now();
+  let failed = 0;
+  for (const { name, body } of tests) {
+    const begun = Date.now();
+    try {
+      await body();
+      console.log(`ok      ${name} (${Date.now() - begun} ms)`);
+    } catch (error) {
+      failed += 1;
+      console.log(`FAILED  ${name}\n${error instanceof Error ? error.stack : error}`);
+    }
+  }
+  console.log(`\nEnd-to-end: ${tests.length - failed} passed, ${failed} failed, ${((Date.now() - start) / 1000).toFixed(1)} s`);
+  process.exitCode = failed === 0 ? 0 : 1;
+}

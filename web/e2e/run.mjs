@@ -1,0 +1,321 @@
+// End-to-end: the real server program, the built client, Debian's Chromium.
+//   npm run build && npm run e2e        (SPECTRA_BIN names another server program)
+import assert from 'node:assert/strict';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { openClient, runTests, screenshot, settled, startBrowser, startServer, test } from './harness.mjs';
+
+const scratch = mkdtempSync(join(tmpdir(), 'spectra-e2e-'));
+const browser = await startBrowser();
+let server = await startServer(['--demo']);
+const { page, problems } = await openClient(browser, server.url);
+
+const state = () =>
+  page.evaluate(() => {
+    const { store } = globalThis.spectra;
+    return JSON.parse(
+      JSON.stringify({
+        fusion: store.fusionInForce,
+        scene: store.scene,
+        shown: store.shown,
+        extremes: store.extremes,
+        histogram: store.histogram,
+        refusals: store.refusals,
+        quality: store.quality,
+        generation: store.generation,
+        palette: store.palette,
+        complete: store.complete,
+      }),
+    );
+  });
+
+/** Puts the camera close before a vertex, on a side from which it can be seen, and says where it is on the screen. */
+function lookAt(position) {
+  return page.evaluate(async (target) => {
+    const session = globalThis.spectra;
+    const { viewport, tiles, store } = session;
+    const [min, max] = [store.scene.bounds.min, store.scene.bounds.max];
+    const distance = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 60;
+    const geometries = [...tiles.shownGeometries()].filter(({ visible }) => visible).map(({ geometry }) => geometry);
+    for (let i = 0; i < 60; i += 1) {
+      const z = 1 - (2 * i + 1) / 60;
+      const angle = i * 2.39996;
+      const ring = Math.sqrt(1 - z * z);
+      const eye = [ring * Math.cos(angle), z, ring * Math.sin(angle)].map((value, axis) => target[axis] + value * distance);
+      session.setView({ eye, target });
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+      const place = viewport.project(target);
+      const hit = viewport.pick(place.x, place.y, geometries);
+      if (hit !== null && Math.hypot(hit[0] - target[0], hit[1] - target[1], hit[2] - target[2]) < distance / 100) return place;
+    }
+    return null;
+  }, position);
+}
+
+function assertColour(actual, expected, tolerance, what) {
+  const worst = Math.max(...expected.map((value, channel) => Math.abs(value - actual[channel])));
+  assert.ok(worst <= tolerance, `${what}: ${actual} is not ${expected} (tolerance ${tolerance})`);
+}
+
+const number = (selector) => page.locator(selector).inputValue().then(Number);
+
+test('The whole demo scene stands in the browser', async () => {
+  await settled(page);
+  const { scene, shown, complete } = await state();
+  assert.ok(scene.vertex_count > 200_000, `${scene.vertex_count} vertices`);
+  assert.equal(shown.triangles, scene.triangle_count);
+  assert.equal(complete.tiles, scene.tile_count);
+  const bar = await page.locator('footer').innerText();
+  assert.match(bar, /low/);
+  assert.match(bar, /up to date/);
+  const image = await screenshot(page, 'demo');
+  const seen = new Set();
+  for (let x = 200; x < 1100; x += 10) for (let y = 50; y < 850; y += 10) seen.add(image.at(x, y).join());
+  assert.ok(seen.size > 500, `${seen.size} colours`);
+  assert.deepEqual(problems, []);
+});
+
+let hottest;
+test('The hottest place has the hot colour of the palette on the screen', async () => {
+  await page.keyboard.press('1');
+  await settled(page);
+  const { fusion, extremes, palette } = await state();
+  assert.equal(fusion.method, 'thermal_only');
+  hottest = extremes.hottest;
+  const place = await lookAt(hottest.position);
+  assert.notEqual(place, null, 'the hottest vertex can be seen from nowhere');
+  const image = await screenshot(page, 'hottest-thermal');
+  assertColour(image.at(place.x, place.y), palette.colours[255].map(Math.round), 8, 'hottest vertex');
+});
+
+test('Visible and fused are one key away', async () => {
+  await page.keyboard.press('2');
+  await settled(page);
+  assert.equal((await state()).fusion.method, 'visible_only');
+  await page.keyboard.press('3');
+  await settled(page);
+  assert.equal((await state()).fusion.method, 'thermal_visible_blend');
+});
+
+test('A threshold handle on the axis turns the hot place from palette to visible colour', async () => {
+  await page.locator('[data-method="colour_mapped_threshold"]').click();
+  await settled(page);
+  const handle = page.locator('[data-handle="params.threshold"]');
+  const { scene, fusion } = await state();
+  const { min, max } = fusion.range;
+  const automatic = min + 0.75 * (max - min);
+  assert.ok(Math.abs(Number(await handle.getAttribute('aria-valuenow')) - automatic) < 0.01, 'automatic threshold');
+  assert.equal(fusion.params.threshold, null);
+
+  const readings = () =>
+    page.evaluate(async (position) => {
+      const { viewport } = globalThis.spectra;
+      return viewport.project(position);
+    }, hottest.position);
+  await lookAt(hottest.position);
+  const place = await readings();
+
+  // Down to the coldest: everything is highlighted.
+  const box = await handle.boundingBox();
+  const axis = await page.locator('section.axis svg[role="group"]').boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2, axis.y + axis.height * 0.8, { steps: 12 });
+  await page.mouse.up();
+  await settled(page);
+  const low = await state();
+  assert.ok(low.fusion.params.threshold < min + 0.3 * (max - min), `threshold ${low.fusion.params.threshold}`);
+  assert.ok(Math.abs((await number('[data-parameter="threshold"] input[type=number]')) - low.fusion.params.threshold) < 0.051);
+  assert.ok(
+    Math.abs(low.histogram.highlighted[0][0] - low.fusion.params.threshold) < 0.01,
+    'the axis highlights what the method does',
+  );
+  const hot = (await screenshot(page, 'threshold-low')).at(place.x, place.y);
+
+  // By keyboard to the very top: nothing is.
+  await page.locator('[data-parameter="threshold"] input[type=number]').fill(String(scene.temperature.max + 1));
+  await page.keyboard.press('Enter');
+  await settled(page);
+  await page.locator('canvas').first().focus();
+  const plain = (await screenshot(page, 'threshold-high')).at(place.x, place.y);
+
+  const probe = await page.evaluate(async (at) => {
+    await globalThis.spectra.pin(at);
+    return JSON.parse(JSON.stringify(globalThis.spectra.store.pinned.reading.probe));
+  }, place);
+  assertColour(plain, probe.visible, 12, 'above every temperature the visible colour shows');
+  assert.ok(Math.max(...hot.map((value, channel) => Math.abs(value - plain[channel]))) > 20, `${hot} and ${plain} look the same`);
+  await page.keyboard.press('Escape');
+});
+
+test('A dragged slider answers at once and its last value always arrives', async () => {
+  await page.locator('[data-method="thermal_visible_blend"]').click();
+  await settled(page);
+  const before = await state();
+  const slider = page.locator('[data-parameter="alpha"] input[type=range]');
+  const box = await slider.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  for (let i = 0; i <= 60; i += 1)
+    await page.mouse.move(box.x + box.width * (0.5 + 0.35 * Math.sin(i / 5)), box.y + box.height / 2);
+  await page.mouse.move(box.x + box.width * 0.9, box.y + box.height / 2);
+  await page.mouse.up();
+  await settled(page);
+  const after = await state();
+  assert.ok(Math.abs(after.fusion.params.alpha - 0.9) < 0.06, `alpha ${after.fusion.params.alpha}`);
+  assert.equal(await number('[data-parameter="alpha"] input[type=number]'), after.fusion.params.alpha);
+  assert.ok(after.generation > before.generation);
+});
+
+test('A refused value snaps back and says why', async () => {
+  const field = page.locator('[data-parameter="alpha"] input[type=number]');
+  const before = (await state()).fusion.params.alpha;
+  await field.fill('7');
+  await field.press('Enter');
+  await page.locator('[data-parameter="alpha"] [role=alert]').waitFor();
+  assert.equal((await state()).fusion.params.alpha, before);
+  assert.equal(Number(await field.inputValue()), before);
+});
+
+test('Palette and range move the axis with them', async () => {
+  await page.locator('[data-palette="viridis"]').click();
+  await settled(page);
+  const { palette, fusion } = await state();
+  assert.equal(palette.id, 'viridis');
+  const strip = await page.locator('section.axis canvas').boundingBox();
+  const image = await screenshot(page, 'viridis');
+  const y = Number(await page.locator('[data-handle="range.max"] line').getAttribute('y1')) + strip.y;
+  assertColour(image.at(strip.x + 7, y + 4), palette.colours[253].map(Math.round), 6, 'top of the strip');
+
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('l');
+  await settled(page);
+  assert.equal((await state()).fusion.range.mode, 'manual');
+  const handle = await page.locator('[data-handle="range.max"]').boundingBox();
+  await page.mouse.move(handle.x + 30, handle.y + 26);
+  await page.mouse.down();
+  await page.mouse.move(handle.x + 30, strip.y + strip.height * 0.4, { steps: 8 });
+  await page.mouse.up();
+  await settled(page);
+  const narrowed = (await state()).fusion.range;
+  assert.ok(narrowed.max < fusion.range.max - 0.2 * (fusion.range.max - fusion.range.min), `top ${narrowed.max}`);
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('l');
+  await settled(page);
+  assert.deepEqual((await state()).fusion.range, fusion.range);
+});
+
+test('The background has exactly the colour that was chosen', async () => {
+  await page.evaluate(() => globalThis.spectra.setView({ eye: [0, 1e4, 0], target: [0, 2e4, 1] }));
+  for (const colour of ['#6b6d70', '#1c1d1f']) {
+    await page.locator(`[aria-label="Background ${colour}"]`).click();
+    const image = await screenshot(page, 'background');
+    const expected = [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16));
+    assert.deepEqual(image.at(700, 500), expected);
+  }
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('r');
+});
+
+test('A click reads the temperature', async () => {
+  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 600)));
+  const place = await page.evaluate(() => {
+    const { viewport, tiles } = globalThis.spectra;
+    const geometries = [...tiles.shownGeometries()].map(({ geometry }) => geometry);
+    for (let y = 300; y < 700; y += 20) {
+      for (let x = 300; x < 1000; x += 20) if (viewport.pick(x, y, geometries) !== null) return { x, y };
+    }
+    return null;
+  });
+  await page.mouse.click(place.x, place.y);
+  const card = page.locator('.pin .card');
+  await card.waitFor();
+  assert.match(await card.innerText(), /°C|no temperature/);
+  await page.keyboard.press('Escape');
+  await card.waitFor({ state: 'detached' });
+});
+
+test('Coarser quality is in force and said in words', async () => {
+  await page.locator('#accuracy').fill('2');
+  await settled(page);
+  await page.waitForFunction(() => globalThis.spectra.store.stats?.accuracy.colour_levels === 64, null, { timeout: 20_000 });
+  const { quality, shown, scene } = await state();
+  assert.equal(quality.colour_bits, 6);
+  assert.match(await page.locator('.words').innerText(), /colours ±2 of 255/);
+  await settled(page);
+  assert.equal(shown.triangles > 0.9 * scene.triangle_count, true);
+  await page.locator('#accuracy').fill('4');
+  await settled(page);
+});
+
+test('It reconnects by itself and keeps its settings', async () => {
+  await page.locator('[data-method="thermal_highlighting"]').click();
+  await settled(page);
+  await page.locator('[data-parameter="k"] input[type=number]').fill('2.5');
+  await page.keyboard.press('Enter');
+  await settled(page);
+  const before = await state();
+  await server.stop();
+  await page.getByText('Reconnecting').waitFor();
+  assert.equal(await page.locator('canvas.lost').count(), 1);
+  await page.waitForTimeout(1200);
+  await screenshot(page, 'reconnecting');
+  assert.match(await page.locator('footer').innerText(), /not connected, \d+\su?s? ?old|not connected/);
+  server = await startServer(['--demo'], server.port);
+  await page.waitForFunction(() => globalThis.spectra.store.connected, null, { timeout: 20_000 });
+  await settled(page);
+  const after = await state();
+  assert.deepEqual(after.fusion, before.fusion);
+  assert.equal(after.shown.triangles, after.scene.triangle_count);
+  assert.equal(await page.locator('canvas.lost').count(), 0);
+});
+
+test('A page in a narrow window has axis and sheet beside each other', async () => {
+  const { page: phone, problems: phoneProblems } = await openClient(browser, server.url, { width: 390, height: 844 });
+  await settled(phone);
+  await screenshot(phone, 'narrow');
+  const axis = await phone.locator('section.axis').boundingBox();
+  for (const other of ['aside.panel', 'footer']) {
+    const box = await phone.locator(other).boundingBox();
+    assert.ok(box.y >= axis.y + axis.height - 1, `${other} overlaps the axis`);
+  }
+  assert.ok(axis.height > 250, `axis of ${axis.height} px`);
+  assert.deepEqual(phoneProblems, []);
+  await phone.close();
+});
+
+test('A scene without thermal data says so and shows the visible colours', async () => {
+  const file = join(scratch, 'visible.ply');
+  writeFileSync(
+    file,
+    'ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n' +
+      'property uchar blue\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n' +
+      '0 0 0 40 90 200\n1 0 0 40 90 200\n1 1 0 40 90 200\n0 1 0 40 90 200\n3 0 1 2\n3 0 2 3\n',
+  );
+  const other = await startServer([file]);
+  const { page: tab, problems: tabProblems } = await openClient(browser, other.url);
+  await settled(tab);
+  const image = await screenshot(tab, 'no-thermal');
+  const place = await tab.evaluate(() => globalThis.spectra.viewport.project([0.5, 0.5, 0]));
+  assert.deepEqual(image.at(place.x, place.y), [40, 90, 200]);
+  assert.equal(await tab.locator('section.axis').count(), 0);
+  assert.ok(await tab.getByRole('radio', { name: 'Thermal' }).isDisabled());
+  assert.match(await tab.locator('main').innerText(), /no t(hermal|emperature)/i);
+  assert.deepEqual(tabProblems, []);
+  await tab.close();
+  await other.stop();
+});
+
+test('Nothing broke the content policy', () => {
+  // While the server was away the browser could not connect; that alone may be complained about.
+  assert.deepEqual(
+    problems.filter((text) => !/ERR_CONNECTION_REFUSED|WebSocket connection/.test(text)),
+    [],
+  );
+});
+
+await runTests();
+await browser.close();
+await server.stop();
+rmSync(scratch, { recursive: true, force: true });
