@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <functional>
+#include <random>
 #include <string_view>
 #include <variant>
 
@@ -62,6 +63,11 @@ std::uint64_t FrameCache::hit_count() const {
 std::uint64_t FrameCache::miss_count() const {
   return state_->miss_count();
 }
+
+// Revisions start somewhere else in each run of the server, so that a viewer who comes back after a restart with
+// revisions of the last run does not name encodings of this one by accident.
+FrameCache::State::State(std::size_t capacity_bytes)
+    : capacity_bytes_(capacity_bytes), last_revision_(std::random_device()() & 0x3fff'ffffU) {}
 
 std::shared_ptr<const EncodedTile> FrameCache::State::find_geometry(const GeometryKey& key) {
   const std::lock_guard lock(mutex_);
@@ -148,6 +154,11 @@ std::shared_ptr<const PlanIdentity> FrameCache::State::plan_identity(
   auto identity = known.lock();
   if (!identity) known = identity = std::make_shared<const PlanIdentity>();
   return identity;
+}
+
+std::uint32_t FrameCache::State::unused_revision() {
+  const std::lock_guard lock(mutex_);
+  return ++last_revision_;
 }
 
 bool FrameCache::State::is_first_failure(const Identity& tile) {

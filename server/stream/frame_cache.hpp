@@ -149,7 +149,7 @@ class Shelf {
 /// What viewers use of the cache. Every member function is thread-safe and short: encoding happens between a claim
 /// and its end, with no lock held. Waiters are called from the thread that ends the claim, again without a lock.
 struct FrameCache::State {
-  explicit State(std::size_t capacity_bytes) : capacity_bytes_(capacity_bytes) {}
+  explicit State(std::size_t capacity_bytes);
 
   std::shared_ptr<const EncodedTile> find_geometry(const GeometryKey& key);
   Claim<EncodedTile> claim_geometry(const GeometryKey& key, const std::weak_ptr<CacheWaiter>& waiter);
@@ -166,6 +166,9 @@ struct FrameCache::State {
   /// The same object for plans that show the same picture of `scene`, as long as anybody holds it.
   std::shared_ptr<const PlanIdentity> plan_identity(const fusion::FusionPlan& plan,
                                                     const std::shared_ptr<const SceneSnapshot>& scene);
+
+  /// A number that names no encoding and never will: for a viewer to whom an encoding must go under another name.
+  std::uint32_t unused_revision();
 
   /// Counts a tile that cannot be encoded; true the first time that this tile fails.
   bool is_first_failure(const Identity& tile);
@@ -189,7 +192,7 @@ struct FrameCache::State {
   std::map<GeometryKey, Issued> issued_;
   std::map<std::pair<Identity, std::string>, std::weak_ptr<const PlanIdentity>> plans_;
   std::set<Identity> failed_tiles_;
-  std::uint32_t last_revision_ = 0;
+  std::uint32_t last_revision_;
   std::uint64_t hit_count_ = 0;
   std::uint64_t miss_count_ = 0;
 };

@@ -7,33 +7,76 @@
 namespace spectra::server {
 
 /// How many bytes may be on their way to one viewer: given out and not yet acknowledged as decoded.
+///
+/// The window follows the link, in the manner of BBR. Each acknowledgement gives a sample of the delivery rate (bytes
+/// acknowledged since the frame was sent, over the time they took) and of the round trip. The rate in force is the largest
+/// sample of the last ten round trips; samples taken while there was too little to send count only when they are larger.
+/// The round trip in force is the smallest of the last ten seconds; it contains the time that the frame itself takes on
+/// the link. The window is one bandwidth-delay product and one frame. At first, as long as each round trip brings a
+/// quarter more than the one before, it is twice the product; later every eighth round trip probes with a quarter more,
+/// and the next one drains what that has queued. It stays between a floor and a ceiling, and never starves: a frame larger
+/// than the window goes when nothing else is on its way.
 class SendingWindow {
  public:
-  static constexpr std::size_t kDefaultBytes = 4u << 20;
-  static constexpr std::size_t kSmallestBytes = 16u << 10;
-  static constexpr std::size_t kLargestBytes = 8u << 20;
+  static constexpr std::size_t kInitialBytes = 128u << 10;
+  static constexpr std::size_t kFloorBytes = 16u << 10;
+  static constexpr std::size_t kDefaultCeilingBytes = 4u << 20;
 
-  /// Sets the size, held within the bounds above; 0 = the default.
-  void set_size(std::size_t bytes);
+  /// The most it may ever be; 0 = the default, which is also the largest that is heeded.
+  void set_ceiling(std::size_t bytes);
 
-  /// True when a frame of that size may go now. A frame larger than the window goes when nothing else is on its way.
   bool admits(std::size_t size_bytes) const;
 
-  void on_sent(std::uint32_t sequence, std::size_t size_bytes);
+  /// `now_s` is a steady clock, the same as in on_acknowledged().
+  void on_sent(std::uint32_t sequence, std::size_t size_bytes, double now_s);
 
-  /// Everything up to `sequence` has arrived. Ignores a sequence that was never sent or is acknowledged already.
-  void on_acknowledged(std::uint32_t sequence);
+  /// There is room, but nothing to send: what is measured from here on says nothing about the link.
+  void on_idle();
+
+  /// Everything up to `sequence` has arrived. False, and nothing happens, for a sequence that was never sent or is
+  /// acknowledged already.
+  bool on_acknowledged(std::uint32_t sequence, double now_s);
 
   std::size_t in_flight_bytes() const { return in_flight_bytes_; }
+  std::size_t size_bytes() const;
+  double round_trip_s() const { return last_round_trip_s_; }  ///< 0 = not known yet.
+  double rate_bytes_per_s() const;                            ///< 0 = not known yet.
 
  private:
   struct Sent {
     std::uint32_t sequence;
     std::size_t size_bytes;
+    double sent_s;
+    std::uint64_t delivered_bytes;  // When it was sent, as is the next.
+    double delivered_s;
+    bool is_idle_sample;
   };
+  struct Sample {
+    double value;
+    double at;  // Round (rate) or second (round trip).
+  };
+
+  void take_rate_sample(const Sent& sent, double now_s);
+  void take_round_trip_sample(const Sent& sent, double now_s);
+  void end_round();
+  double shortest_round_trip_s() const;
+  double gain() const;
+
   std::deque<Sent> sent_;
   std::size_t in_flight_bytes_ = 0;
-  std::size_t size_bytes_ = kDefaultBytes;
+  std::size_t ceiling_bytes_ = kDefaultCeilingBytes;
+  std::size_t largest_frame_bytes_ = 0;
+  std::uint64_t delivered_bytes_ = 0;
+  double delivered_s_ = 0;
+  std::uint64_t idle_until_bytes_ = 0;  // Frames sent before this much is delivered measure an idle link.
+  std::uint64_t round_end_bytes_ = 0;   // The round ends when this much is delivered.
+  std::uint64_t round_ = 0;
+  std::deque<Sample> rates_;        // Falling values, rising rounds: the front is the largest.
+  std::deque<Sample> round_trips_;  // Rising values, rising times: the front is the smallest.
+  double last_round_trip_s_ = 0;
+  bool is_starting_ = true;
+  double start_rate_ = 0;
+  int rounds_without_growth_ = 0;
 };
 
 }  // namespace spectra::server

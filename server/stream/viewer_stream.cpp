@@ -4,16 +4,20 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <deque>
 #include <exception>
 #include <map>
 #include <mutex>
+#include <set>
 #include <utility>
 
 #include "server/stream/frame_cache.hpp"
 #include "server/stream/lattice.hpp"
+#include "server/stream/quality_frontier.hpp"
 #include "server/stream/sending_window.hpp"
 #include "server/stream/tile_encoder.hpp"
+#include "server/stream/view_selection.hpp"
 
 namespace spectra::server {
 namespace {
@@ -26,6 +30,14 @@ using protocol::TileId;
 // enough that a viewer who stopped reading costs nothing.
 constexpr std::size_t kPreparedBytes = 1u << 20;
 
+// Tiles that a viewer keeps although its camera has left them, together with those it looks at. About 250 MB on the
+// viewer's side; beyond, those not looked at for longest are removed.
+constexpr std::uint64_t kMostHeldVertices = 6'000'000;
+
+// After a change of the settings the coarse tiles whose place is taken by finer ones are coloured first, for a quick
+// answer, as long as that adds no more than this part to the whole.
+constexpr double kPreviewShare = 0.1;
+
 // What one viewer has and needs of one tile.
 struct Slot {
   enum class Work {
@@ -36,17 +48,33 @@ struct Slot {
   };
 
   std::shared_ptr<const Tile> tile;
-  bool gone = false;
+  std::size_t node = 0;  // In the tree.
+  bool is_gone = false;
+  bool is_wanted = false;   // The camera asks for it, ...
+  bool is_target = false;   // ... as a tile to be drawn in the end, not only until its children are there.
+  bool is_preview = false;  // Coloured even when its children take its place.
+  std::uint64_t last_wanted = 0;
   Work work = Work::Idle;
   std::shared_ptr<const EncodedTile> geometry;  // While Ready.
   Payload colours;
 
-  std::uint32_t held_revision = 0;  // Geometry given out last; 0 = none.
+  // What was given out last; 0 = nothing. The name of a geometry is its revision on the wire: it rises with each
+  // geometry of the tile, even when an encoding comes back that the viewer had before.
+  std::uint32_t held_revision = 0;
+  std::uint32_t held_name = 0;
   std::uint32_t held_vertex_count = 0;
-  std::uint64_t held_geometry_epoch = 0;  // The epochs that what was given out answers.
+  std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
   std::uint64_t failed_geometry_epoch = 0;
   std::uint64_t failed_colour_epoch = 0;
+
+  void forget_held() {
+    held_revision = 0;
+    held_name = 0;
+    held_vertex_count = 0;
+    held_geometry_epoch = 0;
+    held_colour_epoch = 0;
+  }
 };
 
 // The settings in force, as a job needs them. An epoch rises with each change that makes frames of that kind stale.
@@ -65,7 +93,7 @@ struct Encoding {
   std::shared_ptr<Slot> slot;
   std::shared_ptr<const Tile> tile;
   Demand demand;
-  std::shared_ptr<const EncodedTile> geometry = nullptr;  // Null: geometry is to be made; else the colours for it.
+  std::shared_ptr<const EncodedTile> geometry = nullptr;  // Null: it is to be made; else the colours for it.
   std::shared_ptr<const EncodedTile> made_geometry = nullptr;
   Payload made_colours = nullptr;
 
@@ -85,10 +113,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
     {
       const std::lock_guard lock(mutex_);
       closed_ = true;
-      for (auto& [id, slot] : slots_) slot->gone = true;
+      for (const auto& slot : slots_) slot->is_gone = true;
       slots_.clear();
       order_.clear();
       removed_.clear();
+      tree_ = {};
     }
     // Taking this lock waits for a wake that is being called right now; none follows.
     const std::lock_guard lock(wake_mutex_);
@@ -101,7 +130,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   void subscribe(std::size_t in_flight_bytes) override {
     change([&] {
-      window_.set_size(in_flight_bytes);
+      window_.set_ceiling(in_flight_bytes);
       if (subscribed_) return;
       subscribed_ = true;
       is_complete_due_ = true;
@@ -113,12 +142,29 @@ class Stream final : public ViewerStream, public CacheWaiter {
       subscribed_ = false;
       removed_.clear();
       // Whoever subscribes again starts from nothing.
-      for (auto& [id, slot] : slots_) {
+      for (const auto& slot : slots_) {
         put_down(*slot);
-        slot->held_revision = 0;
-        slot->held_vertex_count = 0;
-        slot->held_geometry_epoch = 0;
-        slot->held_colour_epoch = 0;
+        slot->forget_held();
+      }
+    });
+  }
+
+  void resume(std::span<const ResumedTile> tiles) override {
+    change([&] {
+      if (subscribed_) return;
+      std::map<TileId, Slot*> slot_of;
+      for (const auto& slot : slots_) slot_of.emplace(slot->tile->id, slot.get());
+      std::set<TileId> seen;
+      for (const ResumedTile& resumed : tiles) {
+        if (resumed.revision == 0 || !seen.insert(resumed.tile).second) continue;
+        if (const auto known = slot_of.find(resumed.tile); known != slot_of.end()) {
+          put_down(*known->second);
+          known->second->forget_held();
+          known->second->held_revision = resumed.revision;
+          known->second->held_name = resumed.revision;
+        } else {
+          push_removal(resumed.tile, resumed.revision);
+        }
       }
     });
   }
@@ -132,6 +178,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       demand_.plan = std::move(shared_plan);
       ++demand_.colour_epoch;
       is_complete_due_ = true;
+      choose_point();
     });
     return generation;
   }
@@ -149,22 +196,26 @@ class Stream final : public ViewerStream, public CacheWaiter {
       quality_ = quality;
       quality_.colour_bits = std::clamp(quality.colour_bits, 4, 8);
       quality_.encoder_speed = std::clamp(quality.encoder_speed, 0, 10);
-      apply_quality();
+      choose_point();
     });
   }
 
   const StreamQuality& quality() const override { return quality_; }
 
   void set_camera(const Camera& camera) override {
-    const std::lock_guard lock(mutex_);
-    camera_ = camera;
+    if (!is_usable(camera)) return;
+    change([&] {
+      camera_ = camera;
+      select();
+      if (head() != nullptr || !removed_.empty()) is_complete_due_ = true;
+    });
   }
 
-  void acknowledge(std::uint32_t sequence, double /*now_s*/) override {
-    change([&] { window_.on_acknowledged(sequence); });
+  void acknowledge(std::uint32_t sequence, double now_s) override {
+    change([&] { window_.on_acknowledged(sequence, now_s); });
   }
 
-  std::optional<OutgoingFrame> next_frame(double /*now_s*/) override {
+  std::optional<OutgoingFrame> next_frame(double now_s) override {
     const std::lock_guard lock(mutex_);
     wake_pending_ = false;
     if (closed_ || !subscribed_) return std::nullopt;
@@ -172,36 +223,41 @@ class Stream final : public ViewerStream, public CacheWaiter {
       const TileFrameHeader header = removed_.front();
       if (!window_.admits(protocol::kTileFrameHeaderSize)) return std::nullopt;
       removed_.pop_front();
-      return given_out(header, nullptr);
+      return given_out(header, nullptr, now_s);
     }
+    if (head() == nullptr) refine();
     while (Slot* slot = head()) {
       if (slot->work == Slot::Work::Idle) look_up(*slot);
       if (slot->work != Slot::Work::Ready) break;
       if (slot->held_revision != slot->geometry->revision) {
-        auto header = header_of(*slot->tile, FrameKind::Geometry, *slot->geometry);
         if (!window_.admits(frame_size(slot->geometry->payload))) return std::nullopt;
         prepared_bytes_ -= slot->geometry->payload->size();
+        slot->held_name =
+            slot->geometry->revision > slot->held_name ? slot->geometry->revision : cache_->unused_revision();
         slot->held_revision = slot->geometry->revision;
-        slot->held_vertex_count = header.vertex_count;
         slot->held_geometry_epoch = demand_.geometry_epoch;
         slot->held_colour_epoch = 0;
-        return given_out(header, slot->geometry->payload);
+        return given_out(header_of(*slot, FrameKind::Geometry), slot->geometry->payload, now_s);
       }
       slot->held_geometry_epoch = demand_.geometry_epoch;
+      slot->held_vertex_count = static_cast<std::uint32_t>(slot->geometry->input_of_decoded.size());
       std::optional<OutgoingFrame> frame;
       if (slot->held_colour_epoch != demand_.colour_epoch) {
-        auto header = header_of(*slot->tile, FrameKind::Colours, *slot->geometry);
-        header.generation = generation_;
         if (!window_.admits(frame_size(slot->colours))) return std::nullopt;
+        auto header = header_of(*slot, FrameKind::Colours);
+        header.generation = generation_;
         slot->held_colour_epoch = demand_.colour_epoch;
-        frame = given_out(header, slot->colours);
+        colour_cost_.learn(demand_.colour_bits, header.vertex_count, slot->colours->size());
+        frame = given_out(header, slot->colours, now_s);
       }
       put_down(*slot);
       if (frame) {
         post_jobs();
         return frame;
       }
+      if (head() == nullptr) refine();
     }
+    window_.on_idle();
     post_jobs();
     return std::nullopt;
   }
@@ -211,7 +267,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
     wake_pending_ = false;
     if (!is_complete()) return std::nullopt;
     is_complete_due_ = false;
-    StreamComplete complete{.generation = generation_, .scene_revision = scene_->revision()};
+    StreamComplete complete{
+        .generation = generation_, .scene_revision = scene_->revision(), .tile_count = 0, .vertex_count = 0};
     for (const auto& slot : order_) {
       if (slot->held_colour_epoch != demand_.colour_epoch) continue;
       ++complete.tile_count;
@@ -223,17 +280,19 @@ class Stream final : public ViewerStream, public CacheWaiter {
   StreamStats stats() const override {
     const std::lock_guard lock(mutex_);
     StreamStats stats;
+    stats.round_trip_ms = window_.round_trip_s() * 1e3;
+    stats.throughput_bytes_per_s = window_.rate_bytes_per_s();
     stats.queued_bytes = window_.in_flight_bytes() + prepared_bytes_;
     stats.skipped_frames = skipped_frame_count_;
     stats.failed_tiles = failed_tile_count_;
-    stats.position_mm = static_cast<double>(demand_.position_step_m) * 500;
     stats.colour_levels = 1 << demand_.colour_bits;
+    if (!closed_) add_accuracy(stats);
     return stats;
   }
 
   void cache_changed() override {
     change([&] {
-      for (const auto& slot : order_) {
+      for (const auto& slot : slots_) {
         if (slot->work == Slot::Work::Waiting) slot->work = Slot::Work::Idle;
       }
     });
@@ -271,57 +330,160 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   void adopt(std::shared_ptr<const SceneSnapshot> scene) {
     scene_ = std::move(scene);
+    tree_ = ViewTree(*scene_);
+    std::map<TileId, std::shared_ptr<Slot>> known_slots;
+    for (auto& slot : slots_) known_slots.emplace(slot->tile->id, slot);
+    slots_.clear();
     order_.clear();
-    std::map<TileId, std::shared_ptr<Slot>> slots;
-    for (const auto& tile : scene_->tiles()) {
-      if (tile->positions.empty()) continue;
-      std::shared_ptr<Slot> slot;
-      if (const auto known = slots_.find(tile->id); known != slots_.end()) {
+    for (std::size_t node = 0; node < tree_.nodes().size(); ++node) {
+      const auto& tile = tree_.nodes()[node].tile;
+      auto slot = std::make_shared<Slot>();
+      if (const auto known = known_slots.find(tile->id); known != known_slots.end()) {
         if (known->second->tile == tile) {
           slot = known->second;
         } else {
-          slot = std::make_shared<Slot>();
-          slot->tile = tile;
           slot->held_revision = known->second->held_revision;
-          forget(*known->second);
+          slot->held_name = known->second->held_name;
+          abandon(*known->second);
         }
-        slots_.erase(known);
-      } else {
-        slot = std::make_shared<Slot>();
-        slot->tile = tile;
+        known_slots.erase(known);
       }
-      slots.emplace(tile->id, slot);
-      order_.push_back(std::move(slot));
+      slot->tile = tile;
+      slot->node = node;
+      slots_.push_back(std::move(slot));
     }
-    for (auto& [id, slot] : slots_) {
-      if (slot->held_revision != 0) {
-        removed_.push_back({.kind = FrameKind::Remove, .tile = id, .revision = slot->held_revision});
-      }
-      forget(*slot);
+    for (const auto& [id, slot] : known_slots) {
+      remove_from_viewer(*slot);
+      abandon(*slot);
     }
-    slots_ = std::move(slots);
     is_complete_due_ = true;
-    apply_quality();
+    choose_point();
   }
 
-  void forget(Slot& slot) {
+  void abandon(Slot& slot) {
     put_down(slot);
-    slot.gone = true;
+    slot.is_gone = true;
   }
 
-  void apply_quality() {
+  void push_removal(TileId tile, std::uint32_t revision) {
+    TileFrameHeader header;
+    header.kind = FrameKind::Remove;
+    header.tile = tile;
+    header.revision = revision;
+    removed_.push_back(header);
+  }
+
+  void remove_from_viewer(Slot& slot) {
+    if (slot.held_name != 0) push_removal(slot.tile->id, slot.held_name);
+    slot.forget_held();
+  }
+
+  // Decides how a change is answered first; see StreamQuality. Ends in apply().
+  void choose_point() {
+    point_ = {.pixel_error_factor = 1, .colour_bits = quality_.colour_bits};
+    const double rate = window_.rate_bytes_per_s();
+    if (quality_.automatic && rate > 0) {
+      for (const QualityPoint& point : quality_frontier()) {
+        point_ = {point.pixel_error_factor, std::min(point.colour_bits, quality_.colour_bits)};
+        const auto selected = selected_tiles(tree_, camera_, quality_.pixel_error * point_.pixel_error_factor);
+        const double bytes =
+            static_cast<double>(target_vertex_count(selected)) * colour_cost_.bytes_per_vertex(point_.colour_bits);
+        if ((bytes / rate + window_.round_trip_s()) * 1e3 <= quality_.latency_target_ms) break;
+      }
+    }
+    apply();
+  }
+
+  // Automatic quality: there is a second answer still to come.
+  bool is_refining_due() const {
+    return demand_.plan && (point_.pixel_error_factor != 1 || point_.colour_bits != quality_.colour_bits);
+  }
+
+  void refine() {
+    if (!is_refining_due()) return;
+    point_ = {.pixel_error_factor = 1, .colour_bits = quality_.colour_bits};
+    apply();
+  }
+
+  // Brings what is demanded in line with quality, point, camera and scene.
+  void apply() {
     const float step = position_step_in_force(wanted_step_m_, scene_->suggested_position_step_m(), scene_->bounds());
     quality_.position_step_m = step;
     if (step != demand_.position_step_m || quality_.encoder_speed != demand_.encoder_speed) {
       demand_.position_step_m = step;
       demand_.encoder_speed = quality_.encoder_speed;
       ++demand_.geometry_epoch;
-      is_complete_due_ = true;
     }
-    if (quality_.colour_bits != demand_.colour_bits) {
-      demand_.colour_bits = quality_.colour_bits;
+    if (point_.colour_bits != demand_.colour_bits) {
+      demand_.colour_bits = point_.colour_bits;
       ++demand_.colour_epoch;
-      is_complete_due_ = true;
+    }
+    select();
+    if (head() != nullptr) is_complete_due_ = true;
+  }
+
+  void select() {
+    ++selection_count_;
+    for (const auto& slot : slots_) slot->is_wanted = false;
+    const auto selected = selected_tiles(tree_, camera_, quality_.pixel_error * point_.pixel_error_factor);
+    order_.clear();
+    for (const SelectedTile& tile : selected) {
+      const auto& slot = slots_[tile.node];
+      slot->is_wanted = true;
+      slot->is_target = tile.is_target;
+      slot->last_wanted = selection_count_;
+      order_.push_back(slot);
+    }
+    for (const auto& slot : slots_) {
+      if (!slot->is_wanted) put_down(*slot);
+    }
+    choose_previews(target_vertex_count(selected));
+    remove_surplus();
+    first_ = 0;
+  }
+
+  std::uint64_t target_vertex_count(const std::vector<SelectedTile>& selected) const {
+    std::uint64_t count = 0;
+    for (const SelectedTile& tile : selected) {
+      if (tile.is_target) count += tree_.nodes()[tile.node].tile->positions.size();
+    }
+    return count;
+  }
+
+  // The tops always; further levels as far as they cost little, unless everything arrives at once anyway.
+  void choose_previews(std::uint64_t target_vertices) {
+    const double bytes = static_cast<double>(target_vertices) * colour_cost_.bytes_per_vertex(demand_.colour_bits);
+    const double rate = window_.rate_bytes_per_s();
+    const bool is_quick = rate > 0 && bytes / rate * 1e3 <= quality_.latency_target_ms;
+    const double most = is_quick ? 0 : kPreviewShare * static_cast<double>(target_vertices);
+    double preview_vertices = 0;
+    std::size_t index = 0;
+    while (index < order_.size()) {
+      const auto level = order_[index]->tile->id.level;
+      std::size_t end = index;
+      for (; end < order_.size() && order_[end]->tile->id.level == level; ++end) {
+        if (!order_[end]->is_target) preview_vertices += static_cast<double>(order_[end]->tile->positions.size());
+      }
+      for (; index < end; ++index) {
+        order_[index]->is_preview = !tree_.nodes()[order_[index]->node].parent || preview_vertices <= most;
+      }
+    }
+  }
+
+  void remove_surplus() {
+    std::uint64_t held_vertices = 0;
+    std::vector<Slot*> unused;
+    for (const auto& slot : slots_) {
+      held_vertices += slot->held_vertex_count;
+      if (!slot->is_wanted && slot->held_vertex_count > 0) unused.push_back(slot.get());
+    }
+    if (held_vertices <= kMostHeldVertices) return;
+    std::sort(unused.begin(), unused.end(),
+              [](const Slot* a, const Slot* b) { return a->last_wanted < b->last_wanted; });
+    for (Slot* slot : unused) {
+      if (held_vertices <= kMostHeldVertices) break;
+      held_vertices -= slot->held_vertex_count;
+      remove_from_viewer(*slot);
     }
   }
 
@@ -355,8 +517,52 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   bool is_satisfied(const Slot& slot) const {
     if (slot.failed_geometry_epoch == demand_.geometry_epoch) return true;
-    if (slot.held_geometry_epoch != demand_.geometry_epoch) return false;
-    return slot.held_colour_epoch == demand_.colour_epoch || slot.failed_colour_epoch == demand_.colour_epoch;
+    if (slot.held_geometry_epoch == demand_.geometry_epoch &&
+        (slot.held_colour_epoch == demand_.colour_epoch || slot.failed_colour_epoch == demand_.colour_epoch)) {
+      return true;
+    }
+    return !slot.is_target && !slot.is_preview && is_drawable(slot) && are_children_drawable(slot);
+  }
+
+  static bool is_drawable(const Slot& slot) { return slot.held_geometry_epoch != 0 && slot.held_colour_epoch != 0; }
+
+  bool are_children_drawable(const Slot& slot) const {
+    const auto& children = tree_.nodes()[slot.node].children;
+    return std::all_of(children.begin(), children.end(),
+                       [this](std::size_t child) { return is_drawable(*slots_[child]); });
+  }
+
+  // What the viewer draws by the REPLACE rule, and the largest error in it.
+  void add_accuracy(StreamStats& stats) const {
+    const auto& nodes = tree_.nodes();
+    std::vector<char> is_covered(nodes.size(), 0);  // By itself or by its children.
+    const auto is_replaced = [&](std::size_t index) {
+      const auto& children = nodes[index].children;
+      return !children.empty() &&
+             std::all_of(children.begin(), children.end(), [&](std::size_t child) { return is_covered[child] != 0; });
+    };
+    for (std::size_t index = nodes.size(); index-- > 0;) {
+      is_covered[index] = is_drawable(*slots_[index]) || is_replaced(index) ? 1 : 0;
+    }
+    std::vector<char> is_passed(nodes.size(), 0);  // Its children are drawn in its place.
+    for (std::size_t index = 0; index < nodes.size(); ++index) {
+      const ViewTree::Node& node = nodes[index];
+      if (is_covered[index] == 0 || (node.parent && is_passed[*node.parent] == 0)) continue;
+      if (is_replaced(index)) {
+        is_passed[index] = 1;
+        continue;
+      }
+      if (camera_ && !may_be_in_view(*camera_, node.bounds)) continue;
+      const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+      // Each of three axes may be off by half a step.
+      const double rounding_m = static_cast<double>(demand_.position_step_m) / 2 * std::sqrt(3.0);
+      stats.position_mm = std::max(stats.position_mm, (error_m + rounding_m) * 1e3);
+      if (camera_) {
+        const double pixels =
+            std::min(screen_error(*camera_, node.bounds, error_m), static_cast<double>(camera_->viewport[1]));
+        stats.pixel_error = std::max(stats.pixel_error, pixels);
+      }
+    }
   }
 
   // The first tile that is not as it should be; null when there is none, or no settings yet.
@@ -367,12 +573,13 @@ class Stream final : public ViewerStream, public CacheWaiter {
   }
 
   bool is_complete() {
-    return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && removed_.empty() && head() == nullptr;
+    return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && removed_.empty() && head() == nullptr &&
+           !is_refining_due();
   }
 
   bool has_news() {
     if (!subscribed_) return false;
-    if (!removed_.empty() || is_complete()) return true;
+    if (!removed_.empty() || is_complete() || (head() == nullptr && is_refining_due())) return true;
     const Slot* slot = head();
     return slot != nullptr && slot->work == Slot::Work::Ready;
   }
@@ -388,7 +595,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // One step of a slot towards Ready: the encoding that the caller has to do for it now, or nothing.
   std::optional<Encoding> advance(const std::shared_ptr<Slot>& slot) {
-    if (!is_wanted(*slot)) return std::nullopt;
+    if (!is_needed(*slot)) return std::nullopt;
     Encoding encoding{slot, slot->tile, demand_};
     auto geometry = cache_->claim_geometry(encoding.geometry_key(), weak_waiter());
     switch (geometry.kind) {
@@ -427,7 +634,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   std::optional<Encoding> advance_after(const Encoding& done) {
     Slot& slot = *done.slot;
     slot.work = Slot::Work::Idle;
-    if (!is_wanted(slot)) return std::nullopt;
+    if (!is_needed(slot)) return std::nullopt;
     if (done.demand.geometry_epoch == demand_.geometry_epoch) {
       if (done.made_geometry) return advance_colours({done.slot, done.tile, demand_}, done.made_geometry);
       if (done.made_colours && done.demand.colour_epoch == demand_.colour_epoch) {
@@ -439,7 +646,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
     return advance(done.slot);
   }
 
-  bool is_wanted(const Slot& slot) const { return !slot.gone && !closed_ && subscribed_ && !is_satisfied(slot); }
+  bool is_needed(const Slot& slot) const {
+    return !closed_ && subscribed_ && !slot.is_gone && slot.is_wanted && !is_satisfied(slot);
+  }
 
   bool may_start(std::size_t index) const {
     const Slot& slot = *order_[index];
@@ -481,27 +690,29 @@ class Stream final : public ViewerStream, public CacheWaiter {
     return std::shared_ptr<CacheWaiter>(shared_from_this(), static_cast<CacheWaiter*>(this));
   }
 
-  std::optional<OutgoingFrame> given_out(TileFrameHeader header, Payload payload) {
+  OutgoingFrame given_out(TileFrameHeader header, Payload payload, double now_s) {
     header.sequence = ++last_sequence_;
     header.payload_size_bytes = payload ? static_cast<std::uint32_t>(payload->size()) : 0;
     OutgoingFrame frame{protocol::encoded_header(header), std::move(payload)};
-    window_.on_sent(header.sequence, frame.size_bytes());
+    window_.on_sent(header.sequence, frame.size_bytes(), now_s);
     return frame;
   }
 
   static std::size_t frame_size(const Payload& payload) { return protocol::kTileFrameHeaderSize + payload->size(); }
 
-  static TileFrameHeader header_of(const Tile& tile, FrameKind kind, const EncodedTile& geometry) {
-    return {.kind = kind,
-            .child_mask = tile.child_mask,
-            .tile = tile.id,
-            .revision = geometry.revision,
-            .vertex_count = static_cast<std::uint32_t>(geometry.input_of_decoded.size()),
-            .origin_m = geometry.origin_m,
-            .position_step_m = geometry.position_step_m,
-            .geometric_error_m = tile.geometric_error_m,
-            .lowest_celsius = tile.lowest_celsius,
-            .highest_celsius = tile.highest_celsius};
+  static TileFrameHeader header_of(const Slot& slot, FrameKind kind) {
+    TileFrameHeader header;
+    header.kind = kind;
+    header.child_mask = slot.tile->child_mask;
+    header.tile = slot.tile->id;
+    header.revision = slot.held_name;
+    header.vertex_count = static_cast<std::uint32_t>(slot.geometry->input_of_decoded.size());
+    header.origin_m = slot.geometry->origin_m;
+    header.position_step_m = slot.geometry->position_step_m;
+    header.geometric_error_m = slot.tile->geometric_error_m;
+    header.lowest_celsius = slot.tile->lowest_celsius;
+    header.highest_celsius = slot.tile->highest_celsius;
+    return header;
   }
 
   // Without the lock: a job, on a worker.
@@ -579,14 +790,18 @@ class Stream final : public ViewerStream, public CacheWaiter {
   bool subscribed_ = false;
   bool is_complete_due_ = false;
   std::shared_ptr<const SceneSnapshot> scene_;
-  std::map<TileId, std::shared_ptr<Slot>> slots_;
-  std::vector<std::shared_ptr<Slot>> order_;
-  std::size_t first_ = 0;  // Everything in order_ before it is satisfied.
+  ViewTree tree_;
+  std::vector<std::shared_ptr<Slot>> slots_;  // Of each node of the tree.
+  std::vector<std::shared_ptr<Slot>> order_;  // The wanted ones, as they are to be sent.
+  std::size_t first_ = 0;                     // Everything in order_ before it is satisfied.
   std::deque<TileFrameHeader> removed_;
   StreamQuality quality_;
   float wanted_step_m_ = 0;
   std::optional<Camera> camera_;
+  QualityPoint point_;
+  ColourCost colour_cost_;
   Demand demand_;
+  std::uint64_t selection_count_ = 0;
   std::uint32_t generation_ = 0;
   std::uint32_t last_sequence_ = 0;
   SendingWindow window_;

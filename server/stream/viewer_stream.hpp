@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "fusion/fusion_plan.hpp"
@@ -17,6 +18,10 @@
 namespace spectra::server {
 
 /// The knobs of PROTOCOL quality.set, as in force.
+///
+/// In automatic mode colour_bits and pixel_error are what a viewer gets in the end. Each change of the settings is first
+/// answered at the finest point of a frontier (coarser colours, then larger pixel errors) that is expected to arrive
+/// within latency_target_ms at the measured rate; when that is delivered and nothing newer has come, the rest follows.
 struct StreamQuality {
   bool automatic = false;
   float position_step_m = 0;  ///< Always a lattice_step(); 0 = the scene's suggestion.
@@ -59,9 +64,15 @@ struct StreamStats {
   std::uint64_t queued_bytes = 0;
   std::uint64_t skipped_frames = 0;
   std::uint64_t failed_tiles = 0;  ///< Tiles that could not be encoded; the log names them.
-  double position_mm = 0;
-  int colour_levels = 256;
-  double pixel_error = 0;
+  double position_mm = 0;          ///< The accuracy of what the viewer can draw now: largest distance to the full mesh,
+  int colour_levels = 256;         ///< levels per channel, and
+  double pixel_error = 0;          ///< the largest distance in pixels within the view; 0 before the first camera.
+};
+
+/// A tile that a viewer still has from an earlier connection.
+struct ResumedTile {
+  protocol::TileId tile;
+  std::uint32_t revision = 0;
 };
 
 /// Encoded geometry and colours, each made once and shared by every viewer with the same need; bounded in bytes, the
@@ -97,15 +108,21 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
   virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
 
-  /// Starts sending; `in_flight_bytes` 0 = our choice.
+  /// Starts sending; `in_flight_bytes` bounds the window, 0 = our choice (which is also the largest).
   virtual void subscribe(std::size_t in_flight_bytes) = 0;
   virtual void unsubscribe() = 0;
+
+  /// Called before subscribe(): geometry that the viewer says it holds. What is still current is not sent again (its
+  /// colours are), what is not is replaced, and what is gone is removed. Safe on untrusted input: a false claim spoils
+  /// only the picture of the viewer who makes it.
+  virtual void resume(std::span<const ResumedTile> tiles) = 0;
 
   /// A plan made (on a worker) for the current scene; returns the generation its colours will carry, from 1.
   virtual std::uint32_t set_plan(fusion::FusionPlan plan) = 0;
   virtual std::uint32_t generation() const = 0;
   virtual void set_quality(const StreamQuality& quality) = 0;
   virtual const StreamQuality& quality() const = 0;
+  /// Chooses the tiles: see selected_tiles(). A camera that makes no sense (not finite, no direction) is ignored.
   virtual void set_camera(const Camera& camera) = 0;
 
   /// stream.ack; a sequence that was never sent, or an older one than before, is ignored. `now_s` is a steady clock.
@@ -114,7 +131,9 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// The next frame the window lets through, or nothing now. Sequence numbers rise by one.
   virtual std::optional<OutgoingFrame> next_frame(double now_s) = 0;
 
-  /// Once after everything of the newest generation has been given out by next_frame().
+  /// Once after everything that the newest settings, quality, camera and scene ask for has been given out by
+  /// next_frame(). The counts are of the tiles that show the newest generation; a tile whose place is taken by its
+  /// children may be left with older colours until it is needed again.
   virtual std::optional<StreamComplete> take_complete() = 0;
 
   virtual StreamStats stats() const = 0;

@@ -1,0 +1,28 @@
+#include "server/stream/quality_frontier.hpp"
+
+#include <algorithm>
+
+namespace spectra::server {
+namespace {
+
+constexpr std::array<QualityPoint, 8> kFrontier{{{1, 8}, {1, 7}, {1, 6}, {2, 6}, {2, 5}, {4, 5}, {8, 5}, {8, 4}}};
+constexpr std::size_t kFewestVerticesToLearnFrom = 1000;  // Below, the frame is mostly its fixed part.
+constexpr double kLearningRate = 0.1;
+
+}  // namespace
+
+std::span<const QualityPoint> quality_frontier() {
+  return kFrontier;
+}
+
+void ColourCost::learn(int colour_bits, std::size_t vertex_count, std::size_t payload_bytes) {
+  if (vertex_count < kFewestVerticesToLearnFrom) return;
+  double& known = bytes_per_vertex_[static_cast<std::size_t>(std::clamp(colour_bits, 4, 8))];
+  known += kLearningRate * (static_cast<double>(payload_bytes) / static_cast<double>(vertex_count) - known);
+}
+
+double ColourCost::bytes_per_vertex(int colour_bits) const {
+  return bytes_per_vertex_[static_cast<std::size_t>(std::clamp(colour_bits, 4, 8))];
+}
+
+}  // namespace spectra::server

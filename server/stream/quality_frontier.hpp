@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace spectra::server {
+
+/// One way to answer a change of the settings: how coarse the tiles, how coarse their colours.
+struct QualityPoint {
+  double pixel_error_factor = 1;  ///< Times the pixel error that the viewer wants in the end.
+  int colour_bits = 8;            ///< At most what the viewer wants in the end.
+  friend bool operator==(const QualityPoint&, const QualityPoint&) = default;
+};
+
+/// From full quality to the least that still helps; each point costs fewer bytes than the one before. Colours lose bits
+/// first: six bits are hard to tell from eight and save a third, while a doubled pixel error is seen at edges.
+std::span<const QualityPoint> quality_frontier();
+
+/// Bytes of a colour frame per vertex, for each number of colour bits; learnt from the frames that are sent, starting from
+/// what a scanned outdoor scene needs.
+class ColourCost {
+ public:
+  void learn(int colour_bits, std::size_t vertex_count, std::size_t payload_bytes);
+  double bytes_per_vertex(int colour_bits) const;
+
+ private:
+  std::array<double, 9> bytes_per_vertex_{0, 0, 0, 0, 0.45, 0.70, 1.14, 1.45, 1.78};
+};
+
+}  // namespace spectra::server

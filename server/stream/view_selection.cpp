@@ -1,0 +1,168 @@
+#include "server/stream/view_selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+namespace spectra::server {
+namespace {
+
+using protocol::TileId;
+
+constexpr double kViewMargin = 1.1;
+
+struct Vector {
+  double x = 0, y = 0, z = 0;
+};
+
+Vector vector_of(const fusion::Vec3f& v) {
+  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+Vector operator-(const Vector& a, const Vector& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+Vector operator+(const Vector& a, const Vector& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+Vector operator*(const Vector& a, double factor) {
+  return {a.x * factor, a.y * factor, a.z * factor};
+}
+double dot(const Vector& a, const Vector& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+Vector cross(const Vector& a, const Vector& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+double length(const Vector& a) {
+  return std::sqrt(dot(a, a));
+}
+
+double half_height_tangent(const Camera& camera) {
+  return std::tan(camera.fov_y_deg * std::numbers::pi / 360);
+}
+
+// How far the box reaches along a direction, from the eye; negative when all of it lies behind.
+double reach(const Vector& direction, const Vector& eye, const Bounds& bounds) {
+  const Vector low = vector_of(bounds.min) - eye;
+  const Vector high = vector_of(bounds.max) - eye;
+  return std::max(direction.x * low.x, direction.x * high.x) + std::max(direction.y * low.y, direction.y * high.y) +
+         std::max(direction.z * low.z, direction.z * high.z);
+}
+
+bool is_finite(const fusion::Vec3f& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+void extend(Bounds& bounds, const Bounds& by) {
+  for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+    bounds.min.*axis = std::min(bounds.min.*axis, by.min.*axis);
+    bounds.max.*axis = std::max(bounds.max.*axis, by.max.*axis);
+  }
+}
+
+}  // namespace
+
+ViewTree::ViewTree(const SceneSnapshot& scene) {
+  std::map<TileId, std::size_t> node_of;
+  for (const auto& tile : scene.tiles()) {
+    if (tile->positions.empty()) continue;
+    node_of.emplace(tile->id, nodes_.size());
+    nodes_.push_back({.tile = tile, .bounds = tile->bounds, .parent = std::nullopt, .children = {}});
+  }
+  for (std::size_t index = 0; index < nodes_.size(); ++index) {
+    TileId id = nodes_[index].tile->id;
+    while (id.level > 0) {
+      id = {static_cast<std::uint8_t>(id.level - 1), id.x / 2, id.y / 2, id.z / 2};
+      const auto found = node_of.find(id);
+      if (found == node_of.end()) continue;
+      nodes_[index].parent = found->second;
+      nodes_[found->second].children.push_back(index);
+      break;
+    }
+  }
+  for (std::size_t index = nodes_.size(); index-- > 0;) {
+    if (nodes_[index].parent) extend(nodes_[*nodes_[index].parent].bounds, nodes_[index].bounds);
+  }
+}
+
+bool is_usable(const Camera& camera) {
+  return is_finite(camera.eye) && is_finite(camera.target) && is_finite(camera.up) &&
+         length(vector_of(camera.target) - vector_of(camera.eye)) > 0 && camera.fov_y_deg > 0 &&
+         camera.fov_y_deg < 180 && camera.viewport[0] > 0 && camera.viewport[1] > 0;
+}
+
+double screen_error(const Camera& camera, const Bounds& bounds, double geometric_error_m) {
+  if (!(geometric_error_m > 0)) return 0;
+  double squared = 0;
+  for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+    const auto eye = static_cast<double>(camera.eye.*axis);
+    const double outside =
+        std::max({0.0, static_cast<double>(bounds.min.*axis) - eye, eye - static_cast<double>(bounds.max.*axis)});
+    squared += outside * outside;
+  }
+  if (squared == 0) return std::numeric_limits<double>::infinity();
+  return geometric_error_m * camera.viewport[1] / (2 * half_height_tangent(camera) * std::sqrt(squared));
+}
+
+bool may_be_in_view(const Camera& camera, const Bounds& bounds) {
+  const Vector eye = vector_of(camera.eye);
+  Vector forward = vector_of(camera.target) - eye;
+  forward = forward * (1 / length(forward));
+  Vector right = cross(forward, vector_of(camera.up));
+  if (length(right) < 1e-6) right = cross(forward, std::abs(forward.x) < 0.9 ? Vector{1, 0, 0} : Vector{0, 1, 0});
+  right = right * (1 / length(right));
+  const Vector up = cross(right, forward);
+  const double tangent_y = kViewMargin * half_height_tangent(camera);
+  const double tangent_x = tangent_y * camera.viewport[0] / camera.viewport[1];
+  return reach(forward, eye, bounds) >= 0 && reach(forward * tangent_x + right, eye, bounds) >= 0 &&
+         reach(forward * tangent_x - right, eye, bounds) >= 0 && reach(forward * tangent_y + up, eye, bounds) >= 0 &&
+         reach(forward * tangent_y - up, eye, bounds) >= 0;
+}
+
+std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera,
+                                         double pixel_error) {
+  struct Candidate {
+    SelectedTile tile;
+    int level;
+    int error_octave;
+    double highest_celsius;
+    auto key() const { return std::tuple(level, !tile.is_in_view, -error_octave, -highest_celsius, tile.node); }
+  };
+  const auto& nodes = tree.nodes();
+  std::vector<char> is_refined(nodes.size(), 0);
+  std::vector<Candidate> candidates;
+  for (std::size_t index = 0; index < nodes.size(); ++index) {
+    const ViewTree::Node& node = nodes[index];
+    if (node.parent && is_refined[*node.parent] == 0) continue;
+    const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+    const bool is_in_view = !camera || may_be_in_view(*camera, node.bounds);
+    const double error = camera ? screen_error(*camera, node.bounds, error_m) : error_m;
+    const bool refine = !node.children.empty() && is_in_view && (!camera || error > pixel_error);
+    is_refined[index] = refine ? 1 : 0;
+    // What is seen while this tile is missing is its parent, with the parent's error.
+    double missing_error = std::numeric_limits<double>::infinity();
+    if (node.parent) {
+      const auto parent_error_m = static_cast<double>(nodes[*node.parent].tile->geometric_error_m);
+      missing_error = camera ? screen_error(*camera, node.bounds, parent_error_m) : parent_error_m;
+    }
+    const int octave = missing_error > 0 && std::isfinite(missing_error) ? std::ilogb(missing_error)
+                       : missing_error > 0                               ? std::numeric_limits<int>::max()
+                                                                         : -std::numeric_limits<int>::max();
+    const auto celsius = static_cast<double>(node.tile->highest_celsius);
+    candidates.push_back({.tile = {.node = index, .is_target = !refine, .is_in_view = is_in_view},
+                          .level = node.tile->id.level,
+                          .error_octave = octave,
+                          .highest_celsius = std::isnan(celsius) ? -std::numeric_limits<double>::infinity() : celsius});
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.key() < b.key(); });
+  std::vector<SelectedTile> selected;
+  selected.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) selected.push_back(candidate.tile);
+  return selected;
+}
+
+}  // namespace spectra::server

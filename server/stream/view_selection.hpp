@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "server/scene/scene_snapshot.hpp"
+#include "server/stream/viewer_stream.hpp"
+
+namespace spectra::server {
+
+/// The tiles of a snapshot with their ties: who replaces whom. Tiles without vertices are left out; a tile's parent is
+/// its nearest ancestor that is there.
+class ViewTree {
+ public:
+  struct Node {
+    std::shared_ptr<const Tile> tile;
+    Bounds bounds;  ///< Of everything beneath, too.
+    std::optional<std::size_t> parent;
+    std::vector<std::size_t> children;
+  };
+
+  ViewTree() = default;
+  explicit ViewTree(const SceneSnapshot& scene);
+
+  /// Coarse before fine.
+  const std::vector<Node>& nodes() const { return nodes_; }
+
+ private:
+  std::vector<Node> nodes_;
+};
+
+/// A tile that a viewer needs.
+struct SelectedTile {
+  std::size_t node = 0;
+  bool is_target = false;  ///< To be drawn in the end; otherwise it stands in for its children until all are there.
+  bool is_in_view = true;
+};
+
+/// The tiles that a camera asks for, in sending order: coarse before fine; of one level those in view before others,
+/// then by how much their lack is seen (in octaves of the error on the screen), and among equals the hottest first.
+///
+/// A tile is refined when it may be in view (the field of view widened by a tenth) and its geometric error, seen from
+/// the nearest point of its bounds, covers more than `pixel_error` pixels. All children of a refined tile are needed,
+/// also those out of view, because a client replaces a tile only by all of its children. Without a camera every tile is
+/// needed.
+std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error);
+
+/// Error on the screen, in pixels, of a geometric error within `bounds`; infinite when the eye is inside.
+double screen_error(const Camera& camera, const Bounds& bounds, double geometric_error_m);
+
+/// False when nothing within `bounds` can be in view, the field of view widened by a tenth.
+bool may_be_in_view(const Camera& camera, const Bounds& bounds);
+
+/// A camera that selected_tiles() can use: finite, with a direction, a viewport and a field of view between 0 and 180.
+bool is_usable(const Camera& camera);
+
+}  // namespace spectra::server

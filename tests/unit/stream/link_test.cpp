@@ -1,0 +1,139 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <iostream>
+
+#include "fake_scene.hpp"
+#include "fusion/mesh/ply_reader.hpp"
+#include "simulated_link.hpp"
+
+namespace spectra::server {
+namespace {
+
+using protocol::FrameKind;
+using testing::LinkSpeed;
+using testing::plan_with_alpha;
+using testing::SimulatedLink;
+
+constexpr LinkSpeed kRadio{5e6 / 8, 0.1};
+constexpr double kDrag_s = 3;
+constexpr int kChangesPerSecond = 30;
+
+/// What came of a slider that was dragged for three seconds after the whole scene had arrived.
+struct Drag {
+  double worst_lag_s = 0;       ///< How old, at any moment, the first setting not yet seen on the coarse picture was.
+  double settle_s = 0;          ///< From the last change to the arrival of its last frame.
+  std::size_t final_bytes = 0;  ///< Of the last generation.
+  std::size_t coarse_count = 0;
+  std::size_t most_in_flight_bytes = 0;
+};
+
+Drag dragged(const std::shared_ptr<const SceneSnapshot>& scene, LinkSpeed speed, StreamQuality quality = {}) {
+  FrameCache cache(256u << 20);
+  WorkerPool pool(2);
+  SimulatedLink link(scene, cache, pool, speed);
+  link.stream().set_quality(quality);
+  link.stream().subscribe(0);
+  link.stream().set_plan(plan_with_alpha(*scene, 0));
+  link.run();
+  EXPECT_TRUE(link.completed_s.contains(1));
+  link.arrivals.clear();
+  link.most_in_flight_bytes = 0;
+
+  // Changes are numbered by their generation; the first of the drag is 2. A change takes half a round trip to arrive.
+  const double start_s = link.now_s() + 1;
+  constexpr int kChanges = static_cast<int>(kDrag_s * kChangesPerSecond);
+  const auto made_s = [&](std::uint32_t generation) {
+    return start_s + static_cast<double>(generation - 2) / kChangesPerSecond;
+  };
+  for (int i = 0; i < kChanges; ++i) {
+    link.at(made_s(static_cast<std::uint32_t>(i) + 2) + speed.round_trip_s / 2,
+            [&link, &scene, i] { link.stream().set_plan(plan_with_alpha(*scene, 0.01 * (i + 1))); });
+  }
+  link.run();
+
+  Drag drag;
+  drag.most_in_flight_bytes = link.most_in_flight_bytes;
+  constexpr std::uint32_t kLast = kChanges + 1;
+  const auto root = scene->tiles().front()->id;
+  std::uint32_t shown = 1;
+  std::map<protocol::TileId, std::uint32_t> generation_of;
+  for (const auto& arrival : link.arrivals) {
+    EXPECT_EQ(arrival.header.kind, FrameKind::Colours);
+    EXPECT_GT(arrival.header.generation, generation_of[arrival.header.tile]) << "an older generation over a newer";
+    generation_of[arrival.header.tile] = arrival.header.generation;
+    if (arrival.header.generation == kLast) {
+      drag.final_bytes += arrival.size_bytes;
+      drag.settle_s = arrival.at_s - made_s(kLast);
+    }
+    if (arrival.header.tile == root) {
+      // Just before this arrival the picture lacked every change after `shown`.
+      drag.worst_lag_s = std::max(drag.worst_lag_s, arrival.at_s - made_s(shown + 1));
+      shown = arrival.header.generation;
+      ++drag.coarse_count;
+    }
+  }
+  EXPECT_EQ(shown, kLast);
+  EXPECT_TRUE(link.completed_s.contains(kLast));
+  return drag;
+}
+
+/// Three levels of tiles of `side` x `side` vertices: 1, 4 and 16.
+std::shared_ptr<const SceneSnapshot> three_level_scene(int side) {
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  for (std::uint8_t level = 0; level < 3; ++level) {
+    const auto count = 1u << level;
+    for (std::uint32_t y = 0; y < count; ++y) {
+      for (std::uint32_t x = 0; x < count; ++x) {
+        auto tile = testing::patch_tile({level, x, y, 0}, side, static_cast<int>(y * count + x), 20);
+        // Noise that no predictor sees through.
+        std::uint32_t state = 12'345 + level * 64U + y * 8 + x;
+        for (auto& colour : tile->visible) {
+          state = state * 1'664'525 + 1'013'904'223;
+          colour = {static_cast<std::uint8_t>(100 + (state >> 28)), static_cast<std::uint8_t>(100 + (state >> 20) % 16),
+                    static_cast<std::uint8_t>(100 + (state >> 12) % 16)};
+        }
+        tile->child_mask = level < 2 ? 0x0f : 0;
+        tile->geometric_error_m = level == 0 ? 0.2F : level == 1 ? 0.05F : 0;
+        tiles.push_back(std::move(tile));
+      }
+    }
+  }
+  return testing::scene_of(std::move(tiles));
+}
+
+void report(const char* name, const Drag& drag, LinkSpeed speed) {
+  std::cout << name << ": worst lag " << drag.worst_lag_s * 1e3 << " ms, " << drag.coarse_count
+            << " coarse pictures, settled after " << drag.settle_s * 1e3 << " ms, ideal "
+            << (static_cast<double>(drag.final_bytes) / speed.bytes_per_s + speed.round_trip_s) * 1e3 << " ms for "
+            << drag.final_bytes << " bytes, at most " << drag.most_in_flight_bytes << " in flight\n";
+}
+
+void expect_bars(const Drag& drag, LinkSpeed speed) {
+  EXPECT_LE(drag.worst_lag_s, 0.4);
+  EXPECT_LE(drag.settle_s, 1.25 * static_cast<double>(drag.final_bytes) / speed.bytes_per_s + speed.round_trip_s);
+}
+
+TEST(RadioLink, ADraggedSliderIsFollowedAndSettlesAtTheRateOfTheLink) {
+  const auto scene = three_level_scene(128);
+  const Drag drag = dragged(scene, kRadio);
+  report("5 Mbit/s, 100 ms", drag, kRadio);
+  expect_bars(drag, kRadio);
+  EXPECT_GE(drag.coarse_count, 10U);
+}
+
+TEST(RadioLink, TheRealSceneIsFollowedToo) {
+  const char* folder = std::getenv("SPECTRA_TEST_DATA");
+  if (folder == nullptr) GTEST_SKIP() << "SPECTRA_TEST_DATA names no folder with the real scenes";
+  auto read = fusion::read_ply(std::string(folder) + "/arco_castle_1m.ply");
+  ASSERT_TRUE(read.has_value());
+  WorkerPool pool(2);
+  const auto scene = SceneSnapshot::build(std::move(read.value().mesh), 1, pool, 32'000, LevelsOfDetail::All);
+  const Drag drag = dragged(scene, kRadio);
+  report("arco_castle_1m", drag, kRadio);
+  expect_bars(drag, kRadio);
+}
+
+}  // namespace
+}  // namespace spectra::server
