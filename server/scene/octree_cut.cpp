@@ -259,7 +259,9 @@ void choose_halvings(std::vector<CellCut>& cuts, std::vector<Chunk>& chunks, std
     }
     for (std::size_t c = 0; c < cuts.size(); ++c) {
       if (cuts[c].groups.size() > 1) continue;
-      cuts[c].groups = octant_groups(sums[c], leaf_vertex_count, has_triangles, attempt == 2);
+      // Not all of them may become one again.
+      const std::uint64_t most = std::min(leaf_vertex_count, cuts[c].cell.owned_count / 2);
+      cuts[c].groups = octant_groups(sums[c], most, has_triangles, attempt == 2);
     }
   }
 }
@@ -376,12 +378,14 @@ Bounds bounds_of(std::span<const fusion::Vec3f> positions) {
   return bounds;
 }
 
-OctreeCut octree_cut(const fusion::MultispectralMesh& mesh, std::uint32_t leaf_vertex_count, WorkerPool& pool) {
+OctreeCut octree_cut(const fusion::MultispectralMesh& mesh, std::uint32_t leaf_vertex_count, WorkerPool& pool,
+                     std::uint32_t root_vertex_count) {
   OctreeCut result;
   result.elements[0] = cut_elements(mesh, pool);
   if (result.elements[0].empty()) return result;
 
   const auto is_leaf = [&](const Cell& cell) {
+    if (cell.id.level == 0 && cell.owned_count > root_vertex_count) return false;
     return 4 * cell.owned_count <= 5 * std::uint64_t{leaf_vertex_count} || cell.id.level >= kDeepestLevel;
   };
   unsigned current = 0;

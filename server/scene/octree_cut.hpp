@@ -44,8 +44,9 @@ struct OctreeCut {
 /// where nothing separates them). A cell is halved in the middle along its long axes; where outliers or coincident points
 /// make that useless, at the medians. Octants are joined with their neighbours as long as they stay within
 /// `leaf_vertex_count`, and those with less than a quarter of it always; every leaf of a scene with triangles has a triangle.
-/// The same for any number of threads.
-OctreeCut octree_cut(const fusion::MultispectralMesh& mesh, std::uint32_t leaf_vertex_count, WorkerPool& pool);
+/// A scene of more than `root_vertex_count` vertices is cut in any case. The same for any number of threads.
+OctreeCut octree_cut(const fusion::MultispectralMesh& mesh, std::uint32_t leaf_vertex_count, WorkerPool& pool,
+                     std::uint32_t root_vertex_count = std::numeric_limits<std::uint32_t>::max());
 
 /// Copies a leaf out of the mesh, along a space-filling curve (it sorts the leaf's elements). Thread-safe for different
 /// leaves.

@@ -2,11 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <list>
 #include <mutex>
 #include <utility>
 
 #include "server/scene/octree_cut.hpp"
+#include "server/scene/surface.hpp"
+#include "server/scene/tile_tree.hpp"
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace spectra::server {
 namespace {
@@ -15,19 +22,6 @@ using fusion::Vec3f;
 
 std::span<const float> owned_temperature(const Tile& tile) {
   return std::span(tile.temperature_celsius).first(tile.owned_count);
-}
-
-double squared_distance(const Vec3f& a, const Vec3f& b) {
-  const double dx = static_cast<double>(a.x) - static_cast<double>(b.x);
-  const double dy = static_cast<double>(a.y) - static_cast<double>(b.y);
-  const double dz = static_cast<double>(a.z) - static_cast<double>(b.z);
-  return dx * dx + dy * dy + dz * dz;
-}
-
-double squared_distance(const Vec3f& p, const Bounds& bounds) {
-  return squared_distance(
-      p, Vec3f{std::clamp(p.x, bounds.min.x, bounds.max.x), std::clamp(p.y, bounds.min.y, bounds.max.y),
-               std::clamp(p.z, bounds.min.z, bounds.max.z)});
 }
 
 /// Histograms of a scene by number of bins, each made when first asked for. Keeps the last few, because a slider may
@@ -138,10 +132,27 @@ LeafFacts leaf_facts(const Tile& leaf) {
   return facts;
 }
 
+/// Building needs for moments several times what stays. Left alone, glibc raises the size from which it gives freed memory
+/// back to the system as blocks of that size are freed, and keeps 64 MB a thread for good.
+class FreedMemoryGoesBack {
+ public:
+  FreedMemoryGoesBack() {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+    mallopt(M_TRIM_THRESHOLD, 8 << 20);
+#endif
+  }
+  ~FreedMemoryGoesBack() {
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+  }
+};
+
 class TiledSnapshot final : public SceneSnapshot {
  public:
   TiledSnapshot(fusion::MultispectralMesh mesh, std::uint32_t revision, WorkerPool& pool,
-                std::uint32_t leaf_vertex_count)
+                std::uint32_t leaf_vertex_count, LevelsOfDetail levels)
       : name_(mesh.name),
         revision_(revision),
         vertex_count_(mesh.vertex_count()),
@@ -151,12 +162,17 @@ class TiledSnapshot final : public SceneSnapshot {
         has_visible_(mesh.has_visible),
         has_temperature_(mesh.has_temperature),
         double_positions_(mesh.double_positions) {
-    std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(mesh), pool, leaf_vertex_count);
+    std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(mesh), pool, leaf_vertex_count, levels);
     std::vector<LeafFacts> facts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
-    tiles_.assign(leaves.begin(), leaves.end());
-    leaves_ = tiles_;
+    leaves_.assign(leaves.begin(), leaves.end());
     gather(std::move(facts));
+    if (levels == LevelsOfDetail::All) {
+      const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius()};
+      tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool);
+    } else {
+      tiles_ = leaves_;
+    }
   }
 
   const std::string& name() const override { return name_; }
@@ -177,7 +193,8 @@ class TiledSnapshot final : public SceneSnapshot {
     if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) return {};
     std::vector<std::pair<double, const Tile*>> by_distance;
     by_distance.reserve(leaves_.size());
-    for (const auto& leaf : leaves_) by_distance.emplace_back(squared_distance(position, leaf->bounds), leaf.get());
+    for (const auto& leaf : leaves_)
+      by_distance.emplace_back(squared_distance_to_box(position, leaf->bounds), leaf.get());
     std::sort(by_distance.begin(), by_distance.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     const Tile* best_tile = nullptr;
     std::size_t best_vertex = 0;
@@ -237,12 +254,35 @@ class TiledSnapshot final : public SceneSnapshot {
  private:
   /// The mesh is freed on return, before anything else is made of the leaves.
   static std::vector<std::shared_ptr<Tile>> cut_leaves(fusion::MultispectralMesh mesh, WorkerPool& pool,
-                                                       std::uint32_t leaf_vertex_count) {
+                                                       std::uint32_t leaf_vertex_count, LevelsOfDetail levels) {
     const fusion::MultispectralMesh consumed = std::move(mesh);
-    const OctreeCut cut = octree_cut(consumed, std::max(1u, leaf_vertex_count), pool);
+    const OctreeCut cut = octree_cut(consumed, std::max(1u, leaf_vertex_count), pool,
+                                     levels == LevelsOfDetail::All ? root_vertex_count(leaf_vertex_count)
+                                                                   : std::numeric_limits<std::uint32_t>::max());
     std::vector<std::shared_ptr<Tile>> leaves(cut.leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { leaves[i] = leaf_tile(consumed, cut.leaves[i]); });
     return leaves;
+  }
+
+  /// 20,000 of 32,000: with 32,000 vertices geometry and colours of a noisy scene would be more than a first picture should
+  /// cost.
+  static std::uint32_t root_vertex_count(std::uint32_t leaf_vertex_count) {
+    return std::max(1u, leaf_vertex_count / 8 * 5);
+  }
+
+  /// Of all finite temperatures, the lower one of an even number; NaN without any.
+  float median_celsius() const {
+    std::vector<float> finite;
+    finite.reserve(static_cast<std::size_t>(temperature_.summary.finite_count));
+    for (const auto& leaf : leaves_) {
+      for (const float t : owned_temperature(*leaf)) {
+        if (std::isfinite(t)) finite.push_back(t);
+      }
+    }
+    if (finite.empty()) return std::numeric_limits<float>::quiet_NaN();
+    const auto middle = finite.begin() + static_cast<std::ptrdiff_t>((finite.size() - 1) / 2);
+    std::nth_element(finite.begin(), middle, finite.end());
+    return *middle;
   }
 
   void gather(std::vector<LeafFacts> facts) {
@@ -295,8 +335,10 @@ class TiledSnapshot final : public SceneSnapshot {
 }  // namespace
 
 std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::MultispectralMesh mesh, std::uint32_t revision,
-                                                          WorkerPool& pool, std::uint32_t leaf_vertex_count) {
-  return std::make_shared<TiledSnapshot>(std::move(mesh), revision, pool, leaf_vertex_count);
+                                                          WorkerPool& pool, std::uint32_t leaf_vertex_count,
+                                                          LevelsOfDetail levels) {
+  const FreedMemoryGoesBack scope;
+  return std::make_shared<TiledSnapshot>(std::move(mesh), revision, pool, leaf_vertex_count, levels);
 }
 
 }  // namespace spectra::server

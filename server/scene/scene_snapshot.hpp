@@ -55,6 +55,12 @@ struct Extreme {
   float temperature_celsius = 0;
 };
 
+/// Which tiles a snapshot has.
+enum class LevelsOfDetail {
+  LeavesOnly,  ///< The full mesh alone.
+  All,         ///< Coarser tiles above it too, up to the root.
+};
+
 /// An immutable scene, cut into tiles; shared by pointer, readers never lock. The histogram is computed once for each number
 /// of bins, when first asked for (thread-safe).
 class SceneSnapshot {
@@ -63,7 +69,8 @@ class SceneSnapshot {
   /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
   /// for any number of threads. Must not be called from a job of the pool.
   static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
-                                                    WorkerPool& pool, std::uint32_t leaf_vertex_count = 32'000);
+                                                    WorkerPool& pool, std::uint32_t leaf_vertex_count = 32'000,
+                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly);
   virtual ~SceneSnapshot() = default;
 
   virtual const std::string& name() const = 0;

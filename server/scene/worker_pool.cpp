@@ -105,6 +105,7 @@ WorkerPool::~WorkerPool() {
     state_->closing = true;
     dropped.swap(state_->waiting);
   }
+  dropped.clear();
   state_->wake.notify_all();
   for (std::thread& thread : state_->threads) thread.join();
 }

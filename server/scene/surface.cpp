@@ -1,0 +1,257 @@
+#include "server/scene/surface.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "server/scene/octree_cut.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::Triangle;
+using fusion::Vec3f;
+
+struct Vector {
+  double x = 0, y = 0, z = 0;
+};
+
+Vector operator-(const Vec3f& a, const Vec3f& b) {
+  return {static_cast<double>(a.x) - static_cast<double>(b.x), static_cast<double>(a.y) - static_cast<double>(b.y),
+          static_cast<double>(a.z) - static_cast<double>(b.z)};
+}
+
+double dot(const Vector& a, const Vector& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+Vector cross(const Vector& a, const Vector& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+double squared_distance_to_segment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
+  const Vector ab = b - a, ap = p - a;
+  const double length = dot(ab, ab);
+  const double s = length > 0 ? std::clamp(dot(ap, ab) / length, 0.0, 1.0) : 0;
+  const Vector rest{ap.x - s * ab.x, ap.y - s * ab.y, ap.z - s * ab.z};
+  return dot(rest, rest);
+}
+
+Vec3f mean(std::span<const Vec3f> points) {
+  Vector sum;
+  for (const Vec3f& p : points) {
+    sum.x += static_cast<double>(p.x);
+    sum.y += static_cast<double>(p.y);
+    sum.z += static_cast<double>(p.z);
+  }
+  const auto count = static_cast<double>(points.size());
+  return {static_cast<float>(sum.x / count), static_cast<float>(sum.y / count), static_cast<float>(sum.z / count)};
+}
+
+/// The largest distance seen; looks closer only at points that would raise it.
+class LargestDistance {
+ public:
+  explicit LargestDistance(const Surface& surface) : surface_(surface) {}
+
+  void add(const Vec3f& p, std::span<const std::uint32_t> starts) {
+    double squared = std::numeric_limits<double>::infinity();
+    for (const std::uint32_t start : starts) {
+      squared = std::min(squared, surface_.squared_distance_near(p, start, largest_squared_));
+      if (squared <= largest_squared_) return;
+    }
+    // Where the walk got stuck its bound is too large; few points set a record, and those may cost more.
+    if (exact_count_ < kMostExact) {
+      ++exact_count_;
+      squared = surface_.squared_distance_anywhere(p, largest_squared_, squared);
+    }
+    largest_squared_ = std::max(largest_squared_, squared);
+  }
+
+  double metres() const { return std::sqrt(largest_squared_); }
+
+ private:
+  static constexpr int kMostExact = 1000;
+
+  const Surface& surface_;
+  double largest_squared_ = 0;
+  int exact_count_ = 0;
+};
+
+}  // namespace
+
+double squared_distance(const Vec3f& a, const Vec3f& b) {
+  const Vector d = a - b;
+  return dot(d, d);
+}
+
+double squared_distance_to_box(const Vec3f& p, const Bounds& box) {
+  return squared_distance(p, Vec3f{std::clamp(p.x, box.min.x, box.max.x), std::clamp(p.y, box.min.y, box.max.y),
+                                   std::clamp(p.z, box.min.z, box.max.z)});
+}
+
+double squared_distance_to_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const Vector ab = b - a, ac = c - a, ap = p - a;
+  const Vector normal = cross(ab, ac);
+  const double area = dot(normal, normal);
+  if (area > 0) {
+    const double of_c = dot(cross(ab, ap), normal);
+    const double of_b = dot(cross(ap, ac), normal);
+    if (of_b >= 0 && of_c >= 0 && of_b + of_c <= area) {
+      const double height = dot(ap, normal);
+      return height * height / area;
+    }
+  }
+  return std::min({squared_distance_to_segment(p, a, b), squared_distance_to_segment(p, b, c),
+                   squared_distance_to_segment(p, c, a)});
+}
+
+Surface::Surface(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
+    : positions_(positions), triangles_(triangles), offsets_(positions.size() + 1), around_(3 * triangles.size()) {
+  for (const Triangle& triangle : triangles) {
+    for (const std::uint32_t v : triangle) ++offsets_[v];
+  }
+  std::uint32_t sum = 0;
+  for (std::uint32_t& offset : offsets_) offset = sum += offset;
+  // Filled from behind, each offset walks down to the beginning of its range.
+  for (std::size_t t = triangles.size(); t-- > 0;) {
+    for (const std::uint32_t v : triangles[t]) around_[--offsets_[v]] = static_cast<std::uint32_t>(t);
+  }
+  block_bounds_.reserve(triangles.size() / kBlockSize + 1);
+  std::vector<Vec3f> corners;
+  for (std::size_t begin = 0; begin < triangles.size(); begin += kBlockSize) {
+    corners.clear();
+    for (const Triangle& t : triangles.subspan(begin, std::min(kBlockSize, triangles.size() - begin))) {
+      for (const std::uint32_t v : t) corners.push_back(positions[v]);
+    }
+    block_bounds_.push_back(bounds_of(corners));
+  }
+}
+
+double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, double enough) const {
+  constexpr std::size_t kMostTriangles = 64;  // of a vertex; a hub of thousands would make this quadratic
+  constexpr std::size_t kMostSteps = 12;
+  std::array<std::uint32_t, kMostSteps> visited{};
+  double best = std::numeric_limits<double>::infinity();
+  std::uint32_t best_triangle = kNone;
+  std::uint32_t vertex = start;
+  for (std::size_t step = 0; step < kMostSteps; ++step) {
+    visited[step] = vertex;
+    const double before = best;
+    const auto around = triangles_around(vertex);
+    for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles))) {
+      const Triangle& triangle = triangles_[t];
+      const double squared =
+          squared_distance_to_triangle(p, positions_[triangle[0]], positions_[triangle[1]], positions_[triangle[2]]);
+      if (squared < best) {
+        best = squared;
+        best_triangle = t;
+        if (best <= enough) return best;
+      }
+    }
+    if (!(best < before)) break;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const std::uint32_t v : triangles_[best_triangle]) {
+      const double squared = squared_distance(p, positions_[v]);
+      const auto end = visited.begin() + static_cast<std::ptrdiff_t>(step) + 1;
+      if (squared < nearest && std::find(visited.begin(), end, v) == end) {
+        nearest = squared;
+        vertex = v;
+      }
+    }
+    if (std::isinf(nearest)) break;
+  }
+  return best;
+}
+
+double Surface::squared_distance_anywhere(const Vec3f& p, double enough, double at_most) const {
+  double best = at_most;
+  for (std::size_t block = 0; block < block_bounds_.size() && best > enough; ++block) {
+    if (squared_distance_to_box(p, block_bounds_[block]) >= best) continue;
+    const std::size_t begin = block * kBlockSize;
+    for (const Triangle& t : triangles_.subspan(begin, std::min(kBlockSize, triangles_.size() - begin))) {
+      best = std::min(best, squared_distance_to_triangle(p, positions_[t[0]], positions_[t[1]], positions_[t[2]]));
+    }
+  }
+  return best;
+}
+
+std::vector<std::uint32_t> Surface::nearest_seeds(const std::vector<bool>& is_seed) const {
+  std::vector<std::uint32_t> seed_of(positions_.size(), kNone);
+  std::vector<std::uint32_t> edges_away(positions_.size(), 0);
+  std::vector<std::uint32_t> queue;
+  queue.reserve(positions_.size());
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (!is_seed[v]) continue;
+    seed_of[v] = v;
+    queue.push_back(v);
+  }
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    const std::uint32_t v = queue[next];
+    for (const std::uint32_t t : triangles_around(v)) {
+      for (const std::uint32_t w : triangles_[t]) {
+        if (seed_of[w] == kNone) {
+          seed_of[w] = seed_of[v];
+          edges_away[w] = edges_away[v] + 1;
+          queue.push_back(w);
+        } else if (edges_away[w] == edges_away[v] + 1 && seed_of[w] != seed_of[v] &&
+                   squared_distance(positions_[w], positions_[seed_of[v]]) <
+                       squared_distance(positions_[w], positions_[seed_of[w]])) {
+          seed_of[w] = seed_of[v];
+        }
+      }
+    }
+  }
+  return seed_of;
+}
+
+std::vector<bool> Surface::open_vertices() const {
+  std::vector<bool> is_open(positions_.size());
+  std::vector<std::pair<std::uint32_t, int>> edges;
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    edges.clear();
+    for (const std::uint32_t t : triangles_around(v)) {
+      const Triangle& triangle = triangles_[t];
+      const unsigned corner = triangle[0] == v ? 0 : triangle[1] == v ? 1 : 2;
+      edges.emplace_back(triangle[(corner + 1) % 3], 1);
+      edges.emplace_back(triangle[(corner + 2) % 3], -1);
+    }
+    std::sort(edges.begin(), edges.end());
+    for (std::size_t i = 0; i < edges.size();) {
+      const std::uint32_t other = edges[i].first;
+      int balance = 0;
+      for (; i < edges.size() && edges[i].first == other; ++i) balance += edges[i].second;
+      if (balance != 0) is_open[v] = is_open[other] = true;
+    }
+  }
+  return is_open;
+}
+
+double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
+                          std::span<const std::uint32_t> fine_of_coarse) {
+  const auto corners = [](const Surface& surface, const Triangle& triangle) {
+    return std::array{surface.positions()[triangle[0]], surface.positions()[triangle[1]],
+                      surface.positions()[triangle[2]]};
+  };
+  LargestDistance from_coarse(coarse);
+  for (std::size_t v = 0; v < fine.positions().size(); ++v) {
+    if (fine_of_coarse[coarse_of_fine[v]] != v) from_coarse.add(fine.positions()[v], {&coarse_of_fine[v], 1});
+  }
+  LargestDistance from_fine(fine);
+  for (const Triangle& triangle : fine.triangles()) {
+    const std::array starts{coarse_of_fine[triangle[0]], coarse_of_fine[triangle[1]], coarse_of_fine[triangle[2]]};
+    from_coarse.add(mean(corners(fine, triangle)), starts);
+  }
+  for (const Triangle& triangle : coarse.triangles()) {
+    const auto [a, b, c] = corners(coarse, triangle);
+    const std::array starts{fine_of_coarse[triangle[0]], fine_of_coarse[triangle[1]], fine_of_coarse[triangle[2]]};
+    for (const Vec3f& sample :
+         {mean(std::array{a, b, c}), mean(std::array{a, b}), mean(std::array{b, c}), mean(std::array{c, a})}) {
+      from_fine.add(sample, starts);
+    }
+  }
+  return std::max(from_coarse.metres(), from_fine.metres());
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fusion/vertex_types.hpp"
+#include "server/scene/scene_snapshot.hpp"
+
+namespace spectra::server {
+
+double squared_distance(const fusion::Vec3f& a, const fusion::Vec3f& b);
+
+/// Zero inside.
+double squared_distance_to_box(const fusion::Vec3f& p, const Bounds& box);
+
+/// To the triangle with its inside, degenerate or not. Exact to double rounding for any finite floats.
+double squared_distance_to_triangle(const fusion::Vec3f& p, const fusion::Vec3f& a, const fusion::Vec3f& b,
+                                    const fusion::Vec3f& c);
+
+/// Triangles over shared vertices, with the triangles around each vertex. Keeps references to what it is made of.
+class Surface {
+ public:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  Surface(std::span<const fusion::Vec3f> positions, std::span<const fusion::Triangle> triangles);
+
+  std::span<const fusion::Vec3f> positions() const { return positions_; }
+  std::span<const fusion::Triangle> triangles() const { return triangles_; }
+  std::span<const std::uint32_t> triangles_around(std::uint32_t vertex) const {
+    return std::span(around_).subspan(offsets_[vertex], offsets_[vertex + 1] - offsets_[vertex]);
+  }
+
+  /// An upper bound of the squared distance of `p`, from the triangles around `start` and, as long as that helps and the
+  /// bound is above `enough`, those around the vertices between there and `p`.
+  double squared_distance_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
+
+  /// The squared distance of `p` itself, or some bound that is not above `enough`. `at_most` is a bound that is known.
+  double squared_distance_anywhere(const fusion::Vec3f& p, double enough, double at_most) const;
+
+  /// For every vertex the seed that is fewest edges away (of several the nearest in space); kNone where no edges lead to one.
+  std::vector<std::uint32_t> nearest_seeds(const std::vector<bool>& is_seed) const;
+
+  /// Marks the vertices of edges that do not have as many triangles on one side as on the other.
+  std::vector<bool> open_vertices() const;
+
+ private:
+  static constexpr std::size_t kBlockSize = 32;
+
+  std::span<const fusion::Vec3f> positions_;
+  std::span<const fusion::Triangle> triangles_;
+  std::vector<std::uint32_t> offsets_;
+  std::vector<std::uint32_t> around_;
+  std::vector<Bounds> block_bounds_;  ///< Of kBlockSize triangles each: neighbours in the list are near each other.
+};
+
+/// The largest distance (metres) of points of one surface from the other, both ways, measured at the vertices, middles of
+/// edges and centroids. `coarse_of_fine` names a coarse vertex near each fine one, `fine_of_coarse` the fine vertex that
+/// each coarse one is.
+double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
+                          std::span<const std::uint32_t> fine_of_coarse);
+
+}  // namespace spectra::server
