@@ -32,7 +32,9 @@ Result<BlockFile> BlockFile::open(const std::filesystem::path& path) {
 }
 
 BlockFile::BlockFile(int descriptor, std::uint64_t size_bytes)
-    : descriptor_(descriptor), size_bytes_(size_bytes), buffer_(kBufferBytes) {}
+    : descriptor_(descriptor),
+      size_bytes_(size_bytes),
+      buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, size_bytes))) {}
 
 BlockFile::~BlockFile() {
   if (descriptor_ >= 0) ::close(descriptor_);

@@ -60,7 +60,6 @@ class PlyBodyReader {
   const PlyElement* element_ = nullptr;  ///< Being read, for messages.
   std::uint64_t entry_ = 0;
 
-  std::uint64_t block_first_vertex_ = 0;
   std::vector<Vec3d> positions_;
   std::array<std::vector<double>, 3> colour_values_;
   std::vector<Rgb8> colours_;

@@ -232,6 +232,11 @@ std::uint64_t PlyStream::triangle_count_limit() const {
   return std::min(face_count_, (file_.size_bytes() - header_.size_bytes) / triangle_bytes + 1);
 }
 
+bool PlyStream::has_faces_first() const {
+  const PlyElement* const faces = header_.find("face");
+  return faces != nullptr && faces < header_.find("vertex");
+}
+
 Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
   file_.seek(header_.size_bytes);
   PlyBodyReader reader(*this, handlers);

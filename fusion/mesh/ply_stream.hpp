@@ -60,6 +60,8 @@ class PlyStream {
   std::uint64_t triangle_count_limit() const;
   bool has_visible() const { return slot_properties_[kRed].has_value(); }
   bool has_temperature() const { return slot_properties_[kTemperature].has_value(); }
+  /// The faces stand before the vertices in the file, and are handed on in that order.
+  bool has_faces_first() const;
   /// Some coordinate is a double.
   bool has_double_positions() const { return has_double_positions_; }
 

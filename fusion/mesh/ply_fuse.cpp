@@ -1,0 +1,121 @@
+#include "fusion/mesh/ply_fuse.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/mesh/output_file.hpp"
+#include "fusion/mesh/ply_encoder.hpp"
+#include "fusion/mesh/ply_stream.hpp"
+#include "fusion/mesh/scene_origin.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// The first pass: what the fusion and the output's header must know of the whole.
+struct FirstPass {
+  PlyBodyFacts facts;
+  TemperatureSummary temperature;
+};
+
+Result<FirstPass> first_pass(PlyStream& stream) {
+  TemperatureAccumulator temperatures;
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    temperatures.add(block.temperature_celsius);
+    return success();
+  };
+  BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
+  return FirstPass{facts, temperatures.summary()};
+}
+
+/// The histogram of the file, by another pass over it; the pass's error, if any, is kept in `error`.
+Histogram file_histogram(PlyStream& stream, const TemperatureSummary& summary, std::uint32_t bins,
+                         std::optional<Error>& error) {
+  Histogram histogram;
+  histogram.minimum = summary.minimum;
+  histogram.maximum = summary.maximum;
+  histogram.counts.resize(bins);
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    add_to_histogram(block.temperature_celsius, histogram);
+    return success();
+  };
+  if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
+  return histogram;
+}
+
+/// The last pass: every block fused and written. What the file does not have is filled in as MultispectralMesh does.
+Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const FusionPlan& plan,
+                            PlyEncoder::Sink sink) {
+  PlyLayout layout;
+  layout.vertex_count = stream.vertex_count();
+  layout.triangle_count = facts.triangle_count;
+  layout.origin = scene_origin(facts.min, facts.max);
+  layout.double_positions = stream.has_double_positions();
+  layout.has_temperature = stream.has_temperature();
+  PlyEncoder encoder(layout, std::move(sink));
+
+  MultispectralMesh block_mesh;
+  std::vector<Rgb8> fused;
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    const std::size_t count = block.positions.size();
+    if (block_mesh.vertex_count() != count) block_mesh.resize_vertices(count);
+    fused.resize(count);
+    std::transform(block.positions.begin(), block.positions.end(), block_mesh.positions().begin(),
+                   [&layout](const Vec3d& position) { return relative_to(layout.origin, position); });
+    std::copy(block.visible.begin(), block.visible.end(), block_mesh.visible().begin());
+    std::copy(block.temperature_celsius.begin(), block.temperature_celsius.end(),
+              block_mesh.temperature_celsius().begin());
+    plan.fuse(block_mesh.temperature_celsius(), block_mesh.visible(), fused);
+    return encoder.vertices(block_mesh.positions(), fused, block_mesh.temperature_celsius());
+  };
+  handlers.triangles = [&](std::span<const Triangle> triangles) { return encoder.triangles(triangles); };
+  if (!stream.has_faces_first()) {
+    BOOST_OUTCOME_TRY(stream.read(handlers));
+  } else {
+    // The output has the vertices first.
+    BOOST_OUTCOME_TRY(stream.read({handlers.vertices, {}}));
+    BOOST_OUTCOME_TRY(stream.read({{}, handlers.triangles}));
+  }
+  return encoder.finish();
+}
+
+Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
+                            const FusionSettings& settings, const PaletteTable* palette) {
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in));
+  BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
+  std::optional<Error> histogram_error;
+  SceneTemperature scene;
+  scene.summary = pass.temperature;
+  scene.histogram = [&](std::uint32_t bins) { return file_histogram(stream, pass.temperature, bins, histogram_error); };
+  auto plan =
+      palette == nullptr ? FusionPlan::prepare(settings, scene) : FusionPlan::prepare(settings, scene, *palette);
+  if (histogram_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*histogram_error));
+  BOOST_OUTCOME_TRY(plan);
+
+  BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
+  BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(),
+                                   [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
+  BOOST_OUTCOME_TRY(file.commit());
+  return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.triangle_count,
+                   stream.notes(pass.facts)};
+}
+
+}  // namespace
+
+Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                           const FusionSettings& settings) {
+  return fuse_file(in, out, settings, nullptr);
+}
+
+Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                           const FusionSettings& settings, const PaletteTable& palette) {
+  return fuse_file(in, out, settings, &palette);
+}
+
+}  // namespace spectra::fusion
