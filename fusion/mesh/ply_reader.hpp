@@ -23,14 +23,23 @@ struct LoadedScene {
   std::vector<Note> notes;
 };
 
-/// Reads PLY (ascii, binary of both byte orders) with bounds on everything: safe on untrusted input; memory is bounded
-/// by a small multiple of the file's size. Accepts float or double x,y,z; red,green,blue or diffuse_*; temperature under
-/// the names temperature, temp, thermal, t, scalar_temperature in any case; polygons of any size (cut into triangle fans).
-/// Errors: FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue, Unsupported, each naming what and where.
+/// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file. Safe on untrusted input: every count is checked
+/// against the bytes that are there, and memory is bounded by a small multiple of the file's size.
+/// - Positions: x, y, z, float or double, finite. The mesh's origin is chosen as scene_origin.hpp says.
+/// - Visible colour: red, green, blue, or diffuse_red ..., or r, g, b, in any case; alpha is left out. uchar as it is, other
+///   whole-number types when the values are 0..255, float and double from 0..1 scaled (note "converted_colours").
+/// - Temperature in degC: float or double named temperature, temp, thermal, t or scalar_temperature, in any case and in
+///   this order of preference; t beside an s is a texture coordinate. Not finite, or beyond float: missing (NaN).
+/// - Faces: the list vertex_indices or vertex_index. Polygons are cut into fans from their first corner; triangles with a
+///   vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are kept.
+/// Everything else is skipped. What was cut, left out, converted or skipped is in the notes.
+/// Errors: FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;
+/// the message begins with the file's name and says what and where.
 Result<LoadedScene> read_ply(const std::filesystem::path& path);
 
 /// The same, and takes the temperature of a second file: same vertex count = same order, else the nearest thermal vertex
 /// within `join_distance_m` (0 = three times the median spacing of the thermal vertices); vertices without one are missing.
+/// The notes tell which of the two was done, how many vertices were joined, and how many were not reached.
 Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
                                           double join_distance_m = 0);
 
