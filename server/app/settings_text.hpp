@@ -14,11 +14,11 @@ namespace spectra::server {
 /// Fusion settings as a person writes them: on the command line and in the query of an export. What is absent has its
 /// default.
 struct SettingsText {
-  std::optional<std::string> method;
-  std::vector<std::pair<std::string, std::string>> params;  ///< name, value; a later one of the same name wins.
-  std::optional<std::string> palette;
-  std::optional<std::string> range;    ///< "auto" or "LO:HI", degC.
-  std::optional<std::string> missing;  ///< "visible" or "#rrggbb".
+  std::optional<std::string> method{};
+  std::vector<std::pair<std::string, std::string>> params{};  ///< name, value; a later one of the same name wins.
+  std::optional<std::string> palette{};
+  std::optional<std::string> range{};    ///< "auto" or "LO:HI", degC.
+  std::optional<std::string> missing{};  ///< "visible" or "#rrggbb".
 };
 
 /// The settings of the text, or an Error that names the field and what would be accepted.

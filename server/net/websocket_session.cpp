@@ -170,7 +170,7 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
     } else if (now - last_move >= limits.idle_timeout) {
       end(true, "it is silent");
     } else if (now >= close_deadline_) {
-      end(true, "it does not answer the close");
+      end(false, "the close was not finished in time");
     } else if (!closing_) {
       client_->ticked();
       if (!is_pinging_ && now - last_ping >= limits.ping_interval) {

@@ -1,0 +1,466 @@
+// The application's side of a viewer over real sockets: what is said and answered, on a small generated scene.
+#include "server/app/viewer_session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "protocol/draco_codec.hpp"
+#include "protocol/tile_frame.hpp"
+#include "server/app/http_api.hpp"
+#include "tests/integration/raw_client.hpp"
+#include "tests/integration/test_server.hpp"
+
+namespace spectra::tests {
+namespace {
+
+using nlohmann::json;
+using std::chrono::milliseconds;
+
+/// A wavy sheet of `side` x `side` vertices, warmer to the right; every 50th vertex has no temperature.
+fusion::MultispectralMesh sheet(std::uint32_t side, bool with_temperature = true) {
+  fusion::MultispectralMesh mesh;
+  mesh.name = "sheet";
+  mesh.has_visible = true;
+  mesh.has_temperature = with_temperature;
+  mesh.resize_vertices(std::size_t{side} * side);
+  for (std::uint32_t y = 0; y < side; ++y) {
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const std::size_t i = std::size_t{y} * side + x;
+      const auto u = static_cast<float>(x) / static_cast<float>(side);
+      const auto v = static_cast<float>(y) / static_cast<float>(side);
+      mesh.positions()[i] = {u, v, 0.05F * std::sin(9 * u)};
+      mesh.visible()[i] = {static_cast<std::uint8_t>(255 * v), 100, 50};
+      if (with_temperature) {
+        mesh.temperature_celsius()[i] = i % 50 == 0 ? std::numeric_limits<float>::quiet_NaN() : 15 + 20 * u;
+      }
+      if (x + 1 < side && y + 1 < side) {
+        const auto a = static_cast<std::uint32_t>(i);
+        mesh.triangles().push_back({a, a + 1, a + side});
+        mesh.triangles().push_back({a + 1, a + side + 1, a + side});
+      }
+    }
+  }
+  return mesh;
+}
+
+/// A client that speaks the protocol.
+class Viewer {
+ public:
+  explicit Viewer(std::uint16_t port) : socket_(port) {}
+
+  bool is_open() const { return socket_.is_open(); }
+  RawWebSocket& socket() { return socket_; }
+
+  /// Reads one message; frames are kept and acknowledged, texts returned.
+  std::optional<json> receive() {
+    for (;;) {
+      const auto message = socket_.receive();
+      if (!message) return std::nullopt;
+      if (message->opcode == 1) return json::parse(message->payload);
+      if (message->opcode == 9) socket_.send_frame(10, message->payload);
+      if (message->opcode == 2) take_frame(message->payload);
+    }
+  }
+
+  /// Reads until a notification of this method, keeping nothing else but frames.
+  std::optional<json> wait_for(const std::string& method) {
+    while (auto message = receive()) {
+      if (message->value("method", "") == method) return (*message)["params"];
+    }
+    return std::nullopt;
+  }
+
+  void send(const json& message) { socket_.send_text(message.dump()); }
+
+  /// Sends a request without waiting; returns its id.
+  int request(const std::string& method, const json& params = json::object()) {
+    send({{"jsonrpc", "2.0"}, {"id", ++last_id_}, {"method", method}, {"params", params}});
+    return last_id_;
+  }
+
+  /// The response to a request, with `result` or `error`.
+  json response(int id) {
+    while (auto message = receive()) {
+      if (message->contains("id") && (*message)["id"] == id) return *message;
+      if (message->contains("method")) notifications_[(*message)["method"]] = (*message)["params"];
+    }
+    return {};
+  }
+
+  json call(const std::string& method, const json& params = json::object()) {
+    return response(request(method, params));
+  }
+
+  /// The last params of a notification that came while a response was waited for.
+  json notification(const std::string& method) { return notifications_[method]; }
+
+  /// Subscribes and reads until everything is there.
+  json subscribe_and_complete() {
+    EXPECT_TRUE(call("scene.subscribe", {{"channels", {"fused"}}}).contains("result"));
+    return wait_for("stream.complete").value_or(json{});
+  }
+
+  /// Fused colours per tile, as decoded from the newest colour frame of each.
+  const std::map<protocol::TileId, std::vector<protocol::ColourBytes>>& colours() const { return colours_; }
+  std::size_t geometry_frames() const { return geometry_frames_; }
+  std::uint32_t newest_generation() const { return newest_generation_; }
+
+ private:
+  void take_frame(const std::string& bytes) {
+    const auto frame = protocol::decoded_frame(std::as_bytes(std::span(bytes))).value();
+    if (frame.header.kind == protocol::FrameKind::Geometry) ++geometry_frames_;
+    if (frame.header.kind == protocol::FrameKind::Colours) {
+      colours_[frame.header.tile] = protocol::decoded_colours(frame.payload).value();
+      EXPECT_GE(frame.header.generation, newest_generation_);
+      newest_generation_ = frame.header.generation;
+    }
+    EXPECT_EQ(frame.header.sequence, ++last_sequence_);
+    send({{"jsonrpc", "2.0"}, {"method", "stream.ack"}, {"params", {{"sequence", frame.header.sequence}}}});
+  }
+
+  RawWebSocket socket_;
+  int last_id_ = 0;
+  std::uint32_t last_sequence_ = 0;
+  std::size_t geometry_frames_ = 0;
+  std::uint32_t newest_generation_ = 0;
+  std::map<protocol::TileId, std::vector<protocol::ColourBytes>> colours_;
+  std::map<std::string, json> notifications_;
+};
+
+class ViewerSessionTest : public testing::Test {
+ protected:
+  explicit ViewerSessionTest() : served_(2, 64U << 20U), api_(served_) { start(quick_options()); }
+
+  void start(server::NetOptions options) {
+    options.limits.write_timeout = std::chrono::seconds(5);
+    const auto limits = options.limits;
+    server_ = std::make_unique<TestServer>(
+        std::move(options), [this](const auto& request, const auto& reply) { api_.handle(request, reply); },
+        [this, limits](const std::shared_ptr<server::ViewerPeer>& peer) {
+          return std::make_shared<server::ViewerSession>(peer, served_, limits);
+        });
+    api_.set_metrics(server_->metrics());
+  }
+  ~ViewerSessionTest() override { server_->stop(); }
+
+  void serve(fusion::MultispectralMesh mesh) { served_.scenes.replace(std::move(mesh), served_.pool); }
+  std::string get(const std::string& target) const {
+    return http_exchange(server_->port(),
+                         "GET " + target + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  }
+
+  std::unique_ptr<TestServer> server_;  // outlives the pool, whose jobs answer through it
+  server::ServedScene served_;
+  server::HttpApi api_;
+};
+
+TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
+  serve(sheet(60));
+  Viewer viewer(server_->port());
+  const auto message = viewer.receive();
+  ASSERT_TRUE(message);
+  EXPECT_EQ((*message)["method"], "hello");
+  const json hello = (*message)["params"];
+  EXPECT_EQ(hello["protocol"], "spectra.v1");
+  EXPECT_EQ(hello["scene"]["vertex_count"], 3600);
+  EXPECT_EQ(hello["scene"]["temperature"]["missing_count"], 72);
+  EXPECT_GE(hello["methods"].size(), 10U);
+  EXPECT_GE(hello["palettes"].size(), 15U);
+  EXPECT_EQ(hello["fusion"]["method"], "thermal_visible_blend");
+  EXPECT_EQ(hello["limits"]["max_message_bytes"], 65536);
+}
+
+TEST_F(ViewerSessionTest, ServesBeforeThereIsAScene) {
+  EXPECT_EQ(status_of(get("/healthz")), 200);
+  EXPECT_EQ(status_of(get("/readyz")), 503);
+  EXPECT_EQ(status_of(get("/api/v1/scene")), 503);
+  Viewer viewer(server_->port());
+  EXPECT_TRUE((*viewer.wait_for("hello"))["scene"].is_null());
+  EXPECT_EQ(viewer.call("scene.get")["error"]["code"], -32004);
+  EXPECT_EQ(viewer.call("scene.probe", {{"position", {0, 0, 0}}})["error"]["code"], -32004);
+  EXPECT_EQ(viewer.call("scene.histogram", {{"bins", 8}})["error"]["code"], -32004);
+  EXPECT_EQ(viewer.call("scene.extremes")["error"]["code"], -32004);
+  EXPECT_TRUE(viewer.call("scene.subscribe", {{"channels", {"fused"}}}).contains("result"));
+  EXPECT_TRUE(viewer.call("fusion.set", {{"method", "thermal_only"}}).contains("result"));
+
+  served_.progress.set("Reading it");
+  EXPECT_EQ((*viewer.wait_for("status"))["message"], "Reading it");
+  served_.progress.set(std::nullopt);
+  EXPECT_TRUE((*viewer.wait_for("status"))["message"].is_null());
+
+  serve(sheet(60));
+  EXPECT_EQ((*viewer.wait_for("scene.changed"))["scene"]["vertex_count"], 3600);
+  const auto changed = viewer.wait_for("fusion.changed");
+  ASSERT_TRUE(changed);
+  EXPECT_EQ((*changed)["fusion"]["method"], "thermal_only") << "what was chosen before holds";
+  EXPECT_EQ((*changed)["fusion"]["range"]["min"], 15);
+  EXPECT_TRUE(viewer.wait_for("stream.complete"));
+  EXPECT_EQ(status_of(get("/readyz")), 200);
+}
+
+TEST_F(ViewerSessionTest, SendsGeometryOnceAndColoursAfterEachChange) {
+  serve(sheet(120));
+  Viewer viewer(server_->port());
+  const auto first = viewer.subscribe_and_complete();
+  ASSERT_EQ(first["tiles"], viewer.colours().size());
+  const auto geometry_frames = viewer.geometry_frames();
+  EXPECT_GT(geometry_frames, 0U);
+
+  const auto set = viewer.call("fusion.set", {{"method", "thermal_only"}, {"palette", "turbo"}});
+  const auto generation = set["result"]["generation"];
+  const auto complete = viewer.wait_for("stream.complete");
+  ASSERT_TRUE(complete);
+  EXPECT_EQ((*complete)["generation"], generation);
+  EXPECT_EQ(viewer.newest_generation(), generation);
+  EXPECT_EQ(viewer.geometry_frames(), geometry_frames);
+}
+
+TEST_F(ViewerSessionTest, GivesEachViewerItsOwnSettings) {
+  serve(sheet(80));
+  Viewer one(server_->port());
+  Viewer two(server_->port());
+  one.subscribe_and_complete();
+  two.subscribe_and_complete();
+  const auto before = two.colours();
+  EXPECT_EQ(one.colours(), before);
+  ASSERT_TRUE(one.call("fusion.set", {{"method", "thermal_only"}}).contains("result"));
+  ASSERT_TRUE(one.wait_for("stream.complete"));
+  EXPECT_NE(one.colours(), before);
+  EXPECT_EQ(two.call("fusion.get")["result"]["fusion"]["method"], "thermal_visible_blend");
+  EXPECT_EQ(two.colours(), before);
+}
+
+TEST_F(ViewerSessionTest, AnswersEveryChangeInOrderWhileTheyCoalesce) {
+  serve(sheet(120));
+  Viewer viewer(server_->port());
+  viewer.subscribe_and_complete();
+  std::vector<int> ids;
+  for (int i = 0; i <= 100; ++i) ids.push_back(viewer.request("fusion.set", {{"params", {{"alpha", i / 100.0}}}}));
+  std::int64_t last_generation = 0;
+  for (const int id : ids) {
+    const auto response = viewer.response(id);
+    ASSERT_TRUE(response.contains("result")) << response;
+    EXPECT_GE(response["result"]["generation"], last_generation);
+    last_generation = response["result"]["generation"];
+  }
+  EXPECT_EQ(viewer.call("fusion.get")["result"]["fusion"]["params"]["alpha"], 1);
+  EXPECT_EQ(viewer.call("fusion.get")["result"]["generation"], last_generation);
+}
+
+TEST_F(ViewerSessionTest, ARefusedChangeAmongOthersChangesNothing) {
+  serve(sheet(40));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  const int good = viewer.request("fusion.set", {{"params", {{"alpha", 0.25}}}});
+  const int bad = viewer.request("fusion.set", {{"method", "thermal_only"}, {"palette", "no_such"}});
+  const int last = viewer.request("fusion.set", {{"palette", "turbo"}});
+  EXPECT_TRUE(viewer.response(good).contains("result"));
+  EXPECT_EQ(viewer.response(bad)["error"]["data"]["field"], "palette");
+  const auto fusion = viewer.response(last)["result"]["fusion"];
+  EXPECT_EQ(fusion["method"], "thermal_visible_blend");
+  EXPECT_EQ(fusion["params"]["alpha"], 0.25);
+  EXPECT_EQ(fusion["palette"], "turbo");
+}
+
+TEST_F(ViewerSessionTest, NamesTheFieldThatIsWrong) {
+  serve(sheet(40));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  struct Case {
+    const char* method;
+    json params;
+    const char* field;
+  };
+  const std::vector<Case> cases{
+      {"fusion.set", {{"method", "no_such"}}, "method"},
+      {"fusion.set", {{"method", 7}}, "method"},
+      {"fusion.set", {{"params", {{"alpha", 2}}}}, "params.alpha"},
+      {"fusion.set", {{"params", {{"alpha", "much"}}}}, "params.alpha"},
+      {"fusion.set", {{"params", {{"gamma", 1}}}}, "params.gamma"},
+      {"fusion.set", {{"palette", "no_such"}}, "palette"},
+      {"fusion.set", {{"range", {{"mode", "manual"}, {"min", 3}, {"max", 1}}}}, "range"},
+      {"fusion.set", {{"missing", "red"}}, "missing"},
+      {"scene.subscribe", {{"channels", {"temperature"}}}, "channels"},
+      {"scene.histogram", {{"bins", 0}}, "bins"},
+      {"scene.histogram", json::object(), "bins"},
+      {"scene.probe", {{"position", {1, 2}}}, "position"},
+      {"quality.set", {{"colour_bits", 3}}, "colour_bits"},
+      {"camera.set", {{"eye", {0, 0, 0}}}, "target"},
+      {"stream.ack", {{"sequence", -1}}, "sequence"},
+  };
+  for (const auto& [method, params, field] : cases) {
+    const auto response = viewer.call(method, params);
+    EXPECT_EQ(response["error"]["code"], -32602) << method << ' ' << params << ' ' << response;
+    EXPECT_TRUE(response["error"]["data"]["field"].get<std::string>().starts_with(field)) << response;
+    EXPECT_FALSE(response["error"]["data"]["reason"].get<std::string>().empty());
+  }
+  EXPECT_EQ(viewer.call("fusion.get")["result"]["fusion"]["params"]["alpha"], 0.5);
+}
+
+TEST_F(ViewerSessionTest, RefusesBadMessagesAndLivesOn) {
+  serve(sheet(40));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  const auto code_of = [&viewer](const std::string& text) -> json {
+    viewer.socket().send_text(text);
+    const auto answer = viewer.receive();
+    return answer ? (*answer)["error"]["code"] : json{};
+  };
+  EXPECT_EQ(code_of("this is not JSON"), -32700);
+  EXPECT_EQ(code_of(""), -32700);
+  EXPECT_EQ(code_of(std::string(60'000, '[')), -32700);
+  EXPECT_EQ(code_of(R"({"a":)" + std::string(20, '[') + std::string(20, ']') + "}"), -32700);
+  EXPECT_EQ(code_of(R"([{"jsonrpc":"2.0","id":1,"method":"fusion.get"}])"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"1.0","id":1,"method":"fusion.get"})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":{},"method":"fusion.get"})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":1})"), -32600);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":1,"method":"fusion.get","params":[]})"), -32602);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":1,"method":"no.such"})"), -32601);
+  viewer.socket().send_frame(2, "binary");
+  EXPECT_EQ((*viewer.receive())["error"]["code"], -32600);
+  EXPECT_TRUE(viewer.call("fusion.get").contains("result"));
+}
+
+TEST_F(ViewerSessionTest, LimitsTheRateOfRequests) {
+  auto options = quick_options();
+  options.limits.requests_per_s = 50;
+  options.limits.message_burst_s = 1;
+  start(std::move(options));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  std::vector<int> ids;
+  for (int i = 0; i < 200; ++i) ids.push_back(viewer.request("fusion.get"));
+  int busy = 0;
+  for (const int id : ids) {
+    const auto response = viewer.response(id);
+    if (response.contains("error")) {
+      EXPECT_EQ(response["error"]["code"], -32003);
+      ++busy;
+    }
+  }
+  EXPECT_GT(busy, 50);
+  EXPECT_LT(busy, 151);
+  std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_TRUE(viewer.call("fusion.get").contains("result"));
+}
+
+TEST_F(ViewerSessionTest, AnswersQuestionsAboutTheScene) {
+  serve(sheet(50));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  EXPECT_EQ(viewer.call("scene.get")["result"]["vertex_count"], 2500);
+
+  const auto histogram = viewer.call("scene.histogram", {{"bins", 10}})["result"];
+  EXPECT_EQ(histogram["edges"].size(), 11U);
+  std::uint64_t counted = 0;
+  for (const auto& count : histogram["counts"]) counted += count.get<std::uint64_t>();
+  EXPECT_EQ(counted, 2450U);
+
+  const auto probe = viewer.call("scene.probe", {{"position", {0.5, 0.5, 0}}})["result"];
+  EXPECT_EQ(probe["vertex_index"], 25 * 50 + 25);
+  EXPECT_TRUE(probe["temperature"].is_null()) << "every 50th vertex has none, this is one";
+  EXPECT_EQ(probe["fused"], probe["visible"]);
+
+  const auto extremes = viewer.call("scene.extremes")["result"];
+  EXPECT_GT(extremes["hottest"]["temperature"], extremes["coldest"]["temperature"]);
+
+  const auto quality = viewer.call("quality.set", {{"colour_bits", 6}, {"position_step_mm", 3}})["result"]["quality"];
+  EXPECT_EQ(quality["colour_bits"], 6);
+  EXPECT_LE(quality["position_step_mm"], 3);
+  EXPECT_GT(quality["position_step_mm"], 2);
+}
+
+TEST_F(ViewerSessionTest, WarnsWhenAMethodCannotShowWhatItShould) {
+  serve(sheet(40, false));
+  Viewer viewer(server_->port());
+  const auto status = viewer.wait_for("status");
+  ASSERT_TRUE(status);
+  EXPECT_EQ((*status)["id"], "no_temperature");
+  EXPECT_TRUE(viewer.call("fusion.get")["result"]["fusion"]["range"]["min"].is_null());
+  viewer.request("fusion.set", {{"method", "visible_only"}});
+  const auto cleared = viewer.wait_for("status");
+  ASSERT_TRUE(cleared);
+  EXPECT_TRUE((*cleared)["message"].is_null());
+
+  serve(sheet(40));
+  viewer.request("fusion.set", {{"method", "intensity_hue"}, {"palette", "white_hot"}});
+  const auto unsafe = viewer.wait_for("status");
+  ASSERT_TRUE(unsafe);
+  EXPECT_EQ((*unsafe)["id"], "palette_not_fusion_safe");
+}
+
+TEST_F(ViewerSessionTest, SendsStatisticsToASubscriber) {
+  serve(sheet(40));
+  Viewer viewer(server_->port());
+  viewer.subscribe_and_complete();
+  const auto stats = viewer.wait_for("stream.stats");
+  ASSERT_TRUE(stats);
+  EXPECT_EQ((*stats)["viewers"], 1);
+  EXPECT_EQ((*stats)["accuracy"]["colour_levels"], 256);
+}
+
+TEST_F(ViewerSessionTest, LivesThroughAChangeOfScene) {
+  serve(sheet(60));
+  Viewer viewer(server_->port());
+  viewer.subscribe_and_complete();
+  for (int i = 0; i < 5; ++i) {
+    serve(sheet(static_cast<std::uint32_t>(50 + 10 * i)));
+    ASSERT_TRUE(viewer.wait_for("scene.changed"));
+    ASSERT_TRUE(viewer.call("fusion.set", {{"params", {{"alpha", 0.1 * i}}}}).contains("result"));
+  }
+  const auto complete = viewer.wait_for("stream.complete");
+  ASSERT_TRUE(complete);
+}
+
+TEST_F(ViewerSessionTest, ADisconnectInMidstreamHarmsNobody) {
+  serve(sheet(250));
+  Viewer stays(server_->port());
+  for (int i = 0; i < 20; ++i) {
+    Viewer leaves(server_->port());
+    leaves.request("scene.subscribe", {{"channels", {"fused"}}});
+    leaves.request("fusion.set", {{"params", {{"alpha", 0.03 * i}}}});
+    leaves.socket().client().receive_some();
+  }
+  EXPECT_TRUE(stays.subscribe_and_complete().contains("tiles"));
+  EXPECT_TRUE(eventually([this] { return server_->metrics().viewers == 1; }));
+}
+
+TEST_F(ViewerSessionTest, ExportsTheSameAsItShows) {
+  serve(sheet(40));
+  const auto response = get("/api/v1/scene.ply?method=thermal_only&palette=turbo&range=10:40&missing=%23ff00ff");
+  EXPECT_EQ(status_of(response), 200);
+  const auto body = response.substr(response.find("\r\n\r\n") + 4);
+  EXPECT_TRUE(body.starts_with("ply\n"));
+  EXPECT_NE(body.find("element vertex 1600\n"), std::string::npos);
+  EXPECT_EQ(status_of(get("/api/v1/scene.glb")), 200);
+  EXPECT_EQ(status_of(get("/api/v1/scene.drc")), 200);
+  for (const auto* target : {"/api/v1/scene.ply?alpha=2", "/api/v1/scene.ply?method=x", "/api/v1/scene.ply?palette=x",
+                             "/api/v1/scene.ply?range=2:1", "/api/v1/scene.ply?range=1", "/api/v1/scene.ply?missing=1",
+                             "/api/v1/scene.ply?nothing=1"}) {
+    EXPECT_EQ(status_of(get(target)), 400) << target;
+  }
+  for (const auto* target :
+       {"/api/v1/scene.obj", "/api/v1/scene.", "/api/v1/", "/api/v1/scene.ply.ply", "/api/v2/scene"}) {
+    EXPECT_EQ(status_of(get(target)), 404) << target;
+  }
+}
+
+TEST_F(ViewerSessionTest, CountsForPrometheus) {
+  serve(sheet(40));
+  Viewer viewer(server_->port());
+  viewer.subscribe_and_complete();
+  const auto metrics = get("/metrics");
+  EXPECT_EQ(status_of(metrics), 200);
+  EXPECT_NE(metrics.find("\nspectra_viewers 1\n"), std::string::npos);
+  EXPECT_NE(metrics.find("\nspectra_scene_vertices 1600\n"), std::string::npos);
+  EXPECT_NE(metrics.find("\nprocess_open_fds "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace spectra::tests

@@ -1,0 +1,141 @@
+#include "server/app/fused_file.hpp"
+
+#include <gtest/gtest.h>
+#include <tiny_gltf.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "fusion/settings.hpp"
+
+namespace spectra::server {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+fusion::MultispectralMesh two_triangles() {
+  fusion::MultispectralMesh mesh;
+  mesh.name = "two";
+  mesh.has_visible = true;
+  mesh.has_temperature = true;
+  mesh.origin = {500'000.25, 4'000'000.5, 12};
+  mesh.resize_vertices(4);
+  const std::array<fusion::Vec3f, 4> positions{{{0, 0, 0}, {1, 0, -2}, {0, 3, 0}, {1, 1, 0}}};
+  const std::array<float, 4> temperatures{10, 20, kNaN, 30};
+  std::copy(positions.begin(), positions.end(), mesh.positions().begin());
+  std::copy(temperatures.begin(), temperatures.end(), mesh.temperature_celsius().begin());
+  mesh.triangles() = {{0, 1, 2}, {1, 3, 2}};
+  return mesh;
+}
+
+const std::vector<fusion::Rgb8> kColours{{1, 2, 3}, {4, 5, 6}, {250, 0, 255}, {7, 8, 9}};
+
+tinygltf::Model read_glb(const std::string& bytes) {
+  tinygltf::Model model;
+  tinygltf::TinyGLTF reader;
+  std::string error;
+  std::string warning;
+  const void* raw = bytes.data();
+  EXPECT_TRUE(reader.LoadBinaryFromMemory(&model, &error, &warning, static_cast<const unsigned char*>(raw),
+                                          static_cast<unsigned>(bytes.size())))
+      << error;
+  EXPECT_EQ(error + warning, "");
+  return model;
+}
+
+template <class T>
+std::vector<T> values_of(const tinygltf::Model& model, int accessor_index, std::size_t per_element) {
+  const auto& accessor = model.accessors.at(static_cast<std::size_t>(accessor_index));
+  const auto& view = model.bufferViews.at(static_cast<std::size_t>(accessor.bufferView));
+  std::vector<T> values(accessor.count * per_element);
+  std::memcpy(values.data(), model.buffers.at(0).data.data() + view.byteOffset, values.size() * sizeof(T));
+  return values;
+}
+
+TEST(SceneFileFormat, IsChosenByTheEnding) {
+  EXPECT_EQ(scene_file_format("a.ply"), SceneFileFormat::Ply);
+  EXPECT_EQ(scene_file_format("a.b.GLB"), SceneFileFormat::Glb);
+  EXPECT_EQ(scene_file_format("/x/y.drc"), SceneFileFormat::Draco);
+  for (const auto* name : {"", "ply", "a.obj", "a.ply.gz", "aply"}) EXPECT_FALSE(scene_file_format(name)) << name;
+}
+
+TEST(GlbFile, HoldsPositionsColoursTemperaturesAndTriangles) {
+  const auto mesh = two_triangles();
+  const auto model = read_glb(scene_file(mesh, kColours, SceneFileFormat::Glb).value());
+  ASSERT_EQ(model.meshes.size(), 1U);
+  const auto& primitive = model.meshes[0].primitives.at(0);
+  EXPECT_EQ(primitive.mode, TINYGLTF_MODE_TRIANGLES);
+  EXPECT_EQ(values_of<float>(model, primitive.attributes.at("POSITION"), 3),
+            (std::vector<float>{0, 0, 0, 1, 0, -2, 0, 3, 0, 1, 1, 0}));
+  const auto& position = model.accessors[static_cast<std::size_t>(primitive.attributes.at("POSITION"))];
+  EXPECT_EQ(position.minValues, (std::vector<double>{0, 0, -2}));
+  EXPECT_EQ(position.maxValues, (std::vector<double>{1, 3, 0}));
+  EXPECT_EQ(values_of<unsigned char>(model, primitive.attributes.at("COLOR_0"), 4),
+            (std::vector<unsigned char>{1, 2, 3, 255, 4, 5, 6, 255, 250, 0, 255, 255, 7, 8, 9, 255}));
+  EXPECT_TRUE(model.accessors[static_cast<std::size_t>(primitive.attributes.at("COLOR_0"))].normalized);
+  EXPECT_EQ(values_of<float>(model, primitive.attributes.at("_TEMPERATURE"), 1),
+            (std::vector<float>{10, 20, kGlbMissingCelsius, 30}));
+  EXPECT_EQ(values_of<std::uint32_t>(model, primitive.indices, 1), (std::vector<std::uint32_t>{0, 1, 2, 1, 3, 2}));
+  EXPECT_EQ(model.nodes.at(0).translation, (std::vector<double>{500'000.25, 4'000'000.5, 12}));
+}
+
+TEST(GlbFile, OfAPointCloudWithoutTemperatureHasPointsOnly) {
+  auto mesh = two_triangles();
+  mesh.triangles().clear();
+  mesh.has_temperature = false;
+  const auto model = read_glb(scene_file(mesh, kColours, SceneFileFormat::Glb).value());
+  const auto& primitive = model.meshes.at(0).primitives.at(0);
+  EXPECT_EQ(primitive.mode, TINYGLTF_MODE_POINTS);
+  EXPECT_EQ(primitive.indices, -1);
+  EXPECT_FALSE(primitive.attributes.contains("_TEMPERATURE"));
+}
+
+TEST(GlbFile, OfAnEmptySceneIsAFileAllTheSame) {
+  const fusion::MultispectralMesh empty;
+  const auto model = read_glb(scene_file(empty, {}, SceneFileFormat::Glb).value());
+  EXPECT_TRUE(model.meshes.empty());
+}
+
+TEST(SceneFile, IsTheSameOnDiskAndInMemory) {
+  const auto mesh = two_triangles();
+  for (const auto* name : {"a.ply", "a.glb", "a.drc"}) {
+    const auto format = *scene_file_format(name);
+    const auto path = std::filesystem::temp_directory_path() / ("spectra_fused_" + std::to_string(getpid()) + name);
+    ASSERT_TRUE(write_scene_file(path, mesh, kColours, format)) << name;
+    std::ifstream in(path, std::ios::binary);
+    const std::string on_disk(std::istreambuf_iterator<char>(in), {});
+    EXPECT_EQ(on_disk, scene_file(mesh, kColours, format).value()) << name;
+    std::filesystem::remove(path);
+  }
+}
+
+TEST(SceneFile, SaysWhereItCannotBeWritten) {
+  const auto written = write_scene_file("/no/such/folder/a.glb", two_triangles(), kColours, SceneFileFormat::Glb);
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().message.find("/no/such/folder"), std::string::npos);
+}
+
+TEST(TemperatureOfMesh, LeavesMissingValuesOut) {
+  const auto mesh = two_triangles();
+  const auto temperature = temperature_of(mesh);
+  EXPECT_EQ(temperature.summary.finite_count, 3U);
+  EXPECT_EQ(temperature.summary.missing_count, 1U);
+  EXPECT_EQ(temperature.histogram(2).counts, (std::vector<std::uint64_t>{1, 2}));
+}
+
+TEST(FusedColours, AreThePlansForEveryVertex) {
+  const auto mesh = two_triangles();
+  fusion::FusionChange change;
+  change.method = "visible_only";
+  const auto settings = fusion::with_change(fusion::default_settings(), change).value();
+  const auto plan = fusion::FusionPlan::prepare(settings, temperature_of(mesh)).value();
+  const auto colours = fused_colours(mesh, plan);
+  EXPECT_TRUE(std::equal(colours.begin(), colours.end(), mesh.visible().begin(), mesh.visible().end()));
+}
+
+}  // namespace
+}  // namespace spectra::server
