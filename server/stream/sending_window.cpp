@@ -5,7 +5,8 @@
 namespace spectra::server {
 namespace {
 
-constexpr double kRateMemoryRounds = 10;
+constexpr std::uint64_t kRateMemoryRounds = 10;
+constexpr double kRateMemory_s = 3;
 constexpr double kRoundTripMemory_s = 10;
 constexpr double kStartGain = 2;
 constexpr double kProbeGain = 1.25;
@@ -13,6 +14,7 @@ constexpr double kDrainGain = 0.75;
 constexpr std::uint64_t kProbePeriodRounds = 8;
 constexpr double kGrowthOfAStart = 1.25;
 constexpr int kRoundsToEndAStart = 3;
+constexpr std::uint64_t kRoundsToTrustTheRate = 2;
 constexpr double kShortestInterval_s = 1e-4;
 
 }  // namespace
@@ -25,7 +27,7 @@ std::size_t SendingWindow::size_bytes() const {
   double wanted = kInitialBytes;
   if (!rates_.empty() && !round_trips_.empty()) {
     wanted = gain() * rate_bytes_per_s() * shortest_round_trip_s() + static_cast<double>(largest_frame_bytes_);
-    if (is_starting_) wanted = std::max(wanted, static_cast<double>(kInitialBytes));
+    if (round_ < kRoundsToTrustTheRate) wanted = std::max(wanted, static_cast<double>(kInitialBytes));
   }
   wanted = std::max(wanted, static_cast<double>(kFloorBytes));
   return static_cast<std::size_t>(std::min(wanted, static_cast<double>(ceiling_bytes_)));
@@ -41,6 +43,10 @@ void SendingWindow::on_sent(std::uint32_t sequence, std::size_t size_bytes, doub
   in_flight_bytes_ += size_bytes;
   // The largest of recent frames, slowly forgotten.
   largest_frame_bytes_ = std::max(size_bytes, largest_frame_bytes_ - largest_frame_bytes_ / 64);
+}
+
+void SendingWindow::on_overtaken() {
+  calm_until_bytes_ = delivered_bytes_ + in_flight_bytes_ + 1;
 }
 
 void SendingWindow::on_idle() {
@@ -72,16 +78,17 @@ void SendingWindow::take_rate_sample(const Sent& sent, double now_s) {
   const double rate = static_cast<double>(delivered_bytes_ - sent.delivered_bytes) / interval_s;
   if (sent.is_idle_sample && rate < rate_bytes_per_s()) return;
   while (!rates_.empty() && rates_.back().value <= rate) rates_.pop_back();
-  const auto round = static_cast<double>(round_);
-  rates_.push_back({rate, round});
-  while (rates_.front().at + kRateMemoryRounds < round) rates_.pop_front();
+  rates_.push_back({rate, now_s, round_});
+  while (rates_.front().round + kRateMemoryRounds < round_ || rates_.front().at_s + kRateMemory_s < now_s) {
+    rates_.pop_front();
+  }
 }
 
 void SendingWindow::take_round_trip_sample(const Sent& sent, double now_s) {
   last_round_trip_s_ = std::max(now_s - sent.sent_s, kShortestInterval_s);
   while (!round_trips_.empty() && round_trips_.back().value >= last_round_trip_s_) round_trips_.pop_back();
-  round_trips_.push_back({last_round_trip_s_, now_s});
-  while (round_trips_.front().at + kRoundTripMemory_s < now_s) round_trips_.pop_front();
+  round_trips_.push_back({last_round_trip_s_, now_s, round_});
+  while (round_trips_.front().at_s + kRoundTripMemory_s < now_s) round_trips_.pop_front();
 }
 
 void SendingWindow::end_round() {
@@ -101,6 +108,7 @@ double SendingWindow::shortest_round_trip_s() const {
 }
 
 double SendingWindow::gain() const {
+  if (delivered_bytes_ < calm_until_bytes_) return 1;
   if (is_starting_) return kStartGain;
   switch (round_ % kProbePeriodRounds) {
     case 0:

@@ -10,15 +10,15 @@ namespace spectra::server {
 ///
 /// The window follows the link, in the manner of BBR. Each acknowledgement gives a sample of the delivery rate (bytes
 /// acknowledged since the frame was sent, over the time they took) and of the round trip. The rate in force is the largest
-/// sample of the last ten round trips; samples taken while there was too little to send count only when they are larger.
+/// sample of the last ten round trips, at most three seconds; samples taken while there was too little to send count only when they are larger.
 /// The round trip in force is the smallest of the last ten seconds; it contains the time that the frame itself takes on
 /// the link. The window is one bandwidth-delay product and one frame. At first, as long as each round trip brings a
 /// quarter more than the one before, it is twice the product; later every eighth round trip probes with a quarter more,
-/// and the next one drains what that has queued. It stays between a floor and a ceiling, and never starves: a frame larger
+/// and the next one takes a quarter less. It stays between a floor and a ceiling, and never starves: a frame larger
 /// than the window goes when nothing else is on its way.
 class SendingWindow {
  public:
-  static constexpr std::size_t kInitialBytes = 128u << 10;
+  static constexpr std::size_t kInitialBytes = 64u << 10;
   static constexpr std::size_t kFloorBytes = 16u << 10;
   static constexpr std::size_t kDefaultCeilingBytes = 4u << 20;
 
@@ -32,6 +32,10 @@ class SendingWindow {
 
   /// There is room, but nothing to send: what is measured from here on says nothing about the link.
   void on_idle();
+
+  /// What is on its way is outdated: until it has arrived, a short queue matters more than a faster link, and nothing is
+  /// probed.
+  void on_overtaken();
 
   /// Everything up to `sequence` has arrived. False, and nothing happens, for a sequence that was never sent or is
   /// acknowledged already.
@@ -53,7 +57,8 @@ class SendingWindow {
   };
   struct Sample {
     double value;
-    double at;  // Round (rate) or second (round trip).
+    double at_s;
+    std::uint64_t round;
   };
 
   void take_rate_sample(const Sent& sent, double now_s);
@@ -69,7 +74,8 @@ class SendingWindow {
   std::uint64_t delivered_bytes_ = 0;
   double delivered_s_ = 0;
   std::uint64_t idle_until_bytes_ = 0;  // Frames sent before this much is delivered measure an idle link.
-  std::uint64_t round_end_bytes_ = 0;   // The round ends when this much is delivered.
+  std::uint64_t calm_until_bytes_ = 0;
+  std::uint64_t round_end_bytes_ = 0;  // The round ends when this much is delivered.
   std::uint64_t round_ = 0;
   std::deque<Sample> rates_;        // Falling values, rising rounds: the front is the largest.
   std::deque<Sample> round_trips_;  // Rising values, rising times: the front is the smallest.

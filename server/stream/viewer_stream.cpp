@@ -30,10 +30,6 @@ using protocol::TileId;
 // enough that a viewer who stopped reading costs nothing.
 constexpr std::size_t kPreparedBytes = 1u << 20;
 
-// Tiles that a viewer keeps although its camera has left them, together with those it looks at. About 250 MB on the
-// viewer's side; beyond, those not looked at for longest are removed.
-constexpr std::uint64_t kMostHeldVertices = 6'000'000;
-
 // After a change of the settings the coarse tiles whose place is taken by finer ones are coloured first, for a quick
 // answer, as long as that adds no more than this part to the whole.
 constexpr double kPreviewShare = 0.1;
@@ -104,8 +100,8 @@ struct Encoding {
 class Stream final : public ViewerStream, public CacheWaiter {
  public:
   Stream(std::shared_ptr<const SceneSnapshot> scene, std::shared_ptr<FrameCache::State> cache, WorkerPool& pool,
-         std::function<void()> wake)
-      : cache_(std::move(cache)), pool_(pool), wake_(std::move(wake)) {
+         std::function<void()> wake, StreamLimits limits)
+      : cache_(std::move(cache)), pool_(pool), limits_(limits), wake_(std::move(wake)) {
     adopt(std::move(scene));
   }
 
@@ -178,6 +174,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       demand_.plan = std::move(shared_plan);
       ++demand_.colour_epoch;
       is_complete_due_ = true;
+      window_.on_overtaken();
       choose_point();
     });
     return generation;
@@ -249,6 +246,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
         slot->held_colour_epoch = demand_.colour_epoch;
         colour_cost_.learn(demand_.colour_bits, header.vertex_count, slot->colours->size());
         frame = given_out(header, slot->colours, now_s);
+        if (slot->is_target && !is_refining_due()) remove_outdated_beneath(*slot);
       }
       put_down(*slot);
       if (frame) {
@@ -477,13 +475,23 @@ class Stream final : public ViewerStream, public CacheWaiter {
       held_vertices += slot->held_vertex_count;
       if (!slot->is_wanted && slot->held_vertex_count > 0) unused.push_back(slot.get());
     }
-    if (held_vertices <= kMostHeldVertices) return;
+    if (held_vertices <= limits_.held_vertices) return;
     std::sort(unused.begin(), unused.end(),
               [](const Slot* a, const Slot* b) { return a->last_wanted < b->last_wanted; });
     for (Slot* slot : unused) {
-      if (held_vertices <= kMostHeldVertices) break;
+      if (held_vertices <= limits_.held_vertices) break;
       held_vertices -= slot->held_vertex_count;
       remove_from_viewer(*slot);
+    }
+  }
+
+  // A viewer draws the children of a tile in its place when it has them all, whatever colours they have. Beneath a tile
+  // that now shows newer colours than they do, and that is fine enough, they would stay in front of it for good.
+  void remove_outdated_beneath(const Slot& slot) {
+    for (const std::size_t child : tree_.nodes()[slot.node].children) {
+      Slot& outdated = *slots_[child];
+      if (outdated.held_name != 0 && outdated.held_colour_epoch != demand_.colour_epoch) remove_from_viewer(outdated);
+      remove_outdated_beneath(outdated);
     }
   }
 
@@ -780,6 +788,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   const std::shared_ptr<FrameCache::State> cache_;
   WorkerPool& pool_;
+  const StreamLimits limits_;
 
   std::mutex wake_mutex_;
   std::function<void()> wake_;
@@ -815,8 +824,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
 }  // namespace
 
 std::shared_ptr<ViewerStream> ViewerStream::create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                                   WorkerPool& pool, std::function<void()> wake) {
-  return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake));
+                                                   WorkerPool& pool, std::function<void()> wake, StreamLimits limits) {
+  return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake), limits);
 }
 
 }  // namespace spectra::server

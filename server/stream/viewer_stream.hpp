@@ -69,6 +69,13 @@ struct StreamStats {
   double pixel_error = 0;          ///< the largest distance in pixels within the view; 0 before the first camera.
 };
 
+/// Bounds of what a stream takes for granted at the other end.
+struct StreamLimits {
+  /// Vertices that a viewer is left with although its camera has left them, together with those it looks at (about 45
+  /// bytes each on the viewer's side). Beyond, tiles not looked at for longest are removed; what the camera asks for never is.
+  std::uint64_t held_vertices = 6'000'000;
+};
+
 /// A tile that a viewer still has from an earlier connection.
 struct ResumedTile {
   protocol::TileId tile;
@@ -100,7 +107,7 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// `wake` is called from any thread whenever next_frame() or take_complete() may have something new; it must only
   /// post to the session's strand. It is not called after close().
   static std::shared_ptr<ViewerStream> create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                              WorkerPool& pool, std::function<void()> wake);
+                                              WorkerPool& pool, std::function<void()> wake, StreamLimits limits = {});
   virtual ~ViewerStream() = default;
 
   virtual void close() = 0;

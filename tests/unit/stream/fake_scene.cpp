@@ -80,6 +80,30 @@ std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side)
   return tiles;
 }
 
+std::vector<std::shared_ptr<const Tile>> quadtree_tiles(int level_count, int side) {
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  for (int level = 0; level < level_count; ++level) {
+    const std::uint32_t count = 1U << level;
+    const float width = 4.0F / static_cast<float>(count);
+    for (std::uint32_t y = 0; y < count; ++y) {
+      for (std::uint32_t x = 0; x < count; ++x) {
+        auto tile = patch_tile({static_cast<std::uint8_t>(level), x, y, 0}, side, 0, 20);
+        const float left = static_cast<float>(x) * width;
+        const float bottom = static_cast<float>(y) * width;
+        for (auto& position : tile->positions) {
+          position = {left + position.x * width, bottom + position.y * width, position.z * width};
+        }
+        tile->bounds = {{left, bottom, -0.1F * width}, {left + width, bottom + width, 0.1F * width}};
+        const bool is_leaf = level + 1 == level_count;
+        tile->child_mask = is_leaf ? 0 : 0x0f;
+        tile->geometric_error_m = is_leaf ? 0 : 0.4F / static_cast<float>(count);
+        tiles.push_back(std::move(tile));
+      }
+    }
+  }
+  return tiles;
+}
+
 std::shared_ptr<const SceneSnapshot> scene_of(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision) {
   return std::make_shared<FakeScene>(std::move(tiles), revision);
 }

@@ -45,6 +45,10 @@ class FakeScene : public SceneSnapshot {
 /// A root and `leaf_count` leaves beneath it (at most 64), every tile of `side` x `side` vertices.
 std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side = 12);
 
+/// A quadtree of `level_count` levels over the square (0,0)-(4,4): tiles of `side` x `side` vertices in their place, with a
+/// geometric error of 0.4 m at the root that halves with each level and is 0 at the leaves.
+std::vector<std::shared_ptr<const Tile>> quadtree_tiles(int level_count, int side);
+
 std::shared_ptr<const SceneSnapshot> scene_of(std::vector<std::shared_ptr<const Tile>> tiles,
                                               std::uint32_t revision = 1);
 
