@@ -16,12 +16,15 @@ namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_colour_mapped(const ThermalTable& thermal, float threshold, bool invert, float alpha,
                         const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  const Floats limit = all(threshold);
-  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    const auto passes = invert ? hn::Lt(vertices.temperature, limit) : hn::Gt(vertices.temperature, limit);
-    return palette.highlighted(hn::IfThenElseZero(passes, all(alpha)), vertices, i);
-  });
+  const auto fill = [=](const float* temperature, const std::uint8_t*, std::size_t count, float* weight) HWY_ATTR {
+    const FloatTag d;
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      const Floats t = hn::LoadU(d, temperature + i);
+      const auto passes = invert ? hn::Lt(t, all(threshold)) : hn::Gt(t, all(threshold));
+      hn::Store(hn::IfThenElseZero(passes, all(alpha)), d, weight + i);
+    }
+  };
+  fuse_thermal(span, thermal, Weights(fill), Mix());
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

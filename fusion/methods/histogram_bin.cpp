@@ -16,14 +16,17 @@
 HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
-void fuse_histogram_bin(const ThermalTable& thermal, const HistogramBinning& bin, const float* weights,
+void fuse_histogram_bin(const ThermalTable& thermal, const HistogramBinning& binning, const float* weight_of_bin,
                         const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  BinStage bins(bin);
-  BothStages stages(palette, bins);
-  fuse_vertices(span, stages, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    return palette.highlighted(hn::GatherIndex(FloatTag(), weights, bins.bins(i)), vertices, i);
-  });
+  const auto fill = [&](const float* temperature, const std::uint8_t*, std::size_t count, float* weight) HWY_ATTR {
+    const FloatTag d;
+    alignas(64) std::int32_t bin[kBlock];
+    histogram_bins(binning, temperature, count, bin);
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      hn::Store(hn::GatherIndex(d, weight_of_bin, hn::Load(IntTag(), bin + i)), d, weight + i);
+    }
+  };
+  fuse_thermal(span, thermal, Weights(fill), Mix());
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

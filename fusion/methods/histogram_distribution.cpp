@@ -17,12 +17,15 @@ namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_distribution(const ThermalTable& thermal, float first_inside, float last_inside, float weight_inside,
                        float weight_outside, const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    const Floats t = vertices.temperature;
-    const auto inside = hn::And(hn::Ge(t, all(first_inside)), hn::Le(t, all(last_inside)));
-    return palette.highlighted(hn::IfThenElse(inside, all(weight_inside), all(weight_outside)), vertices, i);
-  });
+  const auto fill = [=](const float* temperature, const std::uint8_t*, std::size_t count, float* weight) HWY_ATTR {
+    const FloatTag d;
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      const Floats t = hn::LoadU(d, temperature + i);
+      const auto inside = hn::And(hn::Ge(t, all(first_inside)), hn::Le(t, all(last_inside)));
+      hn::Store(hn::IfThenElse(inside, all(weight_inside), all(weight_outside)), d, weight + i);
+    }
+  };
+  fuse_thermal(span, thermal, Weights(fill), Mix());
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

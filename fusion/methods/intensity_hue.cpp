@@ -16,21 +16,40 @@
 HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
-void fuse_intensity_hue(const ThermalTable& thermal, float k, const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    const Colours& v = vertices.visible;
-    // A thousand times the luma is a whole number that float32 holds exactly, and so is what it is above mid grey.
-    const Floats luma = hn::Add(hn::Add(hn::Mul(all(299), v.r), hn::Mul(all(587), v.g)), hn::Mul(all(114), v.b));
-    const Floats lightness = hn::Mul(hn::Sub(luma, all(127500)), all(k / 127500));
-    const Floats lighter = hn::Min(hn::Max(lightness, all(0)), all(1));
-    const Floats darker = hn::Max(hn::Min(lightness, all(0)), all(-1));
-    const Colours m = palette.colours(i);
-    const auto lit = [&](Floats channel) HWY_ATTR {
-      return hn::Add(hn::Add(channel, hn::Mul(darker, channel)), hn::Mul(lighter, hn::Sub(all(255), channel)));
+/// L per vertex, from the interleaved visible colours.
+void write_lightness(float k, const std::uint8_t* visible, std::size_t count, float* lightness) {
+  const FloatTag d;
+  const IntTag di;
+  const hn::ScalableTag<std::uint8_t> bytes;
+  const hn::Rebind<std::uint8_t, FloatTag> quarter;
+  alignas(64) std::uint8_t plane[3][kBlock];
+  for (std::size_t i = 0; i < count; i += hn::Lanes(bytes)) {
+    hn::Vec<decltype(bytes)> r, g, b;
+    hn::LoadInterleaved3(bytes, visible + 3 * i, r, g, b);
+    hn::Store(r, bytes, plane[0] + i);
+    hn::Store(g, bytes, plane[1] + i);
+    hn::Store(b, bytes, plane[2] + i);
+  }
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    const auto part = [&](std::size_t channel, float thousandths) HWY_ATTR {
+      const auto value = hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(quarter, plane[channel] + i)));
+      return hn::Mul(value, all(thousandths));
     };
-    return Colours{lit(m.r), lit(m.g), lit(m.b)};
-  });
+    // A thousand times the luma is a whole number that float32 holds exactly, and so is what it is above mid grey.
+    const Floats luma = hn::Add(hn::Add(part(0, 299), part(1, 587)), part(2, 114));
+    const Floats above = hn::Mul(hn::Sub(luma, all(127500)), all(k / 127500));
+    hn::Store(hn::Min(hn::Max(above, all(-1)), all(1)), d, lightness + i);
+  }
+}
+
+void fuse_intensity_hue(const ThermalTable& thermal, float k, const VertexSpan& span) {
+  const auto fill = [k](const float*, const std::uint8_t* visible, std::size_t count, float* lightness)
+                        HWY_ATTR { write_lightness(k, visible, count, lightness); };
+  const auto lit = [](Floats lightness, Floats m, Floats) HWY_ATTR {
+    const auto lighter = hn::Gt(lightness, all(0));
+    return hn::Add(m, hn::Mul(lightness, hn::IfThenElse(lighter, hn::Sub(all(255), m), m)));
+  };
+  fuse_thermal(span, thermal, AlwaysShown(Weights(fill)), lit);
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

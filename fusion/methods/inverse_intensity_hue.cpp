@@ -57,10 +57,8 @@ void fuse_inverse(const Ramp& normalised, double k, bool substitute, const Verte
     const Doubles t = on_ramp(normalised, temperature);
     return k == 1 ? t : power(t, k);
   };
-  ValueStage stage(intensity);
-  fuse_vertices(span, stage, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
+  fuse_shaded(span, intensity, [&](const Vertices& vertices, Floats scale) HWY_ATTR {
     const Colours& v = vertices.visible;
-    Floats scale = stage.values(i);
     Floats grey = all(0);
     if (substitute) {
       const Floats value = hn::Mul(all(255), scale);

@@ -20,10 +20,8 @@ namespace spectra::fusion::HWY_NAMESPACE {
 void fuse_monochrome(const Ramp& intensity, const float* pure_hue, float threshold, bool invert, float alpha,
                      const VertexSpan& span) {
   const auto on_intensity = [&](Doubles temperature) HWY_ATTR { return on_ramp(intensity, temperature); };
-  ValueStage stage(on_intensity);
   const Floats limit = all(threshold);
-  fuse_vertices(span, stage, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    const Floats t = stage.values(i);
+  fuse_shaded(span, on_intensity, [&](const Vertices& vertices, Floats t) HWY_ATTR {
     const Floats squared = hn::Mul(t, t);
     const Floats pale = hn::Sub(t, squared);
     const auto lit = [&](float pure) HWY_ATTR { return hn::Mul(all(255), hn::Add(pale, hn::Mul(squared, all(pure)))); };

@@ -19,8 +19,7 @@ namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_highlighting(const ThermalTable& thermal, double hot_above, const Ramp& hot, double cold_below,
                        const Ramp& cold, double k, const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  const auto weight = [&](Doubles temperature) HWY_ATTR {
+  const auto weight_of = [&](Doubles temperature) HWY_ATTR {
     const DoubleTag d;
     const auto is_hot = hn::Gt(temperature, hn::Set(d, hot_above));
     const auto is_cold = hn::Lt(temperature, hn::Set(d, cold_below));
@@ -28,11 +27,9 @@ void fuse_highlighting(const ThermalTable& thermal, double hot_above, const Ramp
         hn::IfThenElse(is_hot, on_ramp(hot, temperature), hn::IfThenElseZero(is_cold, on_ramp(cold, temperature)));
     return hn::Min(hn::Set(d, 1), hn::Mul(hn::Set(d, k), hn::Mul(u, u)));
   };
-  ValueStage weights(weight);
-  BothStages stages(palette, weights);
-  fuse_vertices(span, stages, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    return palette.highlighted(weights.values(i), vertices, i);
-  });
+  const auto fill = [&](const float* temperature, const std::uint8_t*, std::size_t count, float* weight)
+                        HWY_ATTR { map_in_double(temperature, count, weight, weight_of); };
+  fuse_thermal(span, thermal, Weights(fill), Mix());
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

@@ -15,8 +15,8 @@ HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_thermal_only(const ThermalTable& thermal, const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  fuse_vertices(span, palette, [&](const Vertices&, std::size_t i) HWY_ATTR { return palette.colours(i); });
+  const auto palette_alone = [](Floats, Floats palette, Floats) HWY_ATTR { return palette; };
+  fuse_thermal(span, thermal, ConstantWeight(1), palette_alone);
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

@@ -15,10 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_blend(const ThermalTable& thermal, float alpha, const VertexSpan& span) {
-  PaletteStage palette(thermal);
-  fuse_vertices(span, palette, [&](const Vertices& vertices, std::size_t i) HWY_ATTR {
-    return mixed(all(alpha), palette.colours(i), vertices.visible);
-  });
+  fuse_thermal(span, thermal, ConstantWeight(alpha), Mix());
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

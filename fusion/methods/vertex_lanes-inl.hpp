@@ -31,6 +31,10 @@ using Doubles = hn::Vec<DoubleTag>;
 constexpr float kWholeFloat = 12582912.0F;           // 1.5 * 2^23
 constexpr double kWholeDouble = 6755399441055744.0;  // 1.5 * 2^52
 
+/// Vertices that are worked on at a time: what is staged for them stays in the first-level cache.
+constexpr std::size_t kBlock = 256;
+constexpr std::size_t kLanes = hn::MaxLanes(FloatTag());
+
 /// A colour of as many vertices as a register holds, 0..255.
 struct Colours {
   Floats r, g, b;
@@ -73,92 +77,167 @@ HWY_INLINE void map_in_double(const float* temperature, std::size_t count, float
   }
 }
 
-/// Vertices that are worked on at a time: what is staged for them stays in the first-level cache.
-constexpr std::size_t kBlock = 256;
-
-/// First stage of the methods that show palette colours: row and part of the way to the next row.
-class PaletteStage {
+/// Interleaving three channels: lane e of register j belongs to vertex (j * lanes + e) / 3.
+class ChannelOrder {
  public:
-  explicit PaletteStage(const ThermalTable& table) : table_(table) {}
-
-  HWY_INLINE void prepare(const float* temperature, std::size_t count) {
-    const DoubleTag d;
-    const hn::Rebind<float, DoubleTag> narrow;
-    const hn::RebindToUnsigned<DoubleTag> bits64;
-    const hn::Rebind<std::uint32_t, DoubleTag> bits32;
-    const Doubles whole = hn::Set(d, kWholeDouble);
-    const Doubles half = hn::Set(d, 0.5);
-    const Ramp& ramp = table_.position;
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-      const Doubles position = on_ramp(ramp, hn::PromoteTo(d, hn::LoadU(narrow, temperature + i)));
-      // A whole position may take the row below with a part of 1: the same colour.
-      const Doubles shifted = hn::Add(hn::Sub(position, half), whole);
-      const Doubles row = hn::Sub(shifted, whole);
-      hn::StoreU(hn::DemoteTo(narrow, hn::Sub(position, row)), narrow, part_ + i);
-      // The mask keeps even the row of a NaN within the table.
-      const auto index = hn::And(hn::TruncateTo(bits32, hn::BitCast(bits64, shifted)), hn::Set(bits32, 255));
-      hn::StoreU(hn::ShiftLeft<3>(index), bits32, offset_ + i);
+  ChannelOrder() {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t e = 0; e < kLanes; ++e) vertex_[j][e] = static_cast<std::int32_t>((j * kLanes + e) / 3);
     }
   }
-
-  /// The palette colours of the vertices that start at `i` of the block.
-  HWY_INLINE Colours colours(std::size_t i) const {
-    const FloatTag d;
-    const float* rows = table_.rows[0].data();
-    const std::uint32_t* offset = offset_ + i;
-#if HWY_TARGET == HWY_SCALAR
-    const float* row = rows + offset[0];
-    const Floats part = hn::Load(d, part_ + i);
-    const auto channel = [&](std::size_t c)
-                             HWY_ATTR { return hn::Add(hn::Set(d, row[c]), hn::Mul(part, hn::Set(d, row[4 + c]))); };
-    return {channel(0), channel(1), channel(2)};
-#else
-    // Register k holds r, g, b, pad of vertices k, k + 4, k + 8 ...; a transposition makes planes of them.
-    const Floats part = hn::Load(d, part_ + i);
-    const Floats v0 =
-        hn::Add(gathered(d, rows, offset), hn::Mul(hn::Broadcast<0>(part), gathered(d, rows + 4, offset)));
-    const Floats v1 =
-        hn::Add(gathered(d, rows, offset + 1), hn::Mul(hn::Broadcast<1>(part), gathered(d, rows + 4, offset + 1)));
-    const Floats v2 =
-        hn::Add(gathered(d, rows, offset + 2), hn::Mul(hn::Broadcast<2>(part), gathered(d, rows + 4, offset + 2)));
-    const Floats v3 =
-        hn::Add(gathered(d, rows, offset + 3), hn::Mul(hn::Broadcast<3>(part), gathered(d, rows + 4, offset + 3)));
-    const Floats low02 = hn::InterleaveLower(d, v0, v2);
-    const Floats low13 = hn::InterleaveLower(d, v1, v3);
-    const Floats high02 = hn::InterleaveUpper(d, v0, v2);
-    const Floats high13 = hn::InterleaveUpper(d, v1, v3);
-    return {hn::InterleaveLower(d, low02, low13), hn::InterleaveUpper(d, low02, low13),
-            hn::InterleaveLower(d, high02, high13)};
-#endif
+  /// One value per vertex, spread over its channels in register j.
+  HWY_INLINE Floats spread(Floats values, std::size_t j) const {
+    return hn::TableLookupLanes(values, hn::SetTableIndices(FloatTag(), vertex_[j]));
   }
-
-  /// weight * palette colour + (1 - weight) * visible; the palette is left alone where no weight asks for it.
-  HWY_INLINE Colours highlighted(Floats weight, const Vertices& vertices, std::size_t i) const {
-    if (hn::AllTrue(FloatTag(), hn::Eq(weight, all(0)))) return vertices.visible;
-    return mixed(weight, colours(i), vertices.visible);
+  /// Register j of one colour over and over.
+  HWY_INLINE Floats repeated(Rgb8 colour, std::size_t j) const {
+    alignas(64) float lanes[kLanes];
+    for (std::size_t e = 0; e < kLanes; ++e) {
+      const std::size_t channel = (j * kLanes + e) % 3;
+      lanes[e] = static_cast<float>(channel == 0 ? colour.r : channel == 1 ? colour.g : colour.b);
+    }
+    return hn::Load(FloatTag(), lanes);
   }
 
  private:
+  alignas(64) std::int32_t vertex_[3][kLanes];
+};
+
+/// The palette colours of a block of vertices, interleaved like the colours of the vertices.
+class ThermalColours {
+ public:
+  explicit ThermalColours(const ThermalTable& table) : table_(table) {
+    for (std::size_t e = 0; e < kLanes; ++e) {
+      without_pad_[e] = static_cast<std::int32_t>(e < 3 * kRowsPerRegister ? e / 3 * 4 + e % 3 : 0);
+      for (std::size_t k = 0; k < kLanes / kRowsPerRegister; ++k) {
+        vertex_[k][e] = static_cast<std::int32_t>(k * kRowsPerRegister + e / 4);
+      }
+    }
+  }
+
+  HWY_INLINE void prepare(const float* temperature, std::size_t count) {
+    if (table_.single_precision) {
+      locate_in_float(temperature, count);
+    } else {
+      locate_in_double(temperature, count);
+    }
+    const float* rows = table_.rows[0].data();
+#if HWY_TARGET == HWY_SCALAR
+    for (std::size_t i = 0; i < count; ++i) {
+      const float* row = rows + 8 * (row_[i] & 255U);
+      for (std::size_t c = 0; c < 3; ++c) colour_[3 * i + c] = row[c] + part_[i] * row[4 + c];
+    }
+#else
+    const FloatTag d;
+    const auto without_pad = hn::SetTableIndices(d, without_pad_);
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      const Floats part = hn::Load(d, part_ + i);
+      for (std::size_t k = 0; k < kLanes / kRowsPerRegister; ++k) {
+        const std::size_t first = i + k * kRowsPerRegister;
+        const Floats way = hn::TableLookupLanes(part, hn::SetTableIndices(d, vertex_[k]));
+        const Floats padded =
+            hn::Add(gathered(d, rows, row_ + first), hn::Mul(way, gathered(d, rows + 4, row_ + first)));
+        // The lanes beyond the last channel are overwritten by the next store.
+        hn::StoreU(hn::TableLookupLanes(padded, without_pad), d, colour_ + 3 * first);
+      }
+    }
+#endif
+  }
+
+  /// Register number `index` of the block's channels.
+  HWY_INLINE Floats channels(std::size_t index) const {
+    return hn::Load(FloatTag(), colour_ + index * kLanes);
+  }
+
+ private:
+  /// Colours with their pad that fit a register.
+  static constexpr std::size_t kRowsPerRegister = kLanes >= 4 ? kLanes / 4 : 1;
+
+  /// Row and part of the way to the next row, to within 6.1e-5 rows where ThermalTable allows it. A whole position may
+  /// take the row below with a part of 1: the same colour. The low byte is the row even of a NaN.
+  HWY_INLINE void locate_in_float(const float* temperature, std::size_t count) {
+    const FloatTag d;
+    const hn::RebindToUnsigned<FloatTag> bits;
+    for (std::size_t i = 0; i < count; i += kLanes) {
+      const Floats above = hn::Sub(hn::Sub(hn::LoadU(d, temperature + i), all(table_.origin)), all(table_.origin_rest));
+      const Floats position = hn::Min(hn::Max(hn::Mul(above, all(table_.slope)), all(0)), all(255));
+      const Floats shifted = hn::Add(hn::Sub(position, all(0.5F)), all(kWholeFloat));
+      hn::Store(hn::BitCast(bits, shifted), bits, row_ + i);
+      hn::Store(hn::Sub(position, hn::Sub(shifted, all(kWholeFloat))), d, part_ + i);
+    }
+  }
+
+  HWY_INLINE void locate_in_double(const float* temperature, std::size_t count) {
+    const DoubleTag d;
+    const hn::Rebind<float, DoubleTag> narrow;
+    const hn::RebindToUnsigned<DoubleTag> bits64;
+    const hn::Rebind<std::uint32_t, DoubleTag> bits;
+    const Doubles whole = hn::Set(d, kWholeDouble);
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      const Doubles position = on_ramp(table_.position, hn::PromoteTo(d, hn::LoadU(narrow, temperature + i)));
+      const Doubles shifted = hn::Add(hn::Sub(position, hn::Set(d, 0.5)), whole);
+      hn::StoreU(hn::TruncateTo(bits, hn::BitCast(bits64, shifted)), bits, row_ + i);
+      hn::StoreU(hn::DemoteTo(narrow, hn::Sub(position, hn::Sub(shifted, whole))), narrow, part_ + i);
+    }
+  }
+
 #if HWY_TARGET != HWY_SCALAR
-  /// Four floats from each of rows + offset[0], rows + offset[4], ...
+  /// Four floats of the rows of as many vertices as fit.
   template <class Tag>
-  static HWY_INLINE hn::Vec<Tag> gathered(Tag d, const float* rows, const std::uint32_t* offset) {
+  static HWY_INLINE hn::Vec<Tag> gathered(Tag d, const float* rows, const std::uint32_t* row) {
     if constexpr (hn::MaxLanes(Tag()) == 4) {
-      return hn::Load(d, rows + offset[0]);
+      return hn::Load(d, rows + 8 * (row[0] & 255U));
     } else {
       const hn::Half<Tag> half;
-      return hn::Combine(d, gathered(half, rows, offset + hn::MaxLanes(Tag()) / 2), gathered(half, rows, offset));
+      return hn::Combine(d, gathered(half, rows, row + hn::MaxLanes(Tag()) / 8), gathered(half, rows, row));
     }
   }
 #endif
 
   const ThermalTable& table_;
-  alignas(64) std::uint32_t offset_[kBlock];
+  alignas(64) std::int32_t without_pad_[kLanes];
+  alignas(64) std::int32_t vertex_[kLanes / kRowsPerRegister][kLanes];
+  alignas(64) std::uint32_t row_[kBlock];
   alignas(64) float part_[kBlock];
+  alignas(64) float colour_[3 * kBlock + kLanes];
 };
 
-/// First stage of a method that needs one number per vertex, computed in double precision by `Function`: from a
-/// register of temperatures to a register of values.
+/// The same weight for every vertex.
+class ConstantWeight {
+ public:
+  explicit ConstantWeight(float weight) : weight_(weight) {}
+  HWY_INLINE bool prepare(const float*, const std::uint8_t*, std::size_t) { return weight_ != 0; }
+  HWY_INLINE Floats spread(const ChannelOrder&, std::size_t, std::size_t) const { return all(weight_); }
+
+ private:
+  float weight_;
+};
+
+/// A weight per vertex, written by `Fill`: fill(temperature, visible, count, weights).
+template <class Fill>
+class Weights {
+ public:
+  explicit Weights(const Fill& fill) : fill_(fill) {}
+
+  /// False when every weight of the block is 0.
+  HWY_INLINE bool prepare(const float* temperature, const std::uint8_t* visible, std::size_t count) {
+    fill_(temperature, visible, count, static_cast<float*>(weight_));
+    const FloatTag d;
+    Floats any = all(0);
+    for (std::size_t i = 0; i < count; i += kLanes) any = hn::Or(any, hn::Load(d, weight_ + i));
+    return !hn::AllTrue(d, hn::Eq(any, all(0)));
+  }
+  HWY_INLINE Floats spread(const ChannelOrder& order, std::size_t i, std::size_t j) const {
+    return order.spread(hn::Load(FloatTag(), weight_ + i), j);
+  }
+
+ private:
+  Fill fill_;
+  alignas(64) float weight_[kBlock];
+};
+
+/// One value per vertex of a block, computed in double precision by `Function`: from a register of temperatures to a
+/// register of values.
 template <class Function>
 class ValueStage {
  public:
@@ -173,35 +252,6 @@ class ValueStage {
   alignas(64) float value_[kBlock];
 };
 
-/// First stage of a method that shows or hides whole bins of a histogram.
-class BinStage {
- public:
-  explicit BinStage(const HistogramBinning& binning) : binning_(binning) {}
-  HWY_INLINE void prepare(const float* temperature, std::size_t count) {
-    histogram_bins(binning_, temperature, count, bin_);
-  }
-  HWY_INLINE hn::Vec<IntTag> bins(std::size_t i) const { return hn::Load(IntTag(), bin_ + i); }
-
- private:
-  const HistogramBinning& binning_;
-  alignas(64) std::int32_t bin_[kBlock];
-};
-
-/// Two first stages, one after the other.
-template <class First, class Second>
-class BothStages {
- public:
-  BothStages(First& first, Second& second) : first_(first), second_(second) {}
-  HWY_INLINE void prepare(const float* temperature, std::size_t count) {
-    first_.prepare(temperature, count);
-    second_.prepare(temperature, count);
-  }
-
- private:
-  First& first_;
-  Second& second_;
-};
-
 /// The one rounding: half up, for values within 1 of 0..255. Whatever comes within 2^-13 of the next level from below
 /// counts as that tie, which makes up for the rounding of the arithmetic before.
 HWY_INLINE hn::Vec<hn::Rebind<std::uint8_t, FloatTag>> levels(Floats value) {
@@ -212,7 +262,7 @@ HWY_INLINE hn::Vec<hn::Rebind<std::uint8_t, FloatTag>> levels(Floats value) {
 }
 
 /// Fuses `count` vertices, a multiple of the lanes of a byte register and at most kBlock.
-/// shade(Vertices, index in the block) -> Colours.
+/// shade(Vertices, their values) -> Colours.
 template <class Stage, class Shade>
 HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
                            std::size_t count, const MissingDisplay& missing, Stage& stage, const Shade& shade) {
@@ -235,7 +285,7 @@ HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible
     const auto plane = [&](const std::uint8_t* from)
                            HWY_ATTR { return hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(quarter, from + i))); };
     const Vertices vertices{hn::LoadU(d, temperature + i), {plane(r), plane(g), plane(b)}};
-    const Colours colours = shade(vertices, i);
+    const Colours colours = shade(vertices, stage.values(i));
     Colours without = vertices.visible;
     if (missing) without = {all(missing->r), all(missing->g), all(missing->b)};
     const auto finite = hn::IsFinite(vertices.temperature);
@@ -248,13 +298,88 @@ HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible
   }
 }
 
+/// Weights whose 0 still shows something.
+template <class Weight>
+class AlwaysShown : public Weight {
+ public:
+  explicit AlwaysShown(const Weight& weight) : Weight(weight) {}
+  HWY_INLINE bool prepare(const float* temperature, const std::uint8_t* visible, std::size_t count) {
+    static_cast<void>(Weight::prepare(temperature, visible, count));
+    return true;
+  }
+};
+
+/// Whether every temperature of a block is finite.
+HWY_INLINE bool all_finite(const float* temperature, std::size_t count) {
+  const FloatTag d;
+  auto finite = hn::IsFinite(hn::LoadU(d, temperature));
+  for (std::size_t i = kLanes; i < count; i += kLanes) {
+    finite = hn::And(finite, hn::IsFinite(hn::LoadU(d, temperature + i)));
+  }
+  return hn::AllTrue(d, finite);
+}
+
+/// combine(weight, palette channel, visible channel) for every channel of a block, as they lie in memory.
+template <bool kSomeMissing, class Weight, class Combine>
+HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weight, const ChannelOrder& order,
+                              const Combine& combine, const float* temperature, const std::uint8_t* visible,
+                              std::uint8_t* fused, std::size_t count, const MissingDisplay& missing) {
+  const FloatTag d;
+  const IntTag di;
+  const hn::Rebind<std::uint8_t, FloatTag> quarter;
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const std::size_t begin = 3 * i + j * kLanes;
+      const Floats v = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(quarter, visible + begin)));
+      Floats f = combine(weight.spread(order, i, j), thermal.channels(begin / kLanes), v);
+      if constexpr (kSomeMissing) {
+        const auto finite = hn::IsFinite(hn::LoadU(d, temperature + i));
+        const auto keep = hn::Gt(order.spread(hn::IfThenElseZero(finite, all(1)), j), all(0));
+        f = hn::IfThenElse(keep, f, missing ? order.repeated(*missing, j) : v);
+      }
+      hn::StoreU(levels(f), quarter, fused + begin);
+    }
+  }
+}
+
+/// weight * palette + (1 - weight) * visible; exactly `visible` where the weight is 0.
+struct Mix {
+  HWY_INLINE Floats operator()(Floats weight, Floats palette, Floats visible) const {
+    return hn::Add(visible, hn::Mul(weight, hn::Sub(palette, visible)));
+  }
+};
+
+/// Fuses a block with its palette colours. Where `Weight` has nothing to show the palette is left alone.
+template <class Weight, class Combine>
+struct ThermalBlock {
+  ThermalColours thermal;
+  Weight weight;
+  Combine combine;
+  ChannelOrder order = {};
+
+  HWY_INLINE void operator()(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
+                             std::size_t count, const MissingDisplay& missing) {
+    const bool complete = all_finite(temperature, count);
+    if (!weight.prepare(temperature, visible, count) && (complete || !missing)) {
+      if (fused != visible) std::memcpy(fused, visible, 3 * count);
+      return;
+    }
+    thermal.prepare(temperature, count);
+    if (complete) {
+      combine_block<false>(thermal, weight, order, combine, temperature, visible, fused, count, missing);
+    } else {
+      combine_block<true>(thermal, weight, order, combine, temperature, visible, fused, count, missing);
+    }
+  }
+};
+
 /// Fuses all vertices of a span block by block. Every vertex goes through the same arithmetic wherever it stands.
-template <class Stage, class Shade>
-HWY_INLINE void fuse_vertices(const VertexSpan& span, Stage& stage, const Shade& shade) {
+/// block(temperature, visible, fused, count, missing); count is a multiple of the lanes of a byte register.
+template <class Block>
+HWY_INLINE void for_each_block(const VertexSpan& span, Block& block) {
   std::size_t begin = 0;
   for (; begin + kBlock <= span.count; begin += kBlock) {
-    fuse_block(span.temperature_celsius + begin, span.visible + 3 * begin, span.fused + 3 * begin, kBlock, span.missing,
-               stage, shade);
+    block(span.temperature_celsius + begin, span.visible + 3 * begin, span.fused + 3 * begin, kBlock, span.missing);
   }
   const std::size_t rest = span.count - begin;
   if (rest == 0) return;
@@ -264,8 +389,28 @@ HWY_INLINE void fuse_vertices(const VertexSpan& span, Stage& stage, const Shade&
   alignas(64) std::uint8_t colours[3 * kBlock] = {};
   std::memcpy(temperature, span.temperature_celsius + begin, rest * sizeof(float));
   std::memcpy(colours, span.visible + 3 * begin, 3 * rest);
-  fuse_block(temperature, colours, colours, padded, span.missing, stage, shade);
+  const std::uint8_t* visible = colours;
+  block(temperature, visible, colours, padded, span.missing);
   std::memcpy(span.fused + 3 * begin, colours, 3 * rest);
+}
+
+/// Fuses with the palette: combine(weight, palette channel, visible channel) for every channel.
+template <class Weight, class Combine>
+HWY_INLINE void fuse_thermal(const VertexSpan& span, const ThermalTable& table, const Weight& weight,
+                             const Combine& combine) {
+  ThermalBlock<Weight, Combine> block{ThermalColours(table), weight, combine};
+  for_each_block(span, block);
+}
+
+/// Fuses without the palette: shade(Vertices, value) -> Colours, with a value per vertex from
+/// value(temperatures in double precision).
+template <class Value, class Shade>
+HWY_INLINE void fuse_shaded(const VertexSpan& span, const Value& value, const Shade& shade) {
+  ValueStage stage(value);
+  const auto block = [&](const float* temperature, const std::uint8_t* visible, std::uint8_t* fused, std::size_t count,
+                         const MissingDisplay& missing)
+                         HWY_ATTR { fuse_block(temperature, visible, fused, count, missing, stage, shade); };
+  for_each_block(span, block);
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

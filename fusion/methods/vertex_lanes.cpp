@@ -26,13 +26,23 @@ ThermalTable::ThermalTable(const MethodContext& context)
     const double value = context.palette[row][index];
     return value > 0 ? std::min(value, 255.0) : 0.0;
   };
+  double steepest = 0;
   for (std::size_t row = 0; row < 256; ++row) {
     const std::size_t next = std::min<std::size_t>(row + 1, 255);
     for (std::size_t index = 0; index < 3; ++index) {
       rows[row][index] = static_cast<float>(channel(row, index));
-      rows[row][4 + index] = static_cast<float>(channel(next, index) - channel(row, index));
+      const double step = channel(next, index) - channel(row, index);
+      rows[row][4 + index] = static_cast<float>(step);
+      steepest = std::max(steepest, std::abs(step));
     }
   }
+  const double low = context.range_minimum;
+  const double span = context.range_maximum - low;
+  single_precision = steepest <= 12 && span > 1e-30 && span < 1e30 && std::abs(low) < 1e6 * span;
+  if (!single_precision) return;
+  origin = as_stored(low);
+  origin_rest = static_cast<float>(low - double{origin});
+  slope = static_cast<float>(255 / span);
 }
 
 Ramp normalisation(const MethodContext& context) {

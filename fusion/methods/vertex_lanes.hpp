@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <utility>
 
 #include "fusion/method.hpp"
 
@@ -30,6 +29,12 @@ struct ThermalTable {
   explicit ThermalTable(const MethodContext& context);
 
   Ramp position;  ///< T to 0..255.
+  /// Whether the position may be computed as (T - origin - origin_rest) * slope in float32: its error of at most 6.1e-5
+  /// rows is then below 8e-4 of a level. Steep palettes and extreme ranges need double precision.
+  bool single_precision = false;
+  float origin = 0;
+  float origin_rest = 0;
+  float slope = 0;
   /// Per row r, g, b and a pad, then the same of the step to the next row; 32 bytes, so that both halves load as one.
   alignas(64) std::array<std::array<float, 8>, 256> rows{};
 };
@@ -57,7 +62,7 @@ struct VertexSpan {
 template <class Fuse>
 class LaneKernel final : public Kernel {
  public:
-  LaneKernel(Fuse fuse, const MissingDisplay& missing) : fuse_(std::move(fuse)), missing_(missing) {}
+  LaneKernel(const Fuse& fuse, const MissingDisplay& missing) : fuse_(fuse), missing_(missing) {}
 
   void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
             std::span<Rgb8> fused) const noexcept override {
@@ -71,8 +76,8 @@ class LaneKernel final : public Kernel {
 };
 
 template <class Fuse>
-std::shared_ptr<const Kernel> lane_kernel(const MethodContext& context, Fuse fuse) {
-  return std::make_shared<LaneKernel<Fuse>>(std::move(fuse), context.missing);
+std::shared_ptr<const Kernel> lane_kernel(const MethodContext& context, const Fuse& fuse) {
+  return std::make_shared<LaneKernel<Fuse>>(fuse, context.missing);
 }
 
 }  // namespace spectra::fusion
