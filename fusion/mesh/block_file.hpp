@@ -15,7 +15,7 @@ namespace spectra::fusion {
 class BlockFile {
  public:
   /// The most that ready() can be asked for.
-  static constexpr std::size_t kBufferBytes = 512 * 1024;
+  static constexpr std::size_t kBufferBytes = std::size_t{512} * 1024;
 
   /// FileNotFound, or FileUnreadable (also for what is not a regular file: its size would not bound anything).
   static Result<BlockFile> open(const std::filesystem::path& path);

@@ -10,7 +10,7 @@ namespace spectra::fusion {
 
 namespace {
 
-constexpr std::size_t kBufferBytes = 256 * 1024;
+constexpr std::size_t kBufferBytes = std::size_t{256} * 1024;
 /// No entry is longer: three doubles, a colour, a temperature.
 constexpr std::size_t kMaxEntryBytes = 3 * 8 + 3 + 4;
 

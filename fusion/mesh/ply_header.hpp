@@ -44,7 +44,7 @@ struct PlyHeader {
 };
 
 /// A header must end within this many bytes.
-inline constexpr std::size_t kMaxPlyHeaderBytes = 256 * 1024;
+inline constexpr std::size_t kMaxPlyHeaderBytes = std::size_t{256} * 1024;
 
 /// Reads a header from the first bytes of a file, which must be at least kMaxPlyHeaderBytes of it or all there is.
 /// Lines may end in LF or CR LF. Safe on untrusted input; BadHeader and Unsupported name the line.
