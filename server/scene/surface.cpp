@@ -39,15 +39,40 @@ double squared_distance_to_segment(const Vec3f& p, const Vec3f& a, const Vec3f& 
   return dot(rest, rest);
 }
 
-Vec3f mean(std::span<const Vec3f> points) {
-  Vector sum;
-  for (const Vec3f& p : points) {
-    sum.x += static_cast<double>(p.x);
-    sum.y += static_cast<double>(p.y);
-    sum.z += static_cast<double>(p.z);
+/// Of a sample, to a few percent.
+double mean_edge_length(const Surface& surface) {
+  const std::size_t stride = surface.triangles().size() / 4096 + 1;
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < surface.triangles().size(); i += stride) {
+    const Triangle& t = surface.triangles()[i];
+    for (unsigned corner = 0; corner < 3; ++corner) {
+      sum += std::sqrt(squared_distance(surface.positions()[t[corner]], surface.positions()[t[(corner + 1) % 3]]));
+      ++count;
+    }
   }
-  const auto count = static_cast<double>(points.size());
-  return {static_cast<float>(sum.x / count), static_cast<float>(sum.y / count), static_cast<float>(sum.z / count)};
+  return count > 0 ? sum / count : 0;
+}
+
+/// Calls back with points of a triangle: its edges cut to `spacing` or shorter (but not to more than 16 pieces), and points
+/// as dense inside; the centroid in any case, the corners never.
+template <class Callback>
+void sample(const Vec3f& a, const Vec3f& b, const Vec3f& c, double spacing, Callback callback) {
+  const auto at = [&](double u, double v, double w) {
+    const auto mix = [&](float from_a, float from_b, float from_c) {
+      return static_cast<float>(u * static_cast<double>(from_a) + v * static_cast<double>(from_b) +
+                                w * static_cast<double>(from_c));
+    };
+    return Vec3f{mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
+  };
+  callback(at(1.0 / 3, 1.0 / 3, 1.0 / 3));
+  const double longest = std::sqrt(std::max({squared_distance(a, b), squared_distance(b, c), squared_distance(c, a)}));
+  const int pieces = longest < 16 * spacing ? static_cast<int>(longest / spacing) + 1 : 16;
+  for (int i = 0; i <= pieces; ++i) {
+    for (int j = 0; i + j <= pieces; ++j) {
+      const int k = pieces - i - j;
+      if (std::max({i, j, k}) < pieces) callback(at(1.0 * i / pieces, 1.0 * j / pieces, 1.0 * k / pieces));
+    }
+  }
 }
 
 /// The largest distance seen; looks closer only at points that would raise it.
@@ -98,10 +123,17 @@ double squared_distance_to_triangle(const Vec3f& p, const Vec3f& a, const Vec3f&
   if (area > 0) {
     const double of_c = dot(cross(ab, ap), normal);
     const double of_b = dot(cross(ap, ac), normal);
-    if (of_b >= 0 && of_c >= 0 && of_b + of_c <= area) {
+    const double of_a = area - of_b - of_c;
+    if (of_a >= 0 && of_b >= 0 && of_c >= 0) {
       const double height = dot(ap, normal);
       return height * height / area;
     }
+    // What is nearest lies on an edge that has the point on its outer side.
+    double best = std::numeric_limits<double>::infinity();
+    if (of_a < 0) best = squared_distance_to_segment(p, b, c);
+    if (of_b < 0) best = std::min(best, squared_distance_to_segment(p, c, a));
+    if (of_c < 0) best = std::min(best, squared_distance_to_segment(p, a, b));
+    return best;
   }
   return std::min({squared_distance_to_segment(p, a, b), squared_distance_to_segment(p, b, c),
                    squared_distance_to_segment(p, c, a)});
@@ -230,27 +262,20 @@ std::vector<bool> Surface::open_vertices() const {
 
 double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
                           std::span<const std::uint32_t> fine_of_coarse) {
-  const auto corners = [](const Surface& surface, const Triangle& triangle) {
-    return std::array{surface.positions()[triangle[0]], surface.positions()[triangle[1]],
-                      surface.positions()[triangle[2]]};
-  };
-  LargestDistance from_coarse(coarse);
+  const double spacing = 1.5 * mean_edge_length(fine);
+  LargestDistance from_coarse(coarse), from_fine(fine);
   for (std::size_t v = 0; v < fine.positions().size(); ++v) {
     if (fine_of_coarse[coarse_of_fine[v]] != v) from_coarse.add(fine.positions()[v], {&coarse_of_fine[v], 1});
   }
-  LargestDistance from_fine(fine);
-  for (const Triangle& triangle : fine.triangles()) {
-    const std::array starts{coarse_of_fine[triangle[0]], coarse_of_fine[triangle[1]], coarse_of_fine[triangle[2]]};
-    from_coarse.add(mean(corners(fine, triangle)), starts);
-  }
-  for (const Triangle& triangle : coarse.triangles()) {
-    const auto [a, b, c] = corners(coarse, triangle);
-    const std::array starts{fine_of_coarse[triangle[0]], fine_of_coarse[triangle[1]], fine_of_coarse[triangle[2]]};
-    for (const Vec3f& sample :
-         {mean(std::array{a, b, c}), mean(std::array{a, b}), mean(std::array{b, c}), mean(std::array{c, a})}) {
-      from_fine.add(sample, starts);
+  const auto add_samples = [&](const Surface& of, LargestDistance& from, std::span<const std::uint32_t> start_of) {
+    for (const Triangle& t : of.triangles()) {
+      const std::array starts{start_of[t[0]], start_of[t[1]], start_of[t[2]]};
+      sample(of.positions()[t[0]], of.positions()[t[1]], of.positions()[t[2]], spacing,
+             [&](const Vec3f& p) { from.add(p, starts); });
     }
-  }
+  };
+  add_samples(fine, from_coarse, coarse_of_fine);
+  add_samples(coarse, from_fine, fine_of_coarse);
   return std::max(from_coarse.metres(), from_fine.metres());
 }
 

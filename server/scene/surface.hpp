@@ -55,8 +55,8 @@ class Surface {
   std::vector<Bounds> block_bounds_;  ///< Of kBlockSize triangles each: neighbours in the list are near each other.
 };
 
-/// The largest distance (metres) of points of one surface from the other, both ways, measured at the vertices, middles of
-/// edges and centroids. `coarse_of_fine` names a coarse vertex near each fine one, `fine_of_coarse` the fine vertex that
+/// The largest distance (metres) of points of one surface from the other, both ways, measured at the vertices and at
+/// points of the triangles as dense as the fine vertices. `coarse_of_fine` names a coarse vertex near each fine one, `fine_of_coarse` the fine vertex that
 /// each coarse one is.
 double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
                           std::span<const std::uint32_t> fine_of_coarse);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "server/scene/octree_cut.hpp"
@@ -217,14 +218,16 @@ std::vector<Triangle> simplified(const Merged& mesh, const std::vector<bool>& is
   if (std::isfinite(extent) && extent > 1e-30f && !result.empty()) {
     // A position that three vertices have stays where it is: that is how version 0.18 is told to lock a vertex. Its own
     // option would lock the edges of the scene too, and holes in a scan have many.
+    const auto locked_count = static_cast<std::size_t>(std::count(is_locked.begin(), is_locked.end(), true));
     std::vector<Vec3f> positions;
-    positions.reserve(vertex_count +
-                      2 * static_cast<std::size_t>(std::count(is_locked.begin(), is_locked.end(), true)));
+    positions.reserve(vertex_count + 2 * locked_count);
     positions = mesh.positions;
     for (std::size_t v = 0; v < vertex_count; ++v) {
       if (is_locked[v]) positions.insert(positions.end(), 2, mesh.positions[v]);
     }
-    const std::size_t wanted_triangles = result.size() * wanted_count / vertex_count;
+    // A closed surface has two triangles for each vertex; each vertex on an open edge costs one.
+    const std::size_t share = result.size() * wanted_count / vertex_count;
+    const std::size_t wanted_triangles = std::min(share, 2 * wanted_count - std::min(locked_count, wanted_count));
     constexpr float kAnyError = 1e6f;
     const std::size_t index_count =
         meshopt_simplify(result[0].data(), result[0].data(), 3 * result.size(), &positions[0].x, positions.size(),
@@ -233,7 +236,7 @@ std::vector<Triangle> simplified(const Merged& mesh, const std::vector<bool>& is
   }
   // Loose pieces, or places where many sheets meet, may have stopped it.
   std::vector<std::uint32_t> used = used_vertices(result, vertex_count);
-  if (10 * used.size() > 11 * wanted_count) {
+  if (4 * used.size() > 5 * wanted_count) {
     const std::size_t used_count = used.size();
     std::erase_if(used, [&](std::uint32_t v) { return is_locked[v]; });
     const std::size_t locked_count = used_count - used.size();
@@ -339,12 +342,12 @@ Thinning thinned_points(const Merged& cloud, std::size_t wanted_count) {
 /// Where what a kept vertex stands for is shown: locked ones show themselves alone, so that a border has the same colours
 /// on both sides, and hand the rest on to the nearest that is not.
 std::vector<std::uint32_t> showing_vertices(const Thinning& thinning, const Merged& mesh,
-                                            const std::vector<bool>& is_locked) {
+                                            const std::vector<bool>& is_kept_locked) {
   std::vector<Vec3f> positions(thinning.kept.size());
   std::vector<bool> is_free(thinning.kept.size());
   for (std::size_t k = 0; k < positions.size(); ++k) {
     positions[k] = mesh.positions[thinning.kept[k]];
-    is_free[k] = !is_locked[thinning.kept[k]];
+    is_free[k] = !is_kept_locked[k];
   }
   std::vector<std::uint32_t> result = Surface(positions, thinning.triangles).nearest_seeds(is_free);
   for (std::uint32_t k = 0; k < result.size(); ++k) {
@@ -355,36 +358,31 @@ std::vector<std::uint32_t> showing_vertices(const Thinning& thinning, const Merg
 
 /// Puts a temperature of the full mesh that lost its place to one further from the median onto the vertex near `k` where it
 /// hides the least.
-void show_extreme(Tile& tile, std::uint32_t k, float celsius, float median_celsius) {
-  const auto holds = [&](float t) {
-    return std::find(tile.temperature_celsius.begin(), tile.temperature_celsius.end(), t) !=
-           tile.temperature_celsius.end();
-  };
-  if (std::isnan(celsius) || holds(celsius)) return;
+void show_extreme(Tile& tile, std::uint32_t k, float celsius, float median_celsius,
+                  const std::vector<bool>& is_kept_locked) {
+  std::vector<float>& shown = tile.temperature_celsius;
+  if (std::isnan(celsius) || std::find(shown.begin(), shown.end(), celsius) != shown.end()) return;
   std::vector<std::uint32_t> near{k};
   for (const Triangle& t : tile.triangles) {
     if (t[0] == k || t[1] == k || t[2] == k) near.insert(near.end(), t.begin(), t.end());
   }
-  const auto deviation = [&](std::uint32_t v) {
-    const float t = tile.temperature_celsius[v];
-    return std::isfinite(t) ? std::fabs(static_cast<double>(t) - static_cast<double>(median_celsius)) : -1;
+  // The other extreme is never given up for this one; a locked vertex only where there is no other.
+  const auto cost = [&](std::uint32_t v) {
+    const float t = shown[v];
+    const bool is_other = t == tile.lowest_celsius || t == tile.highest_celsius;
+    const double deviation =
+        std::isfinite(t) ? std::fabs(static_cast<double>(t) - static_cast<double>(median_celsius)) : -1;
+    return std::tuple(is_other, is_kept_locked[v], deviation, v);
   };
-  // The other extreme is never given up for this one, but a tile of one vertex has no room for both.
-  const auto is_other = [&](std::uint32_t v) {
-    const float t = tile.temperature_celsius[v];
-    return t == tile.lowest_celsius || t == tile.highest_celsius;
-  };
-  std::erase_if(near, is_other);
-  if (near.empty()) {
-    near.resize(tile.temperature_celsius.size());
+  const auto is_cheaper = [&](std::uint32_t a, std::uint32_t b) { return cost(a) < cost(b); };
+  std::uint32_t chosen = *std::min_element(near.begin(), near.end(), is_cheaper);
+  if (std::get<0>(cost(chosen))) {
+    near.resize(shown.size());
     std::iota(near.begin(), near.end(), 0u);
-    std::erase_if(near, is_other);
+    chosen = *std::min_element(near.begin(), near.end(), is_cheaper);
   }
-  if (near.empty()) return;
-  const std::uint32_t chosen = *std::min_element(near.begin(), near.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::pair(deviation(a), a) < std::pair(deviation(b), b);
-  });
-  tile.temperature_celsius[chosen] = celsius;
+  // A tile of one vertex has no room for both.
+  if (!std::get<0>(cost(chosen))) shown[chosen] = celsius;
 }
 
 /// Fills the kept vertices with what they show.
@@ -392,7 +390,9 @@ void show(Node& node, const Merged& mesh, const Thinning& thinning, const std::v
           float median_celsius) {
   Tile& tile = *node.tile;
   const std::size_t count = thinning.kept.size();
-  const std::vector<std::uint32_t> showing = showing_vertices(thinning, mesh, is_locked);
+  std::vector<bool> is_kept_locked(count);
+  for (std::size_t k = 0; k < count; ++k) is_kept_locked[k] = is_locked[thinning.kept[k]];
+  const std::vector<std::uint32_t> showing = showing_vertices(thinning, mesh, is_kept_locked);
   struct Colour {
     std::uint64_t r = 0, g = 0, b = 0, weight = 0;
   };
@@ -410,6 +410,9 @@ void show(Node& node, const Merged& mesh, const Thinning& thinning, const std::v
     colour.b += weight * mesh.visible[v].b;
     colour.weight += weight;
   }
+  tile.positions.reserve(count);
+  tile.visible.reserve(count);
+  tile.source_vertex.reserve(count);
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t v = thinning.kept[k];
     const Colour& colour = colours[k];
@@ -422,11 +425,11 @@ void show(Node& node, const Merged& mesh, const Thinning& thinning, const std::v
     node.sharing_level.push_back(mesh.sharing_level[v]);
     node.weight.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(colour.weight, 0xffffffffu)));
   }
-  if (mesh.lowest_at != kNone) {
-    show_extreme(tile, thinning.kept_of_merged[mesh.lowest_at], tile.lowest_celsius, median_celsius);
-  }
-  if (mesh.highest_at != kNone) {
-    show_extreme(tile, thinning.kept_of_merged[mesh.highest_at], tile.highest_celsius, median_celsius);
+  tile.triangles = thinning.triangles;
+  for (const auto& [at, celsius] :
+       {std::pair(mesh.lowest_at, tile.lowest_celsius), std::pair(mesh.highest_at, tile.highest_celsius)}) {
+    if (at == kNone) continue;
+    show_extreme(tile, showing[thinning.kept_of_merged[at]], celsius, median_celsius, is_kept_locked);
   }
 }
 
@@ -468,11 +471,6 @@ void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
       is_point_cloud ? thinned_points(mesh, wanted_count) : thinned_surface(mesh, is_locked, wanted_count);
   show(node, mesh, thinning, is_locked, options.median_celsius);
   tile.owned_count = static_cast<std::uint32_t>(tile.positions.size());
-  tile.triangles = std::move(thinning.triangles);
-  tile.triangles.shrink_to_fit();
-  tile.positions.shrink_to_fit();
-  tile.visible.shrink_to_fit();
-  tile.source_vertex.shrink_to_fit();
   tile.geometric_error_m =
       std::nextafter(static_cast<float>(children_error_m + thinning.distance_m), std::numeric_limits<float>::max());
 }

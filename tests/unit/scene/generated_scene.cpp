@@ -62,6 +62,58 @@ fusion::MultispectralMesh terrain(const TerrainOptions& options) {
   return mesh;
 }
 
+fusion::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<std::uint32_t> place(std::size_t{columns} * rows);
+  std::iota(place.begin(), place.end(), 0u);
+  shuffle(place, random);
+  fusion::MultispectralMesh mesh;
+  mesh.resize_vertices(place.size());
+  mesh.name = "torus";
+  mesh.has_visible = mesh.has_temperature = true;
+  constexpr float kTurn = 6.2831853f;
+  for (std::uint32_t i = 0; i < place.size(); ++i) {
+    const float u = kTurn * static_cast<float>(i % columns) / static_cast<float>(columns);
+    const float v = kTurn * static_cast<float>(i / columns) / static_cast<float>(rows);
+    const float tube = 3 + 0.02f * unit(random);
+    const float ring = 10 + tube * std::cos(v);
+    mesh.positions()[place[i]] = {ring * std::cos(u), ring * std::sin(u), tube * std::sin(v)};
+    mesh.visible()[place[i]] = colour(random);
+    mesh.temperature_celsius()[place[i]] = 20 + 3 * std::sin(2 * u) + unit(random);
+  }
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    for (std::uint32_t column = 0; column < columns; ++column) {
+      const std::uint32_t right = (column + 1) % columns, up = (row + 1) % rows;
+      const std::uint32_t a = place[row * columns + column], b = place[row * columns + right];
+      const std::uint32_t c = place[up * columns + column], d = place[up * columns + right];
+      mesh.triangles().push_back({a, b, c});
+      mesh.triangles().push_back({b, d, c});
+    }
+  }
+  shuffle(mesh.triangles(), random);
+  return mesh;
+}
+
+fusion::MultispectralMesh soup_of(const fusion::MultispectralMesh& mesh) {
+  fusion::MultispectralMesh soup;
+  soup.resize_vertices(3 * mesh.triangle_count());
+  soup.has_visible = mesh.has_visible;
+  soup.has_temperature = mesh.has_temperature;
+  for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
+    fusion::Triangle triangle{};
+    for (unsigned corner = 0; corner < 3; ++corner) {
+      const std::size_t v = 3 * t + corner;
+      const std::uint32_t source = mesh.triangles()[t][corner];
+      triangle[corner] = static_cast<std::uint32_t>(v);
+      soup.positions()[v] = mesh.positions()[source];
+      soup.visible()[v] = mesh.visible()[source];
+      soup.temperature_celsius()[v] = mesh.temperature_celsius()[source];
+    }
+    soup.triangles().push_back(triangle);
+  }
+  return soup;
+}
+
 fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed) {
   std::mt19937 random(seed);
   fusion::MultispectralMesh mesh;

@@ -17,6 +17,12 @@ struct TerrainOptions {
 };
 fusion::MultispectralMesh terrain(const TerrainOptions& options);
 
+/// A rough closed surface: a ring of columns x rows vertices, in scan order.
+fusion::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed);
+
+/// The same triangles, each with three vertices of its own.
+fusion::MultispectralMesh soup_of(const fusion::MultispectralMesh& mesh);
+
 /// Points all over a cube of one metre, with colours and temperatures.
 fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed);
 

@@ -372,17 +372,7 @@ TEST(SceneSnapshot, FewTrianglesAmongManyLoneVertices) {
 }
 
 TEST(SceneSnapshot, TriangleSoupHasLeavesOfTheRightSize) {
-  const MultispectralMesh terrain = testing::terrain({.is_shuffled = false});
-  MultispectralMesh soup;
-  soup.resize_vertices(3 * terrain.triangle_count());
-  for (std::size_t t = 0; t < terrain.triangle_count(); ++t) {
-    fusion::Triangle triangle{};
-    for (unsigned corner = 0; corner < 3; ++corner) {
-      triangle[corner] = static_cast<std::uint32_t>(3 * t + corner);
-      soup.positions()[triangle[corner]] = terrain.positions()[terrain.triangles()[t][corner]];
-    }
-    soup.triangles().push_back(triangle);
-  }
+  const MultispectralMesh soup = testing::soup_of(testing::terrain({.is_shuffled = false}));
   expect_all(soup);
   const auto scene = snapshot_of(soup);
   for (const auto& tile : scene->tiles()) EXPECT_LE(tile->owned_count, kLeafSize * 5 / 4);
