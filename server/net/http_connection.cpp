@@ -165,6 +165,8 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) cons
 }
 
 std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request) const {
+  // RFC 6455, 4.1; what came early is in our buffer and would be lost.
+  if (buffer_.size() > 0) return text_reply(400, "nothing may follow an upgrade before it is answered\n");
   if (!beast::websocket::is_upgrade(request)) {
     auto reply = text_reply(426, "a WebSocket upgrade with subprotocol spectra.v1 is required\n");
     reply.headers.emplace_back("Upgrade", "websocket");
