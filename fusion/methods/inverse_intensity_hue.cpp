@@ -16,39 +16,42 @@
 HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
-/// t^k for t in [0, 1] and k > 0, to a relative error below 1e-9 wherever the result is above 1e-30.
+/// c0 + x (c1 + x (c2 + ...)).
+HWY_INLINE Doubles polynomial(Doubles, double c0) {
+  return hn::Set(DoubleTag(), c0);
+}
+template <class... Rest>
+HWY_INLINE Doubles polynomial(Doubles x, double c0, Rest... rest) {
+  return hn::Add(hn::Set(DoubleTag(), c0), hn::Mul(x, polynomial(x, rest...)));
+}
+
+/// t^k for t in [0, 1] and k > 0, within 1e-7 of the exact power.
 HWY_INLINE Doubles power(Doubles t, double k) {
   const DoubleTag d;
   const hn::RebindToSigned<DoubleTag> di;
-  const auto polynomial = [&](Doubles x, std::initializer_list<double> from_highest) HWY_ATTR {
-    Doubles sum = hn::Zero(d);
-    for (const double coefficient : from_highest) sum = hn::Add(hn::Mul(sum, x), hn::Set(d, coefficient));
-    return sum;
-  };
   // t = 2^e m with m in [sqrt(1/2), sqrt(2)); subnormal t is lifted first.
   const auto tiny = hn::Lt(t, hn::Set(d, 0x1p-1000));
   const Doubles lifted = hn::IfThenElse(tiny, hn::Mul(t, hn::Set(d, 0x1p600)), t);
   const auto bits = hn::BitCast(di, lifted);
   const auto root_half = hn::Set(di, 0x3FE6A09E667F3BCDLL);
   const auto exponent = hn::ShiftRight<52>(hn::Sub(bits, root_half));
-  const Doubles mantissa = hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<52>(exponent)));
-  // Whole numbers below 2^51 turn into doubles in the low bits of kWholeDouble.
+  const Doubles m = hn::BitCast(d, hn::Sub(bits, hn::ShiftLeft<52>(exponent)));
+  // A small whole number added to the bits of kWholeDouble is that number added to it.
   const Doubles whole = hn::Set(d, kWholeDouble);
-  Doubles e = hn::Sub(hn::BitCast(d, hn::Add(exponent, hn::BitCast(di, whole))), whole);
-  e = hn::Sub(e, hn::IfThenElseZero(tiny, hn::Set(d, 600)));
-  // log2(m) = 2 / ln 2 * artanh(s), s = (m - 1) / (m + 1), |s| < 0.172.
-  const Doubles s = hn::Div(hn::Sub(mantissa, hn::Set(d, 1)), hn::Add(mantissa, hn::Set(d, 1)));
-  const Doubles s2 = hn::Mul(s, s);
-  const Doubles artanh = hn::Mul(s, polynomial(s2, {1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3, 1.0}));
-  const Doubles log2 = hn::Add(e, hn::Mul(artanh, hn::Set(d, 2.8853900817779268)));
-  // 2^y = 2^n e^(r ln 2), n whole, |r| <= 1/2.
+  const Doubles e = hn::Sub(hn::Sub(hn::BitCast(d, hn::Add(exponent, hn::BitCast(di, whole))), whole),
+                            hn::IfThenElseZero(tiny, hn::Set(d, 600)));
+  // ln m = 2 artanh s with s = (m - 1) / (m + 1), |s| < 0.172: the series to s^9.
+  const Doubles s = hn::Div(hn::Sub(m, hn::Set(d, 1)), hn::Add(m, hn::Set(d, 1)));
+  constexpr double kScale = 2.8853900817779268;  // 2 / ln 2
+  const Doubles log2 =
+      hn::Add(e, hn::Mul(s, polynomial(hn::Mul(s, s), kScale, kScale / 3, kScale / 5, kScale / 7, kScale / 9)));
+  // 2^y = 2^n e^x with n whole and |x| <= ln 2 / 2: the series to x^7.
   const Doubles y = hn::Max(hn::Mul(log2, hn::Set(d, k)), hn::Set(d, -1000));
   const Doubles shifted = hn::Add(y, whole);
-  const Doubles r = hn::Mul(hn::Sub(y, hn::Sub(shifted, whole)), hn::Set(d, 0.6931471805599453));
-  const Doubles scaled = polynomial(
-      r, {1.0 / 362880, 1.0 / 40320, 1.0 / 5040, 1.0 / 720, 1.0 / 120, 1.0 / 24, 1.0 / 6, 1.0 / 2, 1.0, 1.0});
-  const auto power_of_two = hn::ShiftLeft<52>(hn::BitCast(di, shifted));
-  const Doubles result = hn::BitCast(d, hn::Add(hn::BitCast(di, scaled), power_of_two));
+  const Doubles x = hn::Mul(hn::Sub(y, hn::Sub(shifted, whole)), hn::Set(d, 0.6931471805599453));
+  const Doubles exp = polynomial(x, 1.0, 1.0, 1.0 / 2, 1.0 / 6, 1.0 / 24, 1.0 / 120, 1.0 / 720, 1.0 / 5040);
+  const auto two_to_n = hn::ShiftLeft<52>(hn::BitCast(di, shifted));
+  const Doubles result = hn::BitCast(d, hn::Add(hn::BitCast(di, exp), two_to_n));
   return hn::IfThenElseZero(hn::Gt(t, hn::Zero(d)), result);
 }
 

@@ -124,7 +124,7 @@ class ThermalColours {
     const float* rows = table_.rows[0].data();
 #if HWY_TARGET == HWY_SCALAR
     for (std::size_t i = 0; i < count; ++i) {
-      const float* row = rows + 8 * (row_[i] & 255U);
+      const float* row = rows + 8 * (static_cast<std::uint8_t>(row_[i]));
       for (std::size_t c = 0; c < 3; ++c) colour_[3 * i + c] = row[c] + part_[i] * row[4 + c];
     }
 #else
@@ -182,14 +182,18 @@ class ThermalColours {
   }
 
 #if HWY_TARGET != HWY_SCALAR
-  /// Four floats of the rows of as many vertices as fit.
-  template <class Tag>
-  static HWY_INLINE hn::Vec<Tag> gathered(Tag d, const float* rows, const std::uint32_t* row) {
-    if constexpr (hn::MaxLanes(Tag()) == 4) {
-      return hn::Load(d, rows + 8 * (row[0] & 255U));
+  /// Four floats of the rows of as many vertices as fit. Loads that repeat a block cost no shuffle.
+  template <std::size_t kWidth = kLanes>
+  static HWY_INLINE Floats gathered(FloatTag d, const float* rows, const std::uint32_t* row) {
+    const auto block = [&](std::size_t vertex)
+                           HWY_ATTR { return hn::LoadDup128(d, rows + 8 * static_cast<std::uint8_t>(row[vertex])); };
+    if constexpr (kWidth == 4) {
+      return block(0);
+    } else if constexpr (kWidth == 8) {
+      return hn::OddEvenBlocks(block(1), block(0));
     } else {
-      const hn::Half<Tag> half;
-      return hn::Combine(d, gathered(half, rows, row + hn::MaxLanes(Tag()) / 8), gathered(half, rows, row));
+      static_assert(kWidth == 16);
+      return hn::ConcatUpperLower(d, hn::OddEvenBlocks(block(3), block(2)), hn::OddEvenBlocks(block(1), block(0)));
     }
   }
 #endif
@@ -312,11 +316,13 @@ class AlwaysShown : public Weight {
 /// Whether every temperature of a block is finite.
 HWY_INLINE bool all_finite(const float* temperature, std::size_t count) {
   const FloatTag d;
-  auto finite = hn::IsFinite(hn::LoadU(d, temperature));
-  for (std::size_t i = kLanes; i < count; i += kLanes) {
-    finite = hn::And(finite, hn::IsFinite(hn::LoadU(d, temperature + i)));
+  const hn::RebindToUnsigned<FloatTag> bits;
+  auto largest = hn::Zero(bits);
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    // Without its sign bit, what is not finite is at least the pattern of infinity.
+    largest = hn::Max(largest, hn::ShiftLeft<1>(hn::BitCast(bits, hn::LoadU(d, temperature + i))));
   }
-  return hn::AllTrue(d, finite);
+  return hn::AllTrue(bits, hn::Lt(largest, hn::Set(bits, 0xFF000000U)));
 }
 
 /// combine(weight, palette channel, visible channel) for every channel of a block, as they lie in memory.
@@ -342,10 +348,10 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
   }
 }
 
-/// weight * palette + (1 - weight) * visible; exactly `visible` where the weight is 0.
+/// weight * palette + (1 - weight) * visible; exactly one of them where the weight is 0 or 1.
 struct Mix {
   HWY_INLINE Floats operator()(Floats weight, Floats palette, Floats visible) const {
-    return hn::Add(visible, hn::Mul(weight, hn::Sub(palette, visible)));
+    return hn::Add(hn::Mul(weight, palette), hn::Mul(hn::Sub(all(1), weight), visible));
   }
 };
 
