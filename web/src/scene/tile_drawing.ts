@@ -25,14 +25,10 @@ export class TileDrawing {
 
   /** Makes one tile, hidden until it is selected. */
   create(decoded: DecodedGeometry, rgba: Uint8Array<ArrayBuffer>): Drawable {
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(decoded.positions, 3));
-    const colours = new BufferAttribute(rgba, 4, true);
-    geometry.setAttribute('color', colours);
-    if (decoded.indices !== null) geometry.setIndex(new BufferAttribute(decoded.indices, 1));
+    const object = this.#object(decoded.positions, rgba, decoded.indices);
+    const { geometry } = object;
+    const colours = geometry.getAttribute('color') as BufferAttribute;
     geometry.boundingSphere = new Sphere(new Vector3(...decoded.centre), decoded.radius);
-    const object = decoded.indices === null ? new Points(geometry, this.#cloud) : new Mesh(geometry, this.#surface);
-    object.matrixAutoUpdate = false;
     object.visible = false;
     this.group.add(object);
     this.invalidate();
@@ -53,9 +49,40 @@ export class TileDrawing {
     };
   }
 
+  /**
+   * An empty tile of each kind. Compiled before the first real one, it spares the main thread the wait for the shader. Returns what
+   * removes it again.
+   */
+  addSpecimens(): () => void {
+    const objects = [
+      this.#object(new Float32Array(9), new Uint8Array(12), Uint16Array.from([0, 0, 0])),
+      this.#object(new Float32Array(3), new Uint8Array(4), null),
+    ];
+    for (const object of objects) object.frustumCulled = false;
+    this.group.add(...objects);
+    return () => {
+      this.group.remove(...objects);
+      for (const { geometry } of objects) geometry.dispose();
+    };
+  }
+
   setPointSize(size_px: number): void {
     this.#cloud.size = size_px;
     this.invalidate();
+  }
+
+  #object(
+    positions: Float32Array<ArrayBuffer>,
+    rgba: Uint8Array<ArrayBuffer>,
+    indices: Uint16Array<ArrayBuffer> | Uint32Array<ArrayBuffer> | null,
+  ): Mesh | Points {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(positions, 3));
+    geometry.setAttribute('color', new BufferAttribute(rgba, 4, true));
+    if (indices !== null) geometry.setIndex(new BufferAttribute(indices, 1));
+    const object = indices === null ? new Points(geometry, this.#cloud) : new Mesh(geometry, this.#surface);
+    object.matrixAutoUpdate = false;
+    return object;
   }
 
   dispose(): void {

@@ -55,12 +55,14 @@ export class Viewport {
   #sceneCentre = new Vector3();
   #sceneRadius = 1;
   #pictures = 0;
+  #ready = false;
 
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewportEvents,
   ) {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+    this.#renderer.debug.checkShaderErrors = import.meta.env.DEV;
     this.#renderer.outputColorSpace = LinearSRGBColorSpace;
     this.#scene.add(this.tiles.group);
     this.#scene.matrixAutoUpdate = false;
@@ -76,6 +78,15 @@ export class Viewport {
       this.#controls.addEventListener(wake, () => this.invalidate());
     }
     this.#fitToElement();
+    const removeSpecimens = this.tiles.addSpecimens();
+    const compiled = () => {
+      // The first use of a program asks the GPU about it and waits for the answer: here, where nothing keeps it busy yet.
+      this.#renderer.render(this.#scene, this.#camera);
+      removeSpecimens();
+      this.#ready = true;
+      this.invalidate();
+    };
+    this.#renderer.compileAsync(this.#scene, this.#camera).then(compiled, compiled);
     this.#resize = new ResizeObserver(() => {
       this.#fitToElement();
       this.events.onCamera(this.pose);
@@ -230,7 +241,7 @@ export class Viewport {
     this.#frame = 0;
     const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
     this.#lastFrameAt = now;
-    const more = this.events.beforeRender();
+    const more = this.#ready && this.events.beforeRender();
     const moved = this.#controls.update(elapsed_s);
     this.#draw();
     if (moved) this.events.onCamera(this.pose);
@@ -245,6 +256,10 @@ export class Viewport {
       this.#camera.near = near;
       this.#camera.far = far;
       this.#camera.updateProjectionMatrix();
+    }
+    if (!this.#ready) {
+      this.#renderer.clear();
+      return;
     }
     this.#renderer.render(this.#scene, this.#camera);
     this.#pictures += 1;

@@ -47,7 +47,7 @@ const CAMERA_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
 const TICK_MS = 100;
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
-const BYTES_PER_PICTURE = 6 * 1024 * 1024;
+const BYTES_PER_PICTURE = 4 * 1024 * 1024;
 
 interface Decoded {
   frame: TileFrame;
