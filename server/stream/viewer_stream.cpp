@@ -193,6 +193,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       quality_ = quality;
       quality_.colour_bits = std::clamp(quality.colour_bits, 4, 8);
       quality_.encoder_speed = std::clamp(quality.encoder_speed, 0, 10);
+      is_complete_due_ = true;
       choose_point();
     });
   }
@@ -216,21 +217,23 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const std::lock_guard lock(mutex_);
     wake_pending_ = false;
     if (closed_ || !subscribed_) return std::nullopt;
-    if (!removed_.empty()) {
-      const TileFrameHeader header = removed_.front();
-      if (!window_.admits(protocol::kTileFrameHeaderSize)) return std::nullopt;
-      removed_.pop_front();
-      return given_out(header, nullptr, now_s);
-    }
+    if (!removed_.empty()) return next_removal(now_s);
     if (head() == nullptr) refine();
     while (Slot* slot = head()) {
+      if (!removed_.empty()) return next_removal(now_s);
       if (slot->work == Slot::Work::Idle) look_up(*slot);
       if (slot->work != Slot::Work::Ready) break;
       if (slot->held_revision != slot->geometry->revision) {
         if (!window_.admits(frame_size(slot->geometry->payload))) return std::nullopt;
-        prepared_bytes_ -= slot->geometry->payload->size();
-        slot->held_name =
+        const std::uint32_t name =
             slot->geometry->revision > slot->held_name ? slot->geometry->revision : cache_->unused_revision();
+        if (name <= slot->held_name) {
+          // Resumed under a revision that is not of this run of the server; what replaces it has to be newer.
+          remove_from_viewer(*slot);
+          continue;
+        }
+        prepared_bytes_ -= slot->geometry->payload->size();
+        slot->held_name = name;
         slot->held_revision = slot->geometry->revision;
         slot->held_geometry_epoch = demand_.geometry_epoch;
         slot->held_colour_epoch = 0;
@@ -472,7 +475,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     std::uint64_t held_vertices = 0;
     std::vector<Slot*> unused;
     for (const auto& slot : slots_) {
-      held_vertices += slot->held_vertex_count;
+      held_vertices += slot->is_wanted ? slot->tile->positions.size() : slot->held_vertex_count;
       if (!slot->is_wanted && slot->held_vertex_count > 0) unused.push_back(slot.get());
     }
     if (held_vertices <= limits_.held_vertices) return;
@@ -696,6 +699,13 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   std::weak_ptr<CacheWaiter> weak_waiter() {
     return std::shared_ptr<CacheWaiter>(shared_from_this(), static_cast<CacheWaiter*>(this));
+  }
+
+  std::optional<OutgoingFrame> next_removal(double now_s) {
+    if (!window_.admits(protocol::kTileFrameHeaderSize)) return std::nullopt;
+    const TileFrameHeader header = removed_.front();
+    removed_.pop_front();
+    return given_out(header, nullptr, now_s);
   }
 
   OutgoingFrame given_out(TileFrameHeader header, Payload payload, double now_s) {

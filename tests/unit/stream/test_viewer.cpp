@@ -14,12 +14,16 @@ constexpr std::chrono::seconds kStall{20};
 
 }  // namespace
 
-TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool)
-    : stream_(ViewerStream::create(std::move(scene), cache, pool, [this] {
-        const std::lock_guard lock(mutex_);
-        ++wake_count_;
-        woken_.notify_all();
-      })) {}
+TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool,
+                       StreamLimits limits)
+    : stream_(ViewerStream::create(
+          std::move(scene), cache, pool,
+          [this] {
+            const std::lock_guard lock(mutex_);
+            ++wake_count_;
+            woken_.notify_all();
+          },
+          limits)) {}
 
 TestViewer::~TestViewer() {
   stream_->close();
@@ -108,6 +112,8 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       break;
     }
     case protocol::FrameKind::Remove:
+      // What was removed may come again.
+      revisions_.erase(header.revision);
       EXPECT_EQ(tiles.erase(header.tile), 1U);
       EXPECT_EQ(header.payload_size_bytes, 0U);
       break;

@@ -26,7 +26,7 @@ struct HeldTile {
 /// (rising sequence, colours only for the revision held, no revision twice, generations never falling).
 class TestViewer {
  public:
-  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool);
+  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool, StreamLimits limits = {});
   ~TestViewer();
   TestViewer(const TestViewer&) = delete;
   TestViewer& operator=(const TestViewer&) = delete;
@@ -49,6 +49,7 @@ class TestViewer {
   std::size_t taken_bytes = 0;
   std::size_t wake_count();
 
+  std::uint32_t last_generation() const { return stream_->generation(); }
   std::size_t count(protocol::FrameKind kind) const;
 
  private:

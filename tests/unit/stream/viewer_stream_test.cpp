@@ -3,10 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
 #include <numeric>
+#include <set>
 #include <thread>
 
 #include "fake_scene.hpp"
+#include "server/stream/view_selection.hpp"
 #include "test_viewer.hpp"
 
 namespace spectra::server {
@@ -411,6 +417,30 @@ TEST_F(ViewerStreamTest, ATileThatCannotBeEncodedIsLeftOutAndCounted) {
   EXPECT_EQ(viewer.stream().stats().failed_tiles, 1U) << "tried again for every change of settings";
 }
 
+TEST_F(ViewerStreamTest, AnEncodingThatComesBackHasANewRevisionOnTheWire) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  const auto first = viewer.tiles.at({0, 0, 0, 0}).geometry.revision;
+  const StreamQuality quality = viewer.stream().quality();
+  StreamQuality coarser = quality;
+  coarser.position_step_m = lattice_step(0.01);
+  viewer.stream().set_quality(coarser);
+  viewer.complete();
+  const auto second = viewer.tiles.at({0, 0, 0, 0}).geometry.revision;
+  viewer.stream().set_quality(quality);
+  const auto misses = cache_.miss_count();
+  viewer.complete();
+  EXPECT_EQ(cache_.miss_count(), misses);
+  EXPECT_GT(second, first);
+  EXPECT_GT(viewer.tiles.at({0, 0, 0, 0}).geometry.revision, second);
+  show(viewer, 0.6);
+  viewer.complete();
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 3 * scene_->tiles().size());
+  expect_picture(viewer, *scene_, 0.6);
+}
+
 TEST_F(ViewerStreamTest, UnsubscribeStopsAndSubscribeStartsFromNothing) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe(0);
@@ -504,6 +534,240 @@ TEST_F(ViewerStreamTest, SurvivesViewersThatLeaveInTheMiddle) {
   show(last, 0.79);
   last.complete();
   expect_picture(last, *scene_, 0.79);
+}
+
+/// Sixteen leaves under four quarters under a root, over the square (0,0)-(4,4).
+class ViewerStreamOfATree : public ViewerStreamTest {
+ protected:
+  ViewerStreamOfATree() { scene_ = scene_of(testing::quadtree_tiles(3, 40)); }
+
+  static Camera camera_over(float x, float y, float height) {
+    return {.eye = {x, y, height}, .target = {x, y, 0}, .up = {0, 1, 0}, .fov_y_deg = 50, .viewport = {800, 800}};
+  }
+
+  /// What a client draws by the protocol's rule, whatever the colours are.
+  static std::set<protocol::TileId> drawn(const TestViewer& viewer) {
+    std::set<protocol::TileId> result;
+    const std::function<bool(protocol::TileId, std::set<protocol::TileId>&)> draw =
+        [&](protocol::TileId id, std::set<protocol::TileId>& into) {
+          const auto held = viewer.tiles.find(id);
+          if (held == viewer.tiles.end() || held->second.generation == 0) return false;
+          std::set<protocol::TileId> beneath;
+          const auto mask = held->second.geometry.child_mask;
+          bool is_replaced = mask != 0;
+          for (std::uint32_t i = 0; i < 8 && is_replaced; ++i) {
+            if ((mask >> i & 1) == 0) continue;
+            is_replaced = draw({static_cast<std::uint8_t>(id.level + 1), 2 * id.x + (i & 1), 2 * id.y + (i >> 1 & 1),
+                                2 * id.z + (i >> 2)},
+                               beneath);
+          }
+          if (is_replaced) {
+            into.merge(beneath);
+          } else {
+            into.insert(id);
+          }
+          return true;
+        };
+    draw({0, 0, 0, 0}, result);
+    return result;
+  }
+
+  /// Everything that is drawn and within a tenth beyond the view shows the newest colours of `alpha`.
+  void expect_view(const TestViewer& viewer, const Camera& camera, double alpha) {
+    const auto plan = plan_with_alpha(*scene_, alpha);
+    std::size_t visible_count = 0;
+    for (const auto& tile : scene_->tiles()) {
+      if (!drawn(viewer).contains(tile->id) || !may_be_in_view(camera, tile->bounds)) continue;
+      ++visible_count;
+      const HeldTile& held = viewer.tiles.at(tile->id);
+      EXPECT_EQ(held.generation, viewer.last_generation());
+      expect_tile(held, *tile, plan, 8);
+    }
+    EXPECT_GT(visible_count, 0U);
+  }
+};
+
+TEST_F(ViewerStreamOfATree, WhatIsNotLookedAtIsNeitherSentNorEncoded) {
+  TestViewer viewer(scene_, cache_, pool_);
+  const Camera corner = camera_over(0.5F, 0.5F, 0.5F);
+  viewer.stream().set_camera(corner);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  const auto complete = viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 9U);
+  EXPECT_EQ(complete.tile_count, 9U);
+  EXPECT_EQ(cache_.miss_count(), 18U);
+  EXPECT_EQ(drawn(viewer).size(), 3U + 4U);
+  expect_view(viewer, corner, 0.3);
+}
+
+TEST_F(ViewerStreamOfATree, AMovingCameraRefinesWhatItLooksAt) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().set_camera(camera_over(2, 2, 5000));
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  EXPECT_EQ(viewer.complete().tile_count, 1U);
+  const Camera far_corner = camera_over(3.5F, 3.5F, 0.5F);
+  viewer.stream().set_camera(far_corner);
+  viewer.complete();
+  EXPECT_TRUE(viewer.tiles.contains({2, 3, 3, 0}));
+  EXPECT_FALSE(viewer.tiles.contains({2, 0, 0, 0}));
+  expect_view(viewer, far_corner, 0.3);
+  const auto frames = viewer.frames.size();
+  viewer.stream().set_camera(camera_over(3.4F, 3.5F, 0.5F));
+  wait_until_idle(pool_);
+  EXPECT_EQ(viewer.take(), 0U);
+  EXPECT_EQ(viewer.frames.size(), frames);
+}
+
+TEST_F(ViewerStreamOfATree, ACameraThatMakesNoSenseIsIgnored) {
+  TestViewer viewer(scene_, cache_, pool_);
+  Camera nowhere = camera_over(0.5F, 0.5F, 0.5F);
+  nowhere.target = nowhere.eye;
+  viewer.stream().set_camera(nowhere);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  EXPECT_EQ(viewer.complete().tile_count, 21U);
+}
+
+TEST_F(ViewerStreamOfATree, TilesWhosePlaceIsTakenAreNotColouredAgain) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  const auto frames_before = viewer.frames.size();
+  show(viewer, 0.6);
+  const auto complete = viewer.complete();
+  // The root for a quick answer and the sixteen leaves; the quarters would add a quarter to the bytes.
+  EXPECT_EQ(viewer.frames.size() - frames_before, 17U);
+  EXPECT_EQ(complete.tile_count, 17U);
+  EXPECT_EQ(viewer.frames[frames_before].tile, (protocol::TileId{0, 0, 0, 0}));
+  for (const auto& id : drawn(viewer)) EXPECT_EQ(viewer.tiles.at(id).generation, 2U);
+
+  // From further away a quarter is to be drawn itself: now it needs the colours it was spared.
+  viewer.stream().set_camera(camera_over(2, 2, 60));
+  StreamQuality quality = viewer.stream().quality();
+  quality.pixel_error = 4;
+  viewer.stream().set_quality(quality);
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.at({1, 1, 1, 0}).generation, 2U);
+}
+
+TEST_F(ViewerStreamOfATree, OutdatedTilesDoNotStayInFrontOfNewerOnes) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  const Camera afar = camera_over(2, 2, 5000);
+  viewer.stream().set_camera(afar);
+  wait_until_idle(pool_);
+  viewer.take();
+  EXPECT_EQ(drawn(viewer).size(), 16U) << "what is there and not outdated may stay";
+  show(viewer, 0.6);
+  viewer.complete();
+  EXPECT_EQ(drawn(viewer).size(), 1U);
+  expect_view(viewer, afar, 0.6);
+  const Camera near = camera_over(0.5F, 0.5F, 0.5F);
+  viewer.stream().set_camera(near);
+  viewer.complete();
+  expect_view(viewer, near, 0.6);
+}
+
+TEST_F(ViewerStreamOfATree, TilesLeftLongestAreRemovedBeyondTheLimit) {
+  constexpr std::uint64_t kTileVertices = 40 * 40;
+  TestViewer viewer(scene_, cache_, pool_, {.held_vertices = 14 * kTileVertices});
+  viewer.stream().subscribe(0);
+  viewer.stream().set_camera(camera_over(0.5F, 0.5F, 0.5F));
+  show(viewer, 0.3);
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 9U);
+  viewer.stream().set_camera(camera_over(3.5F, 0.5F, 0.5F));
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 13U);
+  EXPECT_EQ(viewer.count(FrameKind::Remove), 0U);
+  viewer.stream().set_camera(camera_over(3.5F, 3.5F, 0.5F));
+  viewer.complete();
+  viewer.stream().set_camera(camera_over(0.5F, 3.5F, 0.5F));
+  viewer.complete();
+  EXPECT_FALSE(viewer.tiles.contains({2, 0, 0, 0}));
+  EXPECT_TRUE(viewer.tiles.contains({2, 3, 3, 0}));
+  EXPECT_LE(viewer.tiles.size(), 14U);
+  // Back again: what was removed is sent again, geometry and all.
+  const Camera first_corner = camera_over(0.5F, 0.5F, 0.5F);
+  viewer.stream().set_camera(first_corner);
+  viewer.complete();
+  expect_view(viewer, first_corner, 0.3);
+}
+
+TEST_F(ViewerStreamOfATree, ResumesWithTheTilesThatAreStillGood) {
+  std::vector<ResumedTile> held;
+  {
+    TestViewer before(scene_, cache_, pool_);
+    before.stream().subscribe(0);
+    show(before, 0.3);
+    before.complete();
+    for (const auto& [id, tile] : before.tiles) held.push_back({id, tile.geometry.revision});
+  }
+  held[3].revision += 1'000'000;  // Never was, or not of this run.
+  held.push_back({{3, 7, 7, 0}, 5});
+  const auto misses = cache_.miss_count();
+  auto stream = ViewerStream::create(scene_, cache_, pool_, [] {});
+  stream->resume(held);
+  stream->subscribe(0);
+  stream->set_plan(plan_with_alpha(*scene_, 0.6));
+  std::map<FrameKind, std::vector<protocol::TileFrameHeader>> frames;
+  while (!stream->take_complete()) {
+    wait_until_idle(pool_);
+    while (const auto frame = stream->next_frame(0)) {
+      std::vector<std::byte> message(frame->header.begin(), frame->header.end());
+      if (frame->payload) message.insert(message.end(), frame->payload->begin(), frame->payload->end());
+      const auto header = protocol::decoded_frame(message).value().header;
+      frames[header.kind].push_back(header);
+      stream->acknowledge(header.sequence, 0);
+    }
+  }
+  stream->close();
+  ASSERT_EQ(frames[FrameKind::Geometry].size(), 1U);
+  EXPECT_EQ(frames[FrameKind::Geometry][0].tile, held[3].tile);
+  EXPECT_EQ(frames[FrameKind::Colours].size(), 21U);
+  for (const auto& header : frames[FrameKind::Colours]) {
+    const auto known =
+        std::find_if(held.begin(), held.end(), [&](const auto& tile) { return tile.tile == header.tile; });
+    ASSERT_NE(known, held.end());
+    if (header.tile == held[3].tile) continue;
+    EXPECT_EQ(header.revision, known->revision);
+  }
+  // The one that is gone, and the one whose claimed revision is newer than any there is.
+  ASSERT_EQ(frames[FrameKind::Remove].size(), 2U);
+  EXPECT_EQ(frames[FrameKind::Remove][0].tile, (protocol::TileId{3, 7, 7, 0}));
+  EXPECT_EQ(frames[FrameKind::Remove][1].tile, held[3].tile);
+  EXPECT_EQ(cache_.miss_count() - misses, 21U) << "colours alone";
+}
+
+TEST_F(ViewerStreamOfATree, TellsTheAccuracyOnTheScreen) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.acknowledges = false;
+  const Camera camera = camera_over(2, 2, 12);
+  viewer.stream().set_camera(camera);
+  viewer.stream().subscribe(1);
+  show(viewer, 0.3);
+  const double rounding_mm = static_cast<double>(viewer.stream().quality().position_step_m) / 2 * std::sqrt(3.0) * 1e3;
+  wait_until_idle(pool_);
+  for (int frame = 0; frame < 2; ++frame) {
+    EXPECT_EQ(viewer.stream().stats().position_mm, 0) << "nothing can be drawn yet";
+    viewer.take();
+    viewer.acknowledge();
+    wait_until_idle(pool_);
+  }
+  const StreamStats coarse = viewer.stream().stats();
+  EXPECT_NEAR(coarse.position_mm, 400 + rounding_mm, 1e-3);
+  EXPECT_GT(coarse.pixel_error, 20);
+  viewer.acknowledges = true;
+  viewer.complete();
+  const StreamStats fine = viewer.stream().stats();
+  EXPECT_NEAR(fine.position_mm, rounding_mm, 1e-6);
+  EXPECT_EQ(fine.pixel_error, 0);
+  EXPECT_EQ(fine.colour_levels, 256);
 }
 
 }  // namespace
