@@ -55,6 +55,29 @@ double histogram_edge(const Histogram& histogram, std::size_t index) {
   return minimum + (maximum - minimum) * (static_cast<double>(index) / static_cast<double>(bins));
 }
 
+double histogram_quantile(const Histogram& histogram, double part) {
+  std::uint64_t total = 0;
+  for (const std::uint64_t count : histogram.counts) total += count;
+  if (total == 0) return 0;
+  const double wanted = std::clamp(part, 0.0, 1.0) * static_cast<double>(total);
+  double before = 0;
+  for (std::size_t bin = 0; bin < histogram.counts.size(); ++bin) {
+    const auto count = static_cast<double>(histogram.counts[bin]);
+    if (count > 0 && before + count >= wanted) {
+      const double low = histogram_edge(histogram, bin);
+      return low + (histogram_edge(histogram, bin + 1) - low) * ((wanted - before) / count);
+    }
+    before += count;
+  }
+  return double{histogram.maximum};
+}
+
+void merge_histogram(const Histogram& other, Histogram& histogram) {
+  for (std::size_t bin = 0; bin < std::min(other.counts.size(), histogram.counts.size()); ++bin) {
+    histogram.counts[bin] += other.counts[bin];
+  }
+}
+
 void add_to_histogram(std::span<const float> temperature_celsius, Histogram& histogram) {
   const std::size_t bins = histogram.counts.size();
   if (bins == 0 || temperature_celsius.empty()) return;

@@ -48,24 +48,62 @@ TemperatureAccumulator::TemperatureAccumulator()
       maximum_(-std::numeric_limits<float>::infinity()) {}
 
 void TemperatureAccumulator::add(std::span<const float> temperature_celsius) {
-  for (const float value : temperature_celsius) {
-    if (!std::isfinite(value)) {
-      ++missing_count_;
+  // Temperatures of a scene share few exponents, so blocks of one exponent and no sign are summed in registers.
+  constexpr std::size_t kBlock = 64;
+  std::size_t begin = 0;
+  for (; begin + kBlock <= temperature_celsius.size(); begin += kBlock) {
+    const float* block = temperature_celsius.data() + begin;
+    const std::uint32_t shared = std::bit_cast<std::uint32_t>(block[0]) >> 23;
+    std::uint32_t different = 0;
+    for (std::size_t i = 0; i < kBlock; ++i) different |= (std::bit_cast<std::uint32_t>(block[i]) >> 23) ^ shared;
+    if (different != 0 || shared == 0 || shared >= 255) {
+      for (std::size_t i = 0; i < kBlock; ++i) add_one(block[i]);
       continue;
     }
-    ++finite_count_;
-    // Adding zero turns -0 into 0: the extremes must not depend on the order of the two.
-    minimum_ = std::min(minimum_, value + 0.0F);
-    maximum_ = std::max(maximum_, value + 0.0F);
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    const std::size_t exponent = (bits >> 23) & 0xFF;
-    const std::uint64_t mantissa = (bits & 0x7FFFFF) | (exponent == 0 ? 0U : 0x800000U);
-    const std::uint64_t square = mantissa * mantissa;
-    const auto magnitude = static_cast<std::int64_t>(mantissa);
-    sum_by_exponent_[exponent] += (bits >> 31) != 0 ? -magnitude : magnitude;
-    square_low_by_exponent_[exponent] += square & 0xFFFFFF;
-    square_high_by_exponent_[exponent] += square >> 24;
+    std::uint32_t sum = 0;
+    std::uint32_t lowest = ~0U;
+    std::uint32_t highest = 0;
+    std::uint64_t square_low = 0;
+    std::uint64_t square_high = 0;
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      const std::uint32_t mantissa = (std::bit_cast<std::uint32_t>(block[i]) & 0x7FFFFF) | 0x800000U;
+      const std::uint64_t square = std::uint64_t{mantissa} * mantissa;
+      sum += mantissa;
+      lowest = std::min(lowest, mantissa);
+      highest = std::max(highest, mantissa);
+      square_low += square & 0xFFFFFF;
+      square_high += square >> 24;
+    }
+    const auto value_of = [shared](std::uint32_t mantissa) {
+      return std::bit_cast<float>((shared << 23) | (mantissa & 0x7FFFFF));
+    };
+    minimum_ = std::min(minimum_, value_of(lowest));
+    maximum_ = std::max(maximum_, value_of(highest));
+    finite_count_ += kBlock;
+    sum_by_exponent_[shared] += sum;
+    square_low_by_exponent_[shared] += square_low;
+    square_high_by_exponent_[shared] += square_high;
   }
+  for (; begin < temperature_celsius.size(); ++begin) add_one(temperature_celsius[begin]);
+}
+
+void TemperatureAccumulator::add_one(float value) {
+  if (!std::isfinite(value)) {
+    ++missing_count_;
+    return;
+  }
+  ++finite_count_;
+  // Adding zero turns -0 into 0: the extremes must not depend on the order of the two.
+  minimum_ = std::min(minimum_, value + 0.0F);
+  maximum_ = std::max(maximum_, value + 0.0F);
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const std::size_t exponent = (bits >> 23) & 0xFF;
+  const std::uint64_t mantissa = (bits & 0x7FFFFF) | (exponent == 0 ? 0U : 0x800000U);
+  const std::uint64_t square = mantissa * mantissa;
+  const auto magnitude = static_cast<std::int64_t>(mantissa);
+  sum_by_exponent_[exponent] += (bits >> 31) != 0 ? -magnitude : magnitude;
+  square_low_by_exponent_[exponent] += square & 0xFFFFFF;
+  square_high_by_exponent_[exponent] += square >> 24;
 }
 
 void TemperatureAccumulator::merge(const TemperatureAccumulator& other) {

@@ -67,7 +67,9 @@ struct SceneTemperature {
   std::function<Histogram(std::uint32_t bins)> histogram;
 };
 
-/// Collects a TemperatureSummary; exact, mergeable in any order, and of fixed size.
+/// Collects a TemperatureSummary; exact, mergeable in any order, and of fixed size, so that one accumulator per tile
+/// lets an update of a tile leave the others unread. The mean is the exact one correctly rounded, sigma has a relative
+/// error below 1e-15. Good for 5e11 values.
 class TemperatureAccumulator {
  public:
   TemperatureAccumulator();
@@ -76,6 +78,8 @@ class TemperatureAccumulator {
   TemperatureSummary summary() const;
 
  private:
+  void add_one(float value);
+
   /// Sums of the mantissas, by exponent: no rounding ever happens before summary().
   std::vector<std::int64_t> sum_by_exponent_;
   std::vector<std::uint64_t> square_low_by_exponent_;
@@ -85,6 +89,13 @@ class TemperatureAccumulator {
   float minimum_;
   float maximum_;
 };
+
+/// The temperature below which a part of the counted values lies, part in [0, 1]; linear within its bin. Off by at most
+/// the width of one bin from the value that stands at that place among all values sorted. 0 of an empty histogram.
+double histogram_quantile(const Histogram& histogram, double part);
+
+/// Adds the counts of a histogram of the same extremes and bin number.
+void merge_histogram(const Histogram& other, Histogram& histogram);
 
 /// Adds the temperatures to the counts of a histogram whose extremes and bin number are set already; values that are
 /// not finite are left out.

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -59,6 +60,33 @@ TEST(Histogram, WholeFloatRangeAndOneStepRange) {
   add_to_histogram(narrow_values, narrow);
   EXPECT_EQ(narrow.counts.front(), 1U);
   EXPECT_EQ(narrow.counts.back(), 1U);
+}
+
+TEST(Histogram, QuantilesAreWithinOneBinOfTheSortedValues) {
+  std::vector<float> values;
+  for (int i = 0; i < 5000; ++i) values.push_back(20 + 10 * std::sin(static_cast<float>(i) * 0.7F));
+  std::sort(values.begin(), values.end());
+  Histogram histogram = empty_histogram(values.front(), values.back(), 256);
+  add_to_histogram(values, histogram);
+  const double width = (double{values.back()} - double{values.front()}) / 256;
+  for (const double part : {0.0, 0.02, 0.5, 0.9, 0.98, 1.0}) {
+    const auto place = std::min<std::size_t>(values.size() - 1, static_cast<std::size_t>(part * 5000));
+    EXPECT_NEAR(histogram_quantile(histogram, part), double{values[place]}, width * 1.001) << part;
+  }
+  EXPECT_EQ(histogram_quantile(empty_histogram(1, 2, 4), 0.5), 0);
+}
+
+TEST(Histogram, MergingPartsEqualsTheWhole) {
+  std::vector<float> values;
+  for (int i = 0; i < 1000; ++i) values.push_back(static_cast<float>((i * 37) % 101));
+  Histogram whole = empty_histogram(0, 100, 32);
+  Histogram left = whole;
+  Histogram right = whole;
+  add_to_histogram(values, whole);
+  add_to_histogram(std::span(values).first(333), left);
+  add_to_histogram(std::span(values).subspan(333), right);
+  merge_histogram(right, left);
+  EXPECT_EQ(left.counts, whole.counts);
 }
 
 TEST(Histogram, EdgesAscendFromMinimumToMaximum) {

@@ -118,6 +118,19 @@ TEST(TemperatureStatistics, OrderSplitAndMergeChangeNothing) {
   }
 }
 
+TEST(TemperatureStatistics, BlocksOfOneExponentAddUpLikeSingleValues) {
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<float> kelvin(256.0F, 511.0F);
+  std::vector<float> values(64 * 50 + 17);
+  for (float& value : values) value = kelvin(generator);
+  values[700] = -300.0F;  // one block with a sign, one with something missing, one with another exponent
+  values[1500] = kNan;
+  values[2100] = 0.25F;
+  TemperatureAccumulator one_by_one;
+  for (const float value : values) one_by_one.add(std::span(&value, 1));
+  expect_equal(summary_of(values), one_by_one.summary());
+}
+
 TEST(TemperatureStatistics, MergingDoubledManyTimesReachesTenBillion) {
   TemperatureAccumulator accumulator;
   const std::vector<float> values = {kLargest, -kLargest, 300.0F, 300.5F};
