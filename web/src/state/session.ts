@@ -318,7 +318,6 @@ export class Session {
     store.fusionInForce = message.fusion;
     store.wanted = null;
     store.quality = message.quality;
-    store.baseStep_mm ??= message.quality.position_step_mm;
     store.generation = 0;
     store.lostAt = null;
     store.statuses = [];
@@ -478,6 +477,7 @@ export class Session {
     this.#lastSequence = frame.sequence;
     const key = tileKey(frame.tile);
     if (frame.kind === FrameKind.geometry) {
+      this.#stepIs(frame.position_step_m * 1000);
       this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
     } else if (frame.kind === FrameKind.colours) {
       this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload });
@@ -491,6 +491,14 @@ export class Session {
       }
       this.#acknowledger.finished(frame.sequence);
     }
+  }
+
+  /** A server that had no scene when it said hello chooses its step later: the tiles tell which one it is. */
+  #stepIs(position_step_mm: number): void {
+    const { store } = this;
+    if (!this.#qualityChanged) store.baseStep_mm = position_step_mm;
+    if (store.quality === null || this.#qualitySender.busy || store.quality.position_step_mm === position_step_mm) return;
+    store.quality = { ...store.quality, position_step_mm };
   }
 
   #decode(key: string, frame: TileFrame, job: DecodeJob): void {
