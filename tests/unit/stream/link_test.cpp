@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "fake_scene.hpp"
 #include "fusion/mesh/ply_reader.hpp"
@@ -116,11 +120,87 @@ void expect_bars(const Drag& drag, LinkSpeed speed) {
 }
 
 TEST(RadioLink, ADraggedSliderIsFollowedAndSettlesAtTheRateOfTheLink) {
-  const auto scene = three_level_scene(128);
+  const auto scene = three_level_scene(96);
   const Drag drag = dragged(scene, kRadio);
   report("5 Mbit/s, 100 ms", drag, kRadio);
   expect_bars(drag, kRadio);
   EXPECT_GE(drag.coarse_count, 10U);
+}
+
+/// One change of the settings after the whole scene has arrived: when every leaf showed it for the first time and for the
+/// last time, counted from the change, and the colours in the end.
+struct Answer {
+  double first_s = 0;
+  double last_s = 0;
+  std::map<protocol::TileId, std::vector<std::byte>> colours;
+};
+
+Answer answered(const std::shared_ptr<const SceneSnapshot>& scene, StreamQuality quality) {
+  FrameCache cache(256u << 20);
+  WorkerPool pool(2);
+  SimulatedLink link(scene, cache, pool, kRadio);
+  link.stream().set_quality(quality);
+  link.stream().subscribe(0);
+  link.stream().set_plan(plan_with_alpha(*scene, 0));
+  link.run();
+  link.arrivals.clear();
+  const double change_s = link.now_s() + 1;
+  link.at(change_s, [&] { link.stream().set_plan(plan_with_alpha(*scene, 0.5)); });
+  link.run();
+  EXPECT_TRUE(link.completed_s.contains(2));
+  Answer answer;
+  std::map<protocol::TileId, double> first_s;
+  for (const auto& arrival : link.arrivals) {
+    if (arrival.header.tile.level < 2) continue;
+    first_s.emplace(arrival.header.tile, arrival.at_s - change_s);
+    answer.last_s = arrival.at_s - change_s;
+  }
+  EXPECT_EQ(first_s.size(), 16U);
+  for (const auto& [tile, at_s] : first_s) answer.first_s = std::max(answer.first_s, at_s);
+  for (auto& [tile, payload] : link.colours) {
+    if (tile.level == 2) answer.colours.emplace(tile, std::move(payload));
+  }
+  return answer;
+}
+
+TEST(RadioLink, AutomaticQualityAnswersSoonerAndEndsTheSame) {
+  const auto scene = three_level_scene(64);
+  const Answer manual = answered(scene, {});
+  StreamQuality quality;
+  quality.automatic = true;
+  quality.latency_target_ms = 1000 * manual.first_s * 0.7;
+  const Answer automatic = answered(scene, quality);
+  EXPECT_LT(automatic.first_s, 0.9 * manual.first_s);
+  EXPECT_GT(automatic.last_s, automatic.first_s);
+  EXPECT_EQ(automatic.colours, manual.colours);
+
+  quality.latency_target_ms = 1000 * manual.last_s * 3;
+  const Answer patient = answered(scene, quality);
+  EXPECT_EQ(patient.first_s, patient.last_s) << "full quality at once where it is in time";
+  EXPECT_EQ(patient.colours, manual.colours);
+}
+
+TEST(RadioLink, AViewerThatStopsAcknowledgingHoldsBoundedMemory) {
+  const auto scene = three_level_scene(96);
+  FrameCache cache(256u << 20);
+  WorkerPool pool(2);
+  SimulatedLink link(scene, cache, pool, {.bytes_per_s = 1e9, .round_trip_s = 0.001});
+  link.stream().subscribe(0);
+  link.stream().set_plan(plan_with_alpha(*scene, 0));
+  link.run();
+  link.stop_acknowledging();
+  link.arrivals.clear();
+  const double start_s = link.now_s() + 1;
+  for (int i = 0; i < 60; ++i) {
+    link.at(start_s + i / 30.0,
+            [&link, &scene, i] { link.stream().set_plan(plan_with_alpha(*scene, 0.01 * (i + 1))); });
+  }
+  link.run();
+  EXPECT_LE(link.most_queued_bytes, 8u << 20);
+  EXPECT_FALSE(link.completed_s.contains(61));
+  std::size_t sent_bytes = 0;
+  for (const auto& arrival : link.arrivals) sent_bytes += arrival.size_bytes;
+  EXPECT_LE(sent_bytes, 4u << 20) << "no more than the window";
 }
 
 TEST(RadioLink, TheRealSceneIsFollowedToo) {

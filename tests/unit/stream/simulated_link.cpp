@@ -43,8 +43,9 @@ void SimulatedLink::send_what_may_go() {
       in_flight_bytes_ += size_bytes;
       most_in_flight_bytes = std::max(most_in_flight_bytes, in_flight_bytes_);
       link_free_s_ = std::max(link_free_s_, now_s_) + static_cast<double>(size_bytes) / speed_.bytes_per_s;
-      at(link_free_s_ + speed_.round_trip_s / 2, [this, header, size_bytes] {
+      at(link_free_s_ + speed_.round_trip_s / 2, [this, header, size_bytes, payload = frame->payload] {
         arrivals.push_back({now_s_, header, size_bytes});
+        if (header.kind == protocol::FrameKind::Colours) colours[header.tile] = *payload;
         if (!acknowledges_) return;
         at(now_s_ + speed_.round_trip_s / 2, [this, sequence = header.sequence, size_bytes] {
           in_flight_bytes_ -= size_bytes;

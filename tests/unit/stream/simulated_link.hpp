@@ -43,6 +43,7 @@ class SimulatedLink {
   void stop_acknowledging() { acknowledges_ = false; }
 
   std::vector<Arrival> arrivals;
+  std::map<protocol::TileId, std::vector<std::byte>> colours;  ///< The payload that arrived last for each tile.
   std::map<std::uint32_t, double> completed_s;  ///< When the completion of a generation was known to the server.
   std::size_t most_in_flight_bytes = 0;
   std::size_t most_queued_bytes = 0;  ///< As the stream itself tells.
