@@ -31,8 +31,10 @@ CameraControls.install({
 export const FIELD_OF_VIEW_DEG = 45;
 
 export interface ViewportEvents {
-  /** The camera has moved, or the window has changed its size. */
+  /** The camera has moved, or the picture has changed its size. */
   onCamera: (pose: CameraPose) => void;
+  /** The picture has changed its size. */
+  onResize: () => void;
   /** The user moved the camera: from now on it is not moved for them. */
   onUserMove: () => void;
   /** Called before each picture, to bring in what has been decoded. Returns true when more waits for the next picture. */
@@ -86,9 +88,15 @@ export class Viewport {
       this.#ready = true;
       this.invalidate();
     };
-    this.#renderer.compileAsync(this.#scene, this.#camera).then(compiled, compiled);
+    if (this.#renderer.extensions.has('KHR_parallel_shader_compile')) {
+      this.#renderer.compileAsync(this.#scene, this.#camera).then(compiled, compiled);
+    } else {
+      this.#renderer.compile(this.#scene, this.#camera);
+      setTimeout(compiled);
+    }
     this.#resize = new ResizeObserver(() => {
       this.#fitToElement();
+      this.events.onResize();
       this.events.onCamera(this.pose);
     });
     this.#resize.observe(canvas);

@@ -94,6 +94,9 @@ export class Session {
   ) {
     this.viewport = new Viewport(canvas, {
       onCamera: (pose) => this.#cameraMoved(pose),
+      onResize: () => {
+        if (!this.#userMoved && store.scene) this.#firstView(store.scene, false);
+      },
       onUserMove: () => {
         this.#userMoved = true;
       },
