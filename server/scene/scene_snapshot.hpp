@@ -55,6 +55,9 @@ struct Extreme {
   float temperature_celsius = 0;
 };
 
+/// About how many vertices a leaf has unless said otherwise.
+inline constexpr std::uint32_t kLeafVertexCount = 32'000;
+
 /// Which tiles a snapshot has.
 enum class LevelsOfDetail {
   LeavesOnly,  ///< The full mesh alone.
@@ -69,7 +72,8 @@ class SceneSnapshot {
   /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
   /// for any number of threads. Must not be called from a job of the pool.
   static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
-                                                    WorkerPool& pool, std::uint32_t leaf_vertex_count = 32'000,
+                                                    WorkerPool& pool,
+                                                    std::uint32_t leaf_vertex_count = kLeafVertexCount,
                                                     LevelsOfDetail levels = LevelsOfDetail::LeavesOnly);
   virtual ~SceneSnapshot() = default;
 

@@ -53,8 +53,8 @@ double mean_edge_length(const Surface& surface) {
   return count > 0 ? sum / count : 0;
 }
 
-/// Calls back with points of a triangle: its edges cut to `spacing` or shorter (but not to more than 16 pieces), and points
-/// as dense inside; the centroid in any case, the corners never.
+/// Calls back with points of a triangle that is longer than `spacing`: its centroid, its edges cut to that length (but not to
+/// more than 16 pieces), and points as dense inside; never its corners.
 template <class Callback>
 void sample(const Vec3f& a, const Vec3f& b, const Vec3f& c, double spacing, Callback callback) {
   const auto at = [&](double u, double v, double w) {

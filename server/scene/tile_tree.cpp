@@ -471,8 +471,10 @@ void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
       is_point_cloud ? thinned_points(mesh, wanted_count) : thinned_surface(mesh, is_locked, wanted_count);
   show(node, mesh, thinning, is_locked, options.median_celsius);
   tile.owned_count = static_cast<std::uint32_t>(tile.positions.size());
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  const double error_m = children_error_m + thinning.distance_m;
   tile.geometric_error_m =
-      std::nextafter(static_cast<float>(children_error_m + thinning.distance_m), std::numeric_limits<float>::max());
+      error_m < static_cast<double>(kLargest) ? std::nextafter(static_cast<float>(error_m), kLargest) : kLargest;
 }
 
 }  // namespace

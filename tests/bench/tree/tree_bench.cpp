@@ -1,0 +1,188 @@
+// Building the tile tree, beside meshoptimizer simplifying the same mesh once to a quarter; what it keeps in memory; what
+// the root costs on the wire.
+//   tree_bench [SCENE.ply] [--vertices N] [--threads N] [--rounds N]
+// Without a scene: a generated rough terrain of N vertices (1,000,000) in scan order.
+
+#include <meshoptimizer.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+#include "fusion/mesh/ply_reader.hpp"
+#include "server/scene/scene_snapshot.hpp"
+#include "server/stream/tile_encoder.hpp"
+#include "server/stream/viewer_stream.hpp"
+#include "tests/unit/scene/generated_scene.hpp"
+
+namespace {
+
+using namespace spectra;
+using namespace spectra::server;
+
+struct Options {
+  std::string path;
+  std::uint32_t vertex_count = 1'000'000;
+  unsigned thread_count = std::max(1u, std::thread::hardware_concurrency());
+  int round_count = 1;
+};
+
+/// Time of the wall, and of all processors together: on a machine that others use the latter says more.
+struct Times {
+  double wall_ms = 0, cpu_ms = 0;
+};
+
+double cpu_ms() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto ms = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_usec) / 1e3;
+  };
+  return ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+template <class Work>
+Times timed(Work work) {
+  const auto begin = std::chrono::steady_clock::now();
+  const double cpu_begin = cpu_ms();
+  work();
+  return {std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count(),
+          cpu_ms() - cpu_begin};
+}
+
+double resident_bytes() {
+  double total = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> total >> resident;
+  return resident * 4096;
+}
+
+fusion::MultispectralMesh input(const Options& options) {
+  if (options.path.empty()) {
+    const auto side = static_cast<std::uint32_t>(std::lround(std::sqrt(options.vertex_count)));
+    return testing::terrain({.columns = side, .rows = side});
+  }
+  auto loaded = fusion::read_ply(options.path);
+  if (!loaded) {
+    std::fprintf(stderr, "%s\n", loaded.error().message.c_str());
+    std::exit(1);
+  }
+  return std::move(loaded.value().mesh);
+}
+
+Times simplify_whole_mesh(const fusion::MultispectralMesh& mesh) {
+  std::vector<unsigned> indices(3 * mesh.triangle_count());
+  return timed([&] {
+    meshopt_simplify(indices.data(), mesh.triangles()[0].data(), indices.size(), &mesh.positions()[0].x,
+                     mesh.vertex_count(), sizeof(fusion::Vec3f), indices.size() / 4, 1, meshopt_SimplifyLockBorder,
+                     nullptr);
+  });
+}
+
+void print_levels(const SceneSnapshot& scene) {
+  std::printf("\n%-6s %6s %10s %10s %10s %24s\n", "level", "tiles", "vertices", "largest", "triangles",
+              "geometric error, m");
+  for (int level = 0; level < scene.level_count(); ++level) {
+    std::size_t tiles = 0, vertices = 0, largest = 0, triangles = 0;
+    std::vector<float> errors;
+    for (const auto& tile : scene.tiles()) {
+      if (tile->id.level != level) continue;
+      ++tiles;
+      vertices += tile->positions.size();
+      triangles += tile->triangles.size();
+      largest = std::max(largest, tile->positions.size());
+      if (tile->child_mask != 0) errors.push_back(tile->geometric_error_m);
+    }
+    std::printf("%-6d %6zu %10zu %10zu %10zu", level, tiles, vertices, largest, triangles);
+    if (!errors.empty()) {
+      std::sort(errors.begin(), errors.end());
+      std::printf("   %.4g .. %.4g .. %.4g", static_cast<double>(errors.front()),
+                  static_cast<double>(errors[errors.size() / 2]), static_cast<double>(errors.back()));
+    }
+    std::printf("\n");
+  }
+}
+
+void print_wire_bytes(const SceneSnapshot& scene) {
+  const float step = lattice_step(static_cast<double>(scene.suggested_position_step_m()));
+  auto settings = fusion::default_settings();
+  const auto plan = fusion::FusionPlan::prepare(settings, scene.temperature()).value();
+  std::size_t coarse_bytes = 0, leaf_bytes = 0;
+  for (const auto& tile : scene.tiles()) {
+    const auto geometry = encoded_tile(*tile, step, 7);
+    if (!geometry) {
+      std::fprintf(stderr, "a tile of level %d cannot be encoded: %s\n", int{tile->id.level},
+                   geometry.error().message.c_str());
+      std::exit(1);
+    }
+    const auto colours = encoded_tile_colours(*tile, geometry.value(), plan, 8, 7).value();
+    const std::size_t bytes = geometry.value().payload->size() + colours->size();
+    if (tile->id.level == 0) {
+      std::printf("\nroot on the wire (step %g m, speed 7, 8-bit colours): geometry %zu + colours %zu = %zu bytes\n",
+                  static_cast<double>(step), geometry.value().payload->size(), colours->size(), bytes);
+    }
+    (tile->child_mask == 0 ? leaf_bytes : coarse_bytes) += bytes;
+  }
+  std::printf("all leaves %zu bytes, all coarser tiles %zu bytes (%.2f of the leaves)\n", leaf_bytes, coarse_bytes,
+              static_cast<double>(coarse_bytes) / static_cast<double>(leaf_bytes));
+}
+
+void run(const Options& options) {
+  WorkerPool pool(options.thread_count);
+  std::shared_ptr<const SceneSnapshot> scene;
+  for (int round = 0; round < options.round_count; ++round) {
+    scene.reset();
+    const double before = resident_bytes();
+    std::optional<fusion::MultispectralMesh> mesh(input(options));
+    const auto count = static_cast<double>(mesh->vertex_count());
+    std::printf("%.0f vertices, %zu triangles, %u threads\n", count, mesh->triangle_count(), options.thread_count);
+    Times single;
+    if (!mesh->is_point_cloud()) {
+      single = simplify_whole_mesh(*mesh);
+      std::printf("%-42s %8.0f ms, processors %8.0f ms\n", "meshoptimizer, whole mesh to a quarter", single.wall_ms,
+                  single.cpu_ms);
+    }
+    const Times tree =
+        timed([&] { scene = SceneSnapshot::build(std::move(*mesh), 1, pool, 32'000, LevelsOfDetail::All); });
+    std::printf("%-42s %8.0f ms, processors %8.0f ms\n", "cut, statistics and tile tree", tree.wall_ms, tree.cpu_ms);
+    if (single.wall_ms > 0) {
+      std::printf("ratio %.2f (processors %.2f)\n", tree.wall_ms / single.wall_ms, tree.cpu_ms / single.cpu_ms);
+    }
+    mesh.reset();
+    std::printf("resident %.0f bytes a vertex beyond the program\n", (resident_bytes() - before) / count);
+  }
+  print_levels(*scene);
+  print_wire_bytes(*scene);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const bool has_value = i + 1 < argc;
+    if (argument == "--vertices" && has_value) {
+      options.vertex_count = static_cast<std::uint32_t>(std::stoul(argv[++i]));
+    } else if (argument == "--threads" && has_value) {
+      options.thread_count = static_cast<unsigned>(std::stoul(argv[++i]));
+    } else if (argument == "--rounds" && has_value) {
+      options.round_count = std::stoi(argv[++i]);
+    } else if (argument.starts_with("--") || !options.path.empty()) {
+      std::fprintf(stderr, "usage: tree_bench [SCENE.ply] [--vertices N] [--threads N] [--rounds N]\n");
+      return 2;
+    } else {
+      options.path = argument;
+    }
+  }
+  run(options);
+  return 0;
+}
