@@ -296,6 +296,29 @@ TEST_F(ViewerStreamTest, ViewersWithDifferentSettingsShareGeometry) {
   EXPECT_EQ(cache_.miss_count(), 3 * scene_->tiles().size());
 }
 
+TEST_F(ViewerStreamTest, ViewersWithDifferentSettingsTakeTurns) {
+  constexpr std::size_t kViewers = 16;
+  scene_ = scene_of(tiles_of_tree(20, 40));
+  std::vector<std::unique_ptr<TestViewer>> viewers;
+  for (std::size_t i = 0; i < kViewers; ++i) {
+    viewers.push_back(std::make_unique<TestViewer>(scene_, cache_, pool_));
+    viewers.back()->stream().subscribe(0);
+  }
+  {
+    const HeldWorkers held(pool_);
+    for (std::size_t i = 0; i < kViewers; ++i) show(*viewers[i], 0.05 * static_cast<double>(i));
+  }
+  // How much had been encoded for everybody when a viewer had its picture.
+  std::vector<std::uint64_t> encoded_at_completion;
+  while (encoded_at_completion.size() < kViewers) {
+    for (const auto& viewer : viewers) {
+      viewer->take();
+      if (viewer->stream().take_complete()) encoded_at_completion.push_back(cache_.miss_count());
+    }
+  }
+  EXPECT_LE(encoded_at_completion.back(), 2 * encoded_at_completion.front());
+}
+
 TEST_F(ViewerStreamTest, WorksWithACacheThatKeepsNothing) {
   FrameCache tiny(0);
   TestViewer one(scene_, tiny, pool_);
