@@ -83,7 +83,7 @@ class SceneLoader {
     print_notes(loaded.notes);
     served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
                         " vertices)");
-    const auto scene = served.scenes.replace(std::move(loaded.mesh), served.pool);
+    const auto scene = served.scenes.replace(std::move(loaded.mesh), served.pool, LevelsOfDetail::All);
     served.progress.set(std::nullopt);
     spdlog::info("serving {}: {} vertices, {} triangles, {} tiles", scene->name(), scene->vertex_count(),
                  scene->triangle_count(), scene->tiles().size());

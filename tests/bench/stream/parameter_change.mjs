@@ -78,7 +78,9 @@ async function tileChange(alpha) {
   const ms = performance.now() - start;
   if (client.failures.length) throw client.failures[0];
   if (client.frames.slice(framesBefore).some((frame) => frame.kind === KIND.geometry)) throw new Error("geometry was sent again");
-  if ([...client.tiles.values()].some((tile) => tile.generation !== generation)) throw new Error("a tile is behind");
+  const drawn = client.drawnTiles();
+  if (drawn.some((tile) => tile.generation !== generation)) throw new Error("a drawn tile is behind");
+  if (drawn.some((tile) => tile.frame.childMask !== 0)) throw new Error("a drawn tile is not at full accuracy");
   return { ms, bytes: client.received_bytes - bytesBefore };
 }
 
