@@ -182,18 +182,14 @@ class ThermalColours {
   }
 
 #if HWY_TARGET != HWY_SCALAR
-  /// Four floats of the rows of as many vertices as fit. Loads that repeat a block cost no shuffle.
-  template <std::size_t kWidth = kLanes>
-  static HWY_INLINE Floats gathered(FloatTag d, const float* rows, const std::uint32_t* row) {
-    const auto block = [&](std::size_t vertex)
-                           HWY_ATTR { return hn::LoadDup128(d, rows + 8 * static_cast<std::uint8_t>(row[vertex])); };
-    if constexpr (kWidth == 4) {
-      return block(0);
-    } else if constexpr (kWidth == 8) {
-      return hn::OddEvenBlocks(block(1), block(0));
+  /// Four floats of the rows of as many vertices as fit.
+  template <class Tag>
+  static HWY_INLINE hn::Vec<Tag> gathered(Tag d, const float* rows, const std::uint32_t* row) {
+    if constexpr (hn::MaxLanes(Tag()) == 4) {
+      return hn::Load(d, rows + 8 * static_cast<std::uint8_t>(row[0]));
     } else {
-      static_assert(kWidth == 16);
-      return hn::ConcatUpperLower(d, hn::OddEvenBlocks(block(3), block(2)), hn::OddEvenBlocks(block(1), block(0)));
+      const hn::Half<Tag> half;
+      return hn::Combine(d, gathered(half, rows, row + hn::MaxLanes(Tag()) / 8), gathered(half, rows, row));
     }
   }
 #endif
