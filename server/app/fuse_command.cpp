@@ -1,11 +1,37 @@
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "fusion/mesh/ply_fuse.hpp"
 #include "fusion/registry.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
 
 namespace spectra::server {
+namespace {
+
+struct FusedFacts {
+  std::vector<fusion::Note> notes;
+  bool has_temperature = false;
+};
+
+/// PLY to PLY, in constant memory whatever the size of the scene.
+fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fusion::FusionSettings& settings) {
+  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings));
+  return FusedFacts{std::move(fused.notes), fused.temperature.has_temperature()};
+}
+
+fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
+                                           SceneFileFormat format) {
+  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal));
+  const auto temperature = temperature_of(loaded.mesh);
+  BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
+  BOOST_OUTCOME_TRYV(write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), format));
+  return FusedFacts{std::move(loaded.notes), temperature.summary.has_temperature()};
+}
+
+}  // namespace
 
 int run_fuse(const FuseOptions& options) {
   const auto format = scene_file_format(options.output.string());
@@ -14,19 +40,15 @@ int run_fuse(const FuseOptions& options) {
   }
   const auto settings = settings_from_text(options.settings);
   if (!settings) return fail(settings.error());
-  auto loaded = load_scene(options.input, options.thermal);
-  if (!loaded) return fail(loaded.error());
-  const auto& mesh = loaded.value().mesh;
-  print_notes(loaded.value().notes);
-
-  const auto temperature = temperature_of(mesh);
-  if (!temperature.summary.has_temperature() && fusion::find_method(settings.value().method)->needs_temperature) {
+  const auto facts = *format == SceneFileFormat::Ply && !options.thermal
+                         ? fused_in_blocks(options, settings.value())
+                         : fused_in_memory(options, settings.value(), *format);
+  if (!facts) return fail(facts.error());
+  print_notes(facts.value().notes);
+  if (!facts.value().has_temperature && fusion::find_method(settings.value().method)->needs_temperature) {
     warn(options.input.string() + " has no temperatures: the visible colours are written");
   }
-  const auto plan = fusion::FusionPlan::prepare(settings.value(), temperature);
-  if (!plan) return fail(plan.error());
-  const auto written = write_scene_file(options.output, mesh, fused_colours(mesh, plan.value()), *format);
-  return written ? kDone : fail(written.error());
+  return kDone;
 }
 
 }  // namespace spectra::server

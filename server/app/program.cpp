@@ -26,7 +26,7 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--web", options.web, "Folder of the built web client");
   command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
       ->check(CLI::Range(0, 1024));
-  command->set_config("--config", "", "A TOML file with these options by their long names");
+  command->fallthrough();  // --config belongs to the whole program
   command->final_callback([&options, &run] { run = [&options] { return run_serve(options); }; });
 }
 
@@ -81,6 +81,8 @@ int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
   app.set_version_flag("--version", "spectra " + std::string(kVersion));
   app.require_subcommand(1);
+  app.set_config("--config", "", "A TOML file; its section [serve] holds options of serve by their long names");
+  app.allow_config_extras(false);
   ServeOptions serve;
   FuseOptions fuse;
   std::vector<std::string> sets;
@@ -94,6 +96,13 @@ int parse_and_run(int argc, const char* const* argv) {
   add_info(app, info, run);
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);
+  // CLI11 would say that a command is missing, but not which word it did not know.
+  const auto is_first_word = [argc, argv](const CLI::App* command) {
+    return argc > 1 && command->get_name() == argv[1];
+  };
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_first_word).empty()) {
+    return fail(kWrongUsage, "there is no command \"" + std::string(argv[1]) + "\" (see: spectra --help)");
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::FileError& error) {

@@ -64,9 +64,10 @@ struct ViewerSession::Preparation {
   fusion::FusionSettings settings;
   std::vector<FusionRequest> requests;
 
-  std::optional<fusion::FusionPlan> plan;                   ///< Of the newest settings that hold.
-  std::vector<std::optional<protocol::RpcError>> refusals;  ///< One a request.
-  std::optional<std::string> reset_reason;                  ///< The settings did not fit the new scene.
+  std::optional<fusion::FusionPlan> plan;  ///< Of the newest settings that hold.
+  /// One a request: the settings in force after it, or why it changed nothing.
+  std::vector<protocol::Result<protocol::FusionState>> outcomes;
+  std::optional<std::string> reset_reason;  ///< The settings did not fit the new scene.
 
   void run() {
     const auto temperature = temperature_of(scene);
@@ -79,18 +80,19 @@ struct ViewerSession::Preparation {
       }
       if (prepared) plan = std::move(prepared).value();
     }
-    for (const auto& request : requests) refusals.push_back(apply(request, temperature));
+    for (const auto& request : requests) outcomes.push_back(apply(request, temperature));
   }
 
-  std::optional<protocol::RpcError> apply(const FusionRequest& request, const fusion::SceneTemperature& temperature) {
-    if (!request.change) return request.change.error();
+  protocol::Result<protocol::FusionState> apply(const FusionRequest& request,
+                                                const fusion::SceneTemperature& temperature) {
+    if (!request.change) return refused(request.change.error());
     auto changed = fusion::with_change(settings, request.change.value());
-    if (!changed) return to_rpc_error(changed.error());
+    if (!changed) return refused(to_rpc_error(changed.error()));
     auto prepared = fusion::FusionPlan::prepare(changed.value(), temperature);
-    if (!prepared) return to_rpc_error(prepared.error());
+    if (!prepared) return refused(to_rpc_error(prepared.error()));
     settings = std::move(changed).value();
     plan = std::move(prepared).value();
-    return std::nullopt;
+    return to_message(*plan, temperature.summary);
   }
 };
 
@@ -347,9 +349,8 @@ void ViewerSession::start_preparation() {
         } catch (const std::exception& error) {
           spdlog::error("settings could not be prepared: {}", error.what());
           preparation->plan.reset();
-          preparation->refusals.assign(
-              preparation->requests.size(),
-              protocol::RpcError{RpcErrorCode::InternalError, "the settings could not be prepared", "", ""});
+          preparation->outcomes.assign(preparation->requests.size(),
+                                       refusal(RpcErrorCode::InternalError, "the settings could not be prepared"));
         }
         const auto peer = weak_peer.lock();
         if (!peer) return;
@@ -377,10 +378,15 @@ void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& prepa
                                    *preparation->reset_reason)
                    : std::nullopt);
   }
+  const std::uint32_t generation = fusion_reply().generation;
   for (std::size_t i = 0; i < preparation->requests.size(); ++i) {
-    const auto& error = preparation->refusals[i];
+    const auto& outcome = preparation->outcomes[i];
     const Id& id = preparation->requests[i].id;
-    answer(id, error ? Answer(refused(*error)) : fusion_get());
+    if (outcome) {
+      answer(id, protocol::to_json(protocol::FusionReply{generation, outcome.value()}));
+    } else {
+      answer(id, refused(outcome.error()));
+    }
   }
   start_preparation();
 }

@@ -248,6 +248,7 @@ TEST_F(ViewerSessionTest, AnswersEveryChangeInOrderWhileTheyCoalesce) {
     ASSERT_TRUE(response.contains("result")) << response;
     EXPECT_GE(response["result"]["generation"], last_generation);
     last_generation = response["result"]["generation"];
+    EXPECT_EQ(response["result"]["fusion"]["params"]["alpha"], (id - ids.front()) / 100.0);
   }
   EXPECT_EQ(viewer.call("fusion.get")["result"]["fusion"]["params"]["alpha"], 1);
   EXPECT_EQ(viewer.call("fusion.get")["result"]["generation"], last_generation);

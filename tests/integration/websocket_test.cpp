@@ -39,7 +39,7 @@ class EchoViewer final : public server::ViewerClient {
   std::optional<OutgoingFrame> next_frame() override {
     if (record_.frames_left <= 0) return std::nullopt;
     record_.frames_left -= 1;
-    OutgoingFrame frame;
+    OutgoingFrame frame{};
     frame.payload = std::make_shared<const std::vector<std::byte>>(record_.frame_size_bytes);
     return frame;
   }
@@ -93,7 +93,7 @@ TEST_F(WebSocketTest, WantsItsSubprotocol) {
     EXPECT_EQ(status_of(viewer.upgrade_response()), 400) << subprotocol;
   }
   EXPECT_TRUE(RawWebSocket(port(), "", "chat, spectra.v1").is_open());
-  EXPECT_EQ(record_.opened, 1);
+  EXPECT_TRUE(eventually([this] { return record_.opened == 1; }));
 }
 
 TEST_F(WebSocketTest, WantsAnOriginOfItsList) {
