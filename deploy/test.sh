@@ -6,6 +6,7 @@ cd "$(dirname "$0")/.."
 
 deploy/dependencies.sh test
 deploy/build_web.sh
+deploy/npm_packages.sh tests/integration/node
 cmake --preset ci -DSPECTRA_BUILD_TESTS=ON -DSPECTRA_BUILD_BENCHMARKS=ON
 cmake --build --preset ci
 

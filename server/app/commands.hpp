@@ -43,12 +43,20 @@ struct DemoSceneFileOptions {
   std::uint64_t seed = 1;
 };
 
+struct TradeoffCommandOptions {
+  std::filesystem::path input;
+  std::filesystem::path folder;  ///< For the tables and the report; made when it does not exist.
+  std::optional<std::filesystem::path> thermal;
+  std::string palette;  ///< From whose colours the temperature is read back; empty: the default.
+};
+
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
 int run_fuse(const FuseOptions& options);
 int run_info(const InfoOptions& options);
 int run_methods(bool as_json);
 int run_demo_scene(const DemoSceneFileOptions& options);
+int run_tradeoff(const TradeoffCommandOptions& options);
 
 /// Parses the arguments, runs the command, returns the exit status. Catches everything.
 int run_program(int argc, const char* const* argv);

@@ -5,6 +5,7 @@
 #include <new>
 #include <string>
 
+#include "fusion/mesh/demo_scene.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/version.hpp"
@@ -71,10 +72,19 @@ void add_demo_scene(CLI::App& app, DemoSceneFileOptions& options, Run& run) {
   auto* command = app.add_subcommand("demo-scene", "Write the generated demo scene to a PLY file");
   command->add_option("output", options.output, "The file to write")->required();
   command->add_option("--vertices", options.vertex_count, "About how many vertices")
-      ->check(CLI::Range(std::uint64_t{1'000}, std::uint64_t{100'000'000}))
+      ->check(CLI::Range(fusion::kDemoSceneLeastVertices, fusion::kDemoSceneMostVertices))
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Another number, another scene")->capture_default_str();
   command->final_callback([&options, &run] { run = [&options] { return run_demo_scene(options); }; });
+}
+
+void add_tradeoff(CLI::App& app, TradeoffCommandOptions& options, Run& run) {
+  auto* command = app.add_subcommand("tradeoff", "Measure speed against accuracy on a scene");
+  command->add_option("input", options.input, "The scene, a PLY file")->required();
+  command->add_option("--out", options.folder, "Folder for the tables and the report")->required();
+  command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  command->add_option("--palette", options.palette, "The palette that the temperature is read back from");
+  command->final_callback([&options, &run] { run = [&options] { return run_tradeoff(options); }; });
 }
 
 int parse_and_run(int argc, const char* const* argv) {
@@ -89,6 +99,7 @@ int parse_and_run(int argc, const char* const* argv) {
   InfoOptions info;
   bool methods_as_json = false;
   DemoSceneFileOptions demo_scene;
+  TradeoffCommandOptions tradeoff;
   Run run;
   bool is_demo = false;  // what is served without a scene anyway
   add_serve(app, serve, is_demo, run);
@@ -96,6 +107,7 @@ int parse_and_run(int argc, const char* const* argv) {
   add_info(app, info, run);
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);
+  add_tradeoff(app, tradeoff, run);
   // CLI11 would say that a command is missing, but not which word it did not know.
   const auto is_first_word = [argc, argv](const CLI::App* command) {
     return argc > 1 && command->get_name() == argv[1];

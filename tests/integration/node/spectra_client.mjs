@@ -1,10 +1,7 @@
 // A client of the Spectra protocol, written from docs/protocol.md alone: it shares no code with web/ or the server, so
-// that it tests the document as well as the program. Needs the npm packages ws and draco3d (installed for web/).
-import { createRequire } from "node:module";
-
-const require = createRequire(new URL("../../../web/package.json", import.meta.url));
-const WebSocket = require("ws");
-const draco3d = require("draco3d");
+// that it tests the document as well as the program.
+import draco3d from "draco3d";
+import WebSocket from "ws";
 
 export const KIND = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5 };
 const MAGIC = 0x31435053;
