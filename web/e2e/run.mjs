@@ -1,10 +1,10 @@
 // End-to-end: the real server program, the built client, Debian's Chromium.
 //   npm run build && npm run e2e        (SPECTRA_BIN names another server program)
 import assert from 'node:assert/strict';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { openClient, runTests, screenshot, settled, startBrowser, startServer, test } from './harness.mjs';
+import { decodePng, openClient, runTests, screenshot, settled, startBrowser, startServer, test } from './harness.mjs';
 
 const scratch = mkdtempSync(join(tmpdir(), 'spectra-e2e-'));
 const browser = await startBrowser();
@@ -162,6 +162,12 @@ test('A dragged slider answers at once and its last value always arrives', async
   await page.locator('[data-method="thermal_visible_blend"]').click();
   await settled(page);
   const before = await state();
+  const gpuObjects = () =>
+    page.evaluate(() => {
+      const { geometries, textures, programs } = globalThis.spectra.viewport.gpuObjects;
+      return { geometries, textures, programs };
+    });
+  const gpuBefore = await gpuObjects();
   const slider = page.locator('[data-parameter="alpha"] input[type=range]');
   const box = await slider.boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -175,6 +181,7 @@ test('A dragged slider answers at once and its last value always arrives', async
   assert.ok(Math.abs(after.fusion.params.alpha - 0.9) < 0.06, `alpha ${after.fusion.params.alpha}`);
   assert.equal(await number('[data-parameter="alpha"] input[type=number]'), after.fusion.params.alpha);
   assert.ok(after.generation > before.generation);
+  assert.deepEqual(await gpuObjects(), gpuBefore, 'new colours make no new GPU objects');
 });
 
 test('A refused value snaps back and says why', async () => {
@@ -243,6 +250,13 @@ test('A click reads the temperature', async () => {
   assert.match(await card.innerText(), /°C|no temperature/);
   await page.keyboard.press('Escape');
   await card.waitFor({ state: 'detached' });
+});
+
+test('S saves a picture', async () => {
+  const [download] = await Promise.all([page.waitForEvent('download'), page.keyboard.press('s')]);
+  assert.match(download.suggestedFilename(), /^spectra-.*\.png$/);
+  const image = decodePng(readFileSync(await download.path()));
+  assert.equal(image.width, 1440);
 });
 
 test('Coarser quality is in force and said in words', async () => {

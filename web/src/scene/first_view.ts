@@ -64,7 +64,7 @@ export function viewDirection(facing: Vec3, up: UpAxis): Vec3 {
 }
 
 /** An even sample of the scene's vertices; the bounds' corners when there are none. */
-export function samplePoints(geometries: readonly DecodedGeometry[], bounds: Scene['bounds'], wanted = 6000): Vec3[] {
+export function samplePoints(geometries: readonly DecodedGeometry[], bounds: Scene['bounds'], wanted = 3000): Vec3[] {
   const vertexCount = geometries.reduce((n, geometry) => n + geometry.positions.length / 3, 0);
   const points: Vec3[] = [];
   const stride = Math.max(1, Math.floor(vertexCount / wanted)) * 3;
