@@ -161,13 +161,32 @@ Surface::Surface(std::span<const Vec3f> positions, std::span<const Triangle> tri
   }
 }
 
+std::uint32_t Surface::nearest_vertex_near(const Vec3f& p, std::uint32_t start) const {
+  constexpr int kMostSteps = 24;
+  double nearest = squared_distance(p, positions_[start]);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const std::uint32_t from = start;
+    const auto around = triangles_around(from);
+    for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles))) {
+      for (const std::uint32_t v : triangles_[t]) {
+        const double squared = squared_distance(p, positions_[v]);
+        if (squared < nearest) {
+          nearest = squared;
+          start = v;
+        }
+      }
+    }
+    if (start == from) break;
+  }
+  return start;
+}
+
 double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, double enough) const {
-  constexpr std::size_t kMostTriangles = 64;  // of a vertex; a hub of thousands would make this quadratic
   constexpr std::size_t kMostSteps = 12;
   std::array<std::uint32_t, kMostSteps> visited{};
   double best = std::numeric_limits<double>::infinity();
   std::uint32_t best_triangle = kNone;
-  std::uint32_t vertex = start;
+  std::uint32_t vertex = nearest_vertex_near(p, start);
   for (std::size_t step = 0; step < kMostSteps; ++step) {
     visited[step] = vertex;
     const double before = best;

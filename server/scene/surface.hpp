@@ -32,8 +32,8 @@ class Surface {
     return std::span(around_).subspan(offsets_[vertex], offsets_[vertex + 1] - offsets_[vertex]);
   }
 
-  /// An upper bound of the squared distance of `p`, from the triangles around `start` and, as long as that helps and the
-  /// bound is above `enough`, those around the vertices between there and `p`.
+  /// An upper bound of the squared distance of `p`: walks from `start` along edges towards `p` and looks at the triangles
+  /// around the vertices there, until that does not help any more or the bound is not above `enough`.
   double squared_distance_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
 
   /// The squared distance of `p` itself, or some bound that is not above `enough`. `at_most` is a bound that is known.
@@ -47,6 +47,11 @@ class Surface {
 
  private:
   static constexpr std::size_t kBlockSize = 32;
+  static constexpr std::size_t kMostTriangles =
+      64;  ///< Looked at around a vertex: a hub of thousands would cost squares.
+
+  /// From vertex to vertex as long as they come nearer.
+  std::uint32_t nearest_vertex_near(const fusion::Vec3f& p, std::uint32_t start) const;
 
   std::span<const fusion::Vec3f> positions_;
   std::span<const fusion::Triangle> triangles_;
