@@ -36,7 +36,7 @@ import { TileSet } from '../scene/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
 import { Acknowledger } from '../transport/acknowledger';
 import { Coalescer } from '../transport/coalescer';
-import { Connection, ConnectionLost, RpcError } from '../transport/connection';
+import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { mergedChange, wholeChange } from './fusion_change';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
 
@@ -45,6 +45,7 @@ const HISTOGRAM_BINS = 192;
 const CHANGE_INTERVAL_MS = 33;
 const CAMERA_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
+const BUSY_WAIT_MS = 300;
 const TICK_MS = 100;
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
@@ -423,7 +424,11 @@ export class Session {
       const answer = fusionState(await this.#connection.request('fusion.set', change), 'fusion.set');
       this.#fusionIs(answer.generation, answer.fusion);
     } catch (error) {
-      if (error instanceof RpcError) {
+      if (error instanceof RpcError && error.code === BUSY) {
+        // Too fast for the server, not wrong: the newest wish is still to be told.
+        await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
+        if (this.store.connected) this.#fusionSender.push(this.store.wanted ?? change);
+      } else if (error instanceof RpcError) {
         this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
       } else this.#say(error);
     }

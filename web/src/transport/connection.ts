@@ -1,6 +1,8 @@
 import { decodeServerMessage, type Hello, hello, type RpcErrorBody } from '../protocol/messages';
 
 export const SUBPROTOCOL = 'spectra.v1';
+/** RpcError.code of a request that was refused for its rate alone. */
+export const BUSY = -32003;
 
 /** The server refused a request. */
 export class RpcError extends Error {
