@@ -223,6 +223,9 @@ test('Palette and range move the axis with them', async () => {
 });
 
 test('The background has exactly the colour that was chosen', async () => {
+  await page.evaluate(() => {
+    globalThis.firstSession = globalThis.spectra;
+  });
   await page.evaluate(() => globalThis.spectra.setView({ eye: [0, 1e4, 0], target: [0, 2e4, 1] }));
   for (const colour of ['#6b6d70', '#1c1d1f']) {
     await page.locator(`[aria-label="Background ${colour}"]`).click();
@@ -230,6 +233,7 @@ test('The background has exactly the colour that was chosen', async () => {
     const expected = [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16));
     assert.deepEqual(image.at(700, 500), expected);
   }
+  assert.equal(await page.evaluate(() => globalThis.spectra === globalThis.firstSession), true, 'the same session goes on');
   await page.locator('canvas').first().focus();
   await page.keyboard.press('r');
 });
