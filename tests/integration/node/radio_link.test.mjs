@@ -36,7 +36,7 @@ test("the newest setting overtakes and arrives in full", { timeout: 120_000 }, a
   assert.equal(fusion.params.alpha, 1);
   const complete = await client.complete(generation, 60_000);
   assert.deepEqual(client.failures, [], "no colours of an older generation came after newer ones of a tile");
-  assert.ok([...client.tiles.values()].every((tile) => tile.generation === generation));
+  assert.ok(client.drawnTiles().every((tile) => tile.frame.childMask === 0 && tile.generation === generation));
   assert.equal(complete.generation, generation);
 
   const frames = client.frames.slice(firstFrame);
