@@ -10,7 +10,7 @@ build_packages=(
   prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev
 )
 test_packages=(
-  libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
+  libgtest-dev libgmock-dev librapidcheck-dev
   clang-format-14 chromium fonts-dejavu-core python3 git
 )
 
