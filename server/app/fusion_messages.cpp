@@ -246,11 +246,8 @@ protocol::QualityState to_message(const StreamQuality& quality) {
 }
 
 protocol::Result<StreamQuality> with_change(const StreamQuality& quality, const protocol::QualityChange& change) {
-  if (change.mode == protocol::QualityMode::Auto) {
-    return protocol::refusal(protocol::RpcErrorCode::InvalidParams, "this server has no automatic quality", "mode",
-                             "manual");
-  }
   StreamQuality changed = quality;
+  if (change.mode) changed.automatic = *change.mode == protocol::QualityMode::Auto;
   if (change.position_step_mm) {
     changed.position_step_m = lattice_step(*change.position_step_mm / kMillimetresPerMetre);
   }

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { linkProxy } from "./link_proxy.mjs";
+import { identityOfTiles } from "./mesh_identity.mjs";
 import { KIND, SpectraClient } from "./spectra_client.mjs";
 import { serve } from "./spectra_server.mjs";
 
@@ -45,6 +46,26 @@ test("the newest setting overtakes and arrives in full", { timeout: 120_000 }, a
   const whole = frames.filter((frame) => frame.generation === generation).reduce((sum, frame) => sum + frame.bytes, 0);
   assert.ok(total < changes * whole * 0.8, `superseded colours are dropped: ${total} bytes for ${changes} changes of ${whole}`);
   await client.close();
+});
+
+test("automatic quality answers sooner with less and ends at full accuracy", { timeout: 120_000 }, async () => {
+  const client = await SpectraClient.connect(proxy.url);
+  const { quality } = await client.request("quality.set", { mode: "auto", latency_target_ms: 200 });
+  assert.equal(quality.mode, "auto");
+  await client.request("scene.subscribe", { channels: ["fused"] });
+  await client.complete((await client.request("fusion.get")).generation, 60_000);
+  const { generation } = await client.request("fusion.set", { method: "thermal_only", params: {} });
+  await client.complete(generation, 60_000);
+  assert.deepEqual(client.failures, []);
+  assert.ok(client.drawnTiles().every((tile) => tile.frame.childMask === 0 && tile.generation === generation));
+
+  const exact = await SpectraClient.connect(server.url);
+  await exact.request("fusion.set", { method: "thermal_only", params: {} });
+  await exact.request("scene.subscribe", { channels: ["fused"] });
+  await exact.complete((await exact.request("fusion.get")).generation, 60_000);
+  assert.equal(`${identityOfTiles(client.drawnTiles())}`, `${identityOfTiles(exact.drawnTiles())}`);
+  await client.close();
+  await exact.close();
 });
 
 test("a link that stalls and breaks leaves the server well and a new connection whole", { timeout: 120_000 }, async () => {

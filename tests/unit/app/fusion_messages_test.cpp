@@ -164,5 +164,20 @@ TEST(QualityMessages, RoundTheStepDownAndKeepTheRest) {
   EXPECT_LE(to_message(changed).position_step_mm, 3);
 }
 
+TEST(QualityMessages, SwitchAutomaticQualityOnAndOff) {
+  protocol::QualityChange change;
+  change.mode = protocol::QualityMode::Auto;
+  change.latency_target_ms = 120;
+  const auto automatic = with_change(StreamQuality{}, change).value();
+  EXPECT_TRUE(automatic.automatic);
+  EXPECT_EQ(automatic.latency_target_ms, 120);
+  EXPECT_EQ(to_message(automatic).mode, protocol::QualityMode::Auto);
+  protocol::QualityChange bits;
+  bits.colour_bits = 6;
+  EXPECT_TRUE(with_change(automatic, bits).value().automatic) << "what is absent stays";
+  change.mode = protocol::QualityMode::Manual;
+  EXPECT_FALSE(with_change(automatic, change).value().automatic);
+}
+
 }  // namespace
 }  // namespace spectra::server
