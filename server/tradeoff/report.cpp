@@ -126,13 +126,15 @@ std::vector<Mark> frontier_of(std::vector<Mark> marks) {
 /// Size against error, both logarithmic; errors below `floor` are drawn at it.
 std::string plot(const std::string& heading, const std::string& error_name, const std::vector<Mark>& marks,
                  double floor) {
-  constexpr double kWidth = 760, kHeight = 380, kLeft = 70, kBottom = 46, kTop = 14, kRight = 16;
-  double low_size = 1e300, high_size = 0, high_error = floor;
+  constexpr double kWidth = 760, kHeight = 380, kLeft = 70, kBottom = 46, kTop = 14, kRight = 36;
+  double low_size = 1e300, high_size = 0, low_error = 1e300, high_error = floor;
   for (const Mark& mark : marks) {
     low_size = std::min(low_size, mark.size_kb);
     high_size = std::max(high_size, mark.size_kb);
     high_error = std::max(high_error, mark.error);
+    low_error = std::min(low_error, mark.error);
   }
+  floor = std::max(floor, low_error);
   const double x0 = std::floor(std::log10(low_size)), x1 = std::max(x0 + 1, std::ceil(std::log10(high_size)));
   const double y0 = std::floor(std::log10(floor)), y1 = std::max(y0 + 1, std::ceil(std::log10(high_error)));
   const auto x = [&](double kb) { return kLeft + (kWidth - kLeft - kRight) * (std::log10(kb) - x0) / (x1 - x0); };
