@@ -42,10 +42,10 @@ class MultispectralMesh {
 
   /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM loses nothing).
   Vec3d origin;
-  bool has_visible = false;      ///< The input had colours; otherwise visible() is mid grey.
-  bool has_temperature = false;  ///< The input had a temperature property, or a thermal file was joined.
-  bool double_positions = false; ///< The input had double positions; output keeps them.
-  std::string name;              ///< For people: the file's name without folder, or "demo".
+  bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
+  bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.
+  bool double_positions = false;  ///< The input had double positions; output keeps them.
+  std::string name;               ///< For people: the file's name without folder, or "demo".
 
  private:
   struct Storage;
