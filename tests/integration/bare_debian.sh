@@ -9,7 +9,7 @@ folder=${2:-$(mktemp -d /var/tmp/spectra-bare-XXXX)}
 root=$folder/root
 
 if [ ! -e "$root/etc/debian_version" ]; then
-  debootstrap --variant=minbase bookworm "$root" http://deb.debian.org/debian
+  debootstrap --variant=minbase bookworm "$root"
 fi
 mkdir -p "$root/etc/ssl/certs" "$root/usr/local/share/ca-certificates"
 cp /etc/resolv.conf "$root/etc/resolv.conf"
