@@ -8,6 +8,10 @@ export default defineConfig({
   base: './',
   build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0 },
   worker: { format: 'es' },
-  server: { proxy: { '/ws': { target: server, ws: true, changeOrigin: true }, '/api': server } },
+  // By number: a machine without /etc/hosts does not know "localhost".
+  server: {
+    host: '127.0.0.1',
+    proxy: { '/ws': { target: server, ws: true, changeOrigin: true }, '/api': server },
+  },
   test: { include: ['src/**/*.test.ts'], environment: 'node' },
 });
