@@ -55,8 +55,10 @@ class FakeDrawable implements Drawable {
 
 let made: FakeDrawable[];
 let tiles: TileSet;
+let masks: Map<string, number>;
 beforeEach(() => {
   made = [];
+  masks = new Map();
   tiles = new TileSet((_geometry, rgba) => {
     const drawable = new FakeDrawable(rgba[0] ?? -1);
     made.push(drawable);
@@ -65,10 +67,15 @@ beforeEach(() => {
 });
 
 function add(tile: TileId, part: Partial<TileFrame> = {}, shade = 1): FakeDrawable {
+  if (part.child_mask !== undefined) masks.set(tileKey(tile), part.child_mask);
   tiles.addGeometry(frame(tile, part), geometry());
   tiles.addColours(frame(tile, part), colours(shade));
   tiles.updateSelection();
   return made.at(-1) as FakeDrawable;
+}
+function recolour(tile: TileId, generation: number, revision = 1): void {
+  tiles.addColours(frame(tile, { generation, revision, child_mask: masks.get(tileKey(tile)) ?? 0 }), colours(generation));
+  tiles.updateSelection();
 }
 const drawn = () => made.filter(({ visible, disposed }) => visible && !disposed).length;
 
@@ -175,8 +182,126 @@ describe('TileSet', () => {
     expect(tiles.progress(2)).toEqual({ current: 1, total: 2 });
   });
 
+  it('does not wait for colours of tiles that are replaced', () => {
+    const child = childTile(root, 2);
+    add(root, { child_mask: 0b100, generation: 2 });
+    add(child, { child_mask: 0b11, generation: 1 });
+    add(childTile(child, 0), { generation: 2 });
+    expect(tiles.progress(2)).toEqual({ current: 0, total: 1 });
+    add(childTile(child, 1), { generation: 1 });
+    expect(tiles.progress(2)).toEqual({ current: 1, total: 2 });
+    recolour(childTile(child, 1), 2);
+    expect(tiles.progress(2)).toEqual({ current: 2, total: 2 });
+  });
+
   it('gives every tile its own name', () => {
     const names = new Set([0, 1, 2, 3].flatMap((x) => [0, 1].map((y) => tileKey({ level: 2, x, y, z: 0 }))));
     expect(names.size).toBe(8);
+  });
+});
+
+describe('TileSet, which of two generations is drawn', () => {
+  const left = childTile(root, 0);
+  const right = childTile(root, 1);
+  const visible = (...drawables: FakeDrawable[]) => drawables.map((drawable) => drawable.visible);
+
+  it('puts a newer parent in front of older children until all of them are as new', () => {
+    const parent = add(root, { child_mask: 0b11 });
+    const [a, b] = [add(left), add(right)];
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+    recolour(root, 2);
+    expect(visible(parent, a, b)).toEqual([true, false, false]);
+    recolour(left, 2);
+    expect(visible(parent, a, b)).toEqual([true, false, false]);
+    recolour(right, 2);
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+  });
+
+  it('keeps newer children in front of an older parent', () => {
+    const parent = add(root, { child_mask: 0b11 });
+    const [a, b] = [add(left), add(right)];
+    recolour(right, 3);
+    recolour(left, 2);
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+    recolour(root, 2);
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+    recolour(root, 3);
+    expect(visible(parent, a, b)).toEqual([true, false, false]);
+  });
+
+  it('does not draw a tile between for being old, nor lets it hide newer children', () => {
+    const parent = add(root, { child_mask: 0b11 });
+    const between = add(left, { child_mask: 0b11 });
+    const [a, b, c] = [add(childTile(left, 0)), add(childTile(left, 1)), add(right)];
+    expect(visible(parent, between, a, b, c)).toEqual([false, false, true, true, true]);
+    recolour(root, 2);
+    expect(visible(parent, between, a, b, c)).toEqual([true, false, false, false, false]);
+    recolour(childTile(left, 0), 2);
+    recolour(right, 2);
+    expect(visible(parent, between, a, b, c)).toEqual([true, false, false, false, false]);
+    recolour(childTile(left, 1), 2);
+    expect(visible(parent, between, a, b, c)).toEqual([false, false, true, true, true]);
+  });
+
+  it('draws a preview between as soon as it and its neighbours are new', () => {
+    const parent = add(root, { child_mask: 0b11 });
+    const between = add(left, { child_mask: 0b11 });
+    const [a, b, c] = [add(childTile(left, 0)), add(childTile(left, 1)), add(right)];
+    recolour(root, 2);
+    recolour(left, 2);
+    recolour(right, 2);
+    expect(visible(parent, between, a, b, c)).toEqual([false, true, false, false, true]);
+    recolour(childTile(left, 0), 2);
+    recolour(childTile(left, 1), 2);
+    expect(visible(parent, between, a, b, c)).toEqual([false, false, true, true, true]);
+  });
+
+  it('goes on with the coarse answer when the generation rises half-way', () => {
+    const parent = add(root, { child_mask: 0b11 });
+    const [a, b] = [add(left), add(right)];
+    recolour(root, 2);
+    recolour(left, 2);
+    recolour(root, 3);
+    recolour(right, 3);
+    expect(visible(parent, a, b)).toEqual([true, false, false]);
+    expect(parent.shade).toBe(3);
+    recolour(left, 3);
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+  });
+
+  it('draws what is new of this connection before detail of an earlier one, whatever the numbers say', () => {
+    const parent = add(root, { child_mask: 0b11, generation: 90 });
+    const [a, b] = [add(left, { generation: 90 }), add(right, { generation: 90 })];
+    tiles.beginConnection();
+    tiles.updateSelection();
+    expect(visible(parent, a, b)).toEqual([false, true, true]);
+    const newParent = add(root, { child_mask: 0b11, generation: 1 });
+    expect([parent.disposed, ...visible(newParent, a, b)]).toEqual([true, true, false, false]);
+    const newA = add(left, { generation: 1 });
+    expect(visible(newParent, newA, b)).toEqual([true, false, false]);
+    const newB = add(right, { generation: 1 });
+    expect(visible(newParent, newA, newB)).toEqual([false, true, true]);
+  });
+
+  it('keeps new geometry of a drawn tile on the screen', () => {
+    const old = add(root);
+    const next = add(root, { revision: 2, generation: 1 });
+    expect([old.disposed, next.visible]).toEqual([true, true]);
+  });
+
+  it('knows which colours would take detail off the screen', () => {
+    add(root, { child_mask: 0b11 });
+    add(left);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 2 }))).toBe(false);
+    add(right);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 1 }))).toBe(false);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 2 }))).toBe(true);
+    expect(tiles.wouldHideDetail(frame(left, { generation: 2 }))).toBe(false);
+    recolour(left, 2);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 2 }))).toBe(true);
+    tiles.addColours(frame(right, { generation: 2 }), colours(2));
+    expect(tiles.wouldHideDetail(frame(root, { generation: 2 }))).toBe(false);
+    recolour(root, 3);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 4 }))).toBe(false);
   });
 });

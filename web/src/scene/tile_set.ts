@@ -1,5 +1,5 @@
 import type { DecodedGeometry } from '../decode/messages';
-import { childTile, parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
+import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 
 /** What the drawing side keeps for one tile; the tile set owns it and disposes of it. */
 export interface Drawable {
@@ -14,19 +14,30 @@ interface Shown {
   drawable: Drawable;
   geometry: DecodedGeometry;
   revision: number;
-  generation: number;
-  /** From an earlier connection: drawn until its successor is complete, never changed. */
-  stale: boolean;
+  /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
+  rank: number;
 }
 
-interface TileEntry {
-  id: TileId;
+/** A place in the tile tree. It is there while its tile, or one beneath it, is held. */
+interface TileNode {
+  readonly id: TileId;
+  readonly key: string;
+  readonly parent: TileNode | null;
+  /** By octant. */
+  readonly children: (TileNode | undefined)[];
   child_mask: number;
   shown: Shown | null;
   /** Geometry whose colours have not come yet. */
   waitingGeometry: { revision: number; geometry: DecodedGeometry } | null;
   /** Colours whose geometry is not decoded yet. */
   waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
+  /** Rank of the oldest colours that stand on the screen when the children are drawn in this tile's place; NOTHING when they cannot be. */
+  coverRank: number;
+  /** The same when this place is drawn as well as it can be: by the tile itself or by its children, whichever is newer. */
+  bestRank: number;
+  /** Number of the selection in which the children took this tile's place. */
+  replacedIn: number;
+  isDrawn: boolean;
 }
 
 export interface TileCounts {
@@ -35,111 +46,140 @@ export interface TileCounts {
   triangles: number;
 }
 
+const NOTHING = Number.NEGATIVE_INFINITY;
+/** More than there are generations in one connection. */
+const CONNECTION_RANKS = 2 ** 32;
+const OCTANTS = [0, 1, 2, 3, 4, 5, 6, 7] as const;
+
 /**
- * The tiles this client holds, and which of them are drawn (the REPLACE rule of docs/protocol.md). Decoding ends in any order; what
- * is drawn is always a geometry with colours of its own revision, and colours never go back to an older generation.
+ * The tiles this client holds, and which of them are drawn. Decoding ends in any order; what is drawn is always a geometry with
+ * colours of its own revision, and colours never go back to an older generation.
+ *
+ * The children of a tile are drawn in its place when all of them can be (the REPLACE rule of docs/protocol.md) and nothing that is
+ * drawn then has older colours than the tile itself. So no old detail ever stands in front of a newer answer, however coarse; where
+ * both are equally new the detail wins. A tile that its children replace may keep old colours: it hides nothing that is newer.
  */
 export class TileSet {
-  #tiles = new Map<string, TileEntry>();
+  #nodes = new Map<string, TileNode>();
+  #tops = new Set<TileNode>();
+  #drawn = new Set<TileNode>();
   #selectionDirty = false;
+  #selectionCount = 0;
+  #connection = 0;
 
   constructor(private readonly createDrawable: CreateDrawable) {}
 
+  /** Tiles of which anything is held. */
   get size(): number {
-    return this.#tiles.size;
+    let size = 0;
+    for (const node of this.#nodes.values()) if (isHeld(node)) size += 1;
+    return size;
   }
 
   /** Every tile that has something to draw, drawn or not. */
   *shownGeometries(): Iterable<{ geometry: DecodedGeometry; visible: boolean }> {
-    const selected = this.#selected();
-    for (const [key, entry] of this.#tiles) {
-      if (entry.shown !== null) yield { geometry: entry.shown.geometry, visible: selected.has(key) };
+    for (const { shown, isDrawn } of this.#nodes.values()) {
+      if (shown !== null) yield { geometry: shown.geometry, visible: isDrawn };
     }
-  }
-
-  /** Tiles whose colours are of this generation, of all that this connection has filled. */
-  progress(generation: number): { current: number; total: number } {
-    let current = 0;
-    let total = 0;
-    for (const { shown, waitingGeometry } of this.#tiles.values()) {
-      if (shown === null && waitingGeometry === null) continue;
-      total += 1;
-      if (shown !== null && !shown.stale && shown.generation >= generation) current += 1;
-    }
-    return { current, total };
   }
 
   /** The server's frames start anew: what is held stays on the screen, but everything that comes is newer. */
   beginConnection(): void {
-    for (const entry of this.#tiles.values()) {
-      entry.waitingGeometry = null;
-      entry.waitingColours = null;
-      if (entry.shown !== null) entry.shown.stale = true;
+    this.#connection += 1;
+    for (const node of [...this.#nodes.values()]) {
+      node.waitingGeometry = null;
+      node.waitingColours = null;
+      this.#prune(node);
     }
   }
 
   /** The new connection has sent all it has: what it did not send again is no longer part of the scene. */
   endStale(): void {
-    for (const [key, entry] of this.#tiles) {
-      if (entry.shown?.stale) this.#delete(key, entry);
-    }
+    for (const node of [...this.#nodes.values()]) if (node.shown !== null && this.#isStale(node.shown)) this.#delete(node);
   }
 
   addGeometry(frame: TileFrame, geometry: DecodedGeometry): void {
-    const entry = this.#entry(frame.tile);
-    entry.child_mask = frame.child_mask;
-    this.#selectionDirty = true;
-    const { shown } = entry;
-    if (shown !== null && !shown.stale && frame.revision < shown.revision) return;
-    entry.waitingGeometry = { revision: frame.revision, geometry };
-    this.#join(entry);
+    const node = this.#node(frame.tile);
+    this.#setChildMask(node, frame.child_mask);
+    const { shown } = node;
+    if (shown !== null && !this.#isStale(shown) && frame.revision < shown.revision) return;
+    node.waitingGeometry = { revision: frame.revision, geometry };
+    this.#join(node);
   }
 
   addColours(frame: TileFrame, rgba: Uint8Array<ArrayBuffer>): void {
-    const entry = this.#entry(frame.tile);
-    entry.child_mask = frame.child_mask;
-    const { shown, waitingColours } = entry;
-    if (shown !== null && !shown.stale && shown.revision === frame.revision) {
-      if (frame.generation < shown.generation) return;
+    const node = this.#node(frame.tile);
+    this.#setChildMask(node, frame.child_mask);
+    const { shown, waitingColours } = node;
+    if (shown !== null && !this.#isStale(shown) && shown.revision === frame.revision) {
+      const rank = this.#rank(frame.generation);
+      if (rank < shown.rank) return;
       if (rgba.length !== (shown.geometry.positions.length / 3) * 4) {
-        throw new Error(`tile ${tileKey(frame.tile)}: colours of ${rgba.length / 4} vertices for another geometry`);
+        throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for another geometry`);
       }
-      shown.generation = frame.generation;
+      shown.rank = rank;
       shown.drawable.setColours(rgba);
+      this.#changed(node);
       return;
     }
     if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation)
       return;
-    entry.waitingColours = { revision: frame.revision, generation: frame.generation, rgba };
-    this.#join(entry);
+    node.waitingColours = { revision: frame.revision, generation: frame.generation, rgba };
+    this.#join(node);
+  }
+
+  /** True when these colours, once added, would put the tile on the screen in the place of older detail that stands there now. */
+  wouldHideDetail(frame: TileFrame): boolean {
+    const node = this.#nodes.get(tileKey(frame.tile));
+    return (
+      node !== undefined &&
+      node.shown !== null &&
+      node.replacedIn === this.#selectionCount &&
+      node.coverRank >= node.shown.rank &&
+      node.coverRank < this.#rank(frame.generation)
+    );
+  }
+
+  /** False while the tile is held and is to be drawn itself rather than its children. */
+  isReplaced(id: TileId): boolean {
+    const node = this.#nodes.get(tileKey(id));
+    return node === undefined || node.shown === null || node.coverRank >= node.shown.rank;
   }
 
   remove(id: TileId): void {
-    const key = tileKey(id);
-    const entry = this.#tiles.get(key);
-    if (entry !== undefined) this.#delete(key, entry);
+    const node = this.#nodes.get(tileKey(id));
+    if (node !== undefined) this.#delete(node);
   }
 
   clear(): void {
-    for (const [key, entry] of [...this.#tiles]) this.#delete(key, entry);
+    for (const { shown } of this.#nodes.values()) shown?.drawable.dispose();
+    this.#nodes.clear();
+    this.#tops.clear();
+    this.#drawn.clear();
+    this.#selectionDirty = true;
   }
 
-  /** Shows and hides tiles by the REPLACE rule; cheap when nothing has changed. Returns true when something may have. */
+  /** Shows and hides tiles by the rule above; cheap when nothing has changed. Returns true when something may have. */
   updateSelection(): boolean {
     if (!this.#selectionDirty) return false;
     this.#selectionDirty = false;
-    const selected = this.#selected();
-    for (const [key, entry] of this.#tiles) entry.shown?.drawable.setVisible(selected.has(key));
+    this.#selectionCount += 1;
+    const before = this.#drawn;
+    this.#drawn = new Set();
+    for (const top of this.#tops) this.#select(top);
+    for (const node of before) {
+      if (this.#drawn.has(node)) continue;
+      node.isDrawn = false;
+      node.shown?.drawable.setVisible(false);
+    }
     return true;
   }
 
   /** What is on the screen now. */
   counts(): TileCounts {
     const counts: TileCounts = { tiles: 0, vertices: 0, triangles: 0 };
-    const selected = this.#selected();
-    for (const key of selected) {
-      const shown = this.#tiles.get(key)?.shown;
-      if (!shown) continue;
+    for (const { shown } of this.#drawn) {
+      if (shown === null) continue;
       counts.tiles += 1;
       counts.vertices += shown.geometry.positions.length / 3;
       counts.triangles += (shown.geometry.indices?.length ?? 0) / 3;
@@ -147,91 +187,146 @@ export class TileSet {
     return counts;
   }
 
-  #entry(id: TileId): TileEntry {
-    const key = tileKey(id);
-    let entry = this.#tiles.get(key);
-    if (entry === undefined) {
-      entry = { id, child_mask: 0, shown: null, waitingGeometry: null, waitingColours: null };
-      this.#tiles.set(key, entry);
-      this.#selectionDirty = true;
-    }
-    return entry;
+  /**
+   * How much of the finest picture that can be drawn of the tiles held shows this generation, in tiles. Tiles whose place is taken by
+   * their children do not count: they may keep older colours.
+   */
+  progress(generation: number): { current: number; total: number } {
+    const wanted = this.#rank(generation);
+    const progress = { current: 0, total: 0 };
+    const visit = (node: TileNode): void => {
+      const isEnd = node.coverRank === NOTHING && (node.shown !== null || node.waitingGeometry !== null);
+      if (isEnd) {
+        progress.total += 1;
+        if (node.shown !== null && node.shown.rank >= wanted) progress.current += 1;
+      } else {
+        for (const child of node.children) if (child !== undefined) visit(child);
+      }
+    };
+    for (const top of this.#tops) visit(top);
+    return progress;
   }
 
-  #join(entry: TileEntry): void {
-    const { waitingGeometry, waitingColours } = entry;
+  #rank(generation: number): number {
+    return this.#connection * CONNECTION_RANKS + generation;
+  }
+
+  /** From an earlier connection: drawn until its successor is complete, never changed. */
+  #isStale(shown: Shown): boolean {
+    return shown.rank < this.#rank(0);
+  }
+
+  #node(id: TileId): TileNode {
+    const key = tileKey(id);
+    const known = this.#nodes.get(key);
+    if (known !== undefined) return known;
+    const above = parentTile(id);
+    const parent = above === null ? null : this.#node(above);
+    const node: TileNode = {
+      id,
+      key,
+      parent,
+      children: new Array<TileNode | undefined>(8).fill(undefined),
+      child_mask: 0,
+      shown: null,
+      waitingGeometry: null,
+      waitingColours: null,
+      coverRank: NOTHING,
+      bestRank: NOTHING,
+      replacedIn: 0,
+      isDrawn: false,
+    };
+    this.#nodes.set(key, node);
+    if (parent === null) this.#tops.add(node);
+    else parent.children[octantOf(id)] = node;
+    return node;
+  }
+
+  #setChildMask(node: TileNode, child_mask: number): void {
+    if (node.child_mask === child_mask) return;
+    node.child_mask = child_mask;
+    this.#changed(node);
+  }
+
+  #join(node: TileNode): void {
+    const { waitingGeometry, waitingColours } = node;
     if (waitingGeometry === null || waitingColours === null) return;
     if (waitingGeometry.revision !== waitingColours.revision) return;
-    entry.waitingGeometry = null;
-    entry.waitingColours = null;
+    node.waitingGeometry = null;
+    node.waitingColours = null;
     const { geometry, revision } = waitingGeometry;
     if (waitingColours.rgba.length !== (geometry.positions.length / 3) * 4) {
       throw new Error(
-        `tile ${tileKey(entry.id)}: colours of ${waitingColours.rgba.length / 4} vertices for ${geometry.positions.length / 3}`,
+        `tile ${node.key}: colours of ${waitingColours.rgba.length / 4} vertices for ${geometry.positions.length / 3}`,
       );
     }
-    entry.shown?.drawable.dispose();
+    node.shown?.drawable.dispose();
     const drawable = this.createDrawable(geometry, waitingColours.rgba);
-    entry.shown = { drawable, geometry, revision, generation: waitingColours.generation, stale: false };
-    this.#selectionDirty = true;
+    node.shown = { drawable, geometry, revision, rank: this.#rank(waitingColours.generation) };
+    if (node.isDrawn) drawable.setVisible(true);
+    this.#changed(node);
   }
 
-  #delete(key: string, entry: TileEntry): void {
-    entry.shown?.drawable.dispose();
-    this.#tiles.delete(key);
-    this.#selectionDirty = true;
+  #delete(node: TileNode): void {
+    node.shown?.drawable.dispose();
+    node.shown = null;
+    node.waitingGeometry = null;
+    node.waitingColours = null;
+    node.child_mask = 0;
+    node.isDrawn = false;
+    this.#drawn.delete(node);
+    this.#changed(node);
+    this.#prune(node);
   }
 
-  #selected(): Set<string> {
-    const children = new Map<string, string[]>();
-    const tops: string[] = [];
-    const known = new Set<string>();
-    // Tiles of which only descendants are held are walked through as empty ones.
-    const link = (id: TileId): void => {
-      const key = tileKey(id);
-      if (known.has(key)) return;
-      known.add(key);
-      const parent = parentTile(id);
-      if (parent === null) {
-        tops.push(key);
-        return;
-      }
-      const parentKey = tileKey(parent);
-      const siblings = children.get(parentKey);
-      if (siblings === undefined) children.set(parentKey, [key]);
-      else siblings.push(key);
-      link(parent);
-    };
-    for (const entry of this.#tiles.values()) link(entry.id);
-
-    const covers = new Map<string, boolean>();
-    const covered = (key: string): boolean => {
-      const memo = covers.get(key);
-      if (memo !== undefined) return memo;
-      const entry = this.#tiles.get(key);
-      const result = entry !== undefined && (entry.shown !== null || this.#childrenCover(entry, covered));
-      covers.set(key, result);
-      return result;
-    };
-    const selected = new Set<string>();
-    const visit = (key: string): void => {
-      const entry = this.#tiles.get(key);
-      if (entry?.shown && !this.#childrenCover(entry, covered)) {
-        selected.add(key);
-        return;
-      }
-      for (const child of children.get(key) ?? []) visit(child);
-    };
-    for (const top of tops) visit(top);
-    return selected;
-  }
-
-  #childrenCover(entry: TileEntry, covered: (key: string) => boolean): boolean {
-    if (entry.child_mask === 0) return false;
-    for (let octant = 0; octant < 8; octant += 1) {
-      if ((entry.child_mask & (1 << octant)) === 0) continue;
-      if (!covered(tileKey(childTile(entry.id, octant)))) return false;
+  /** Takes away a node of which nothing is held, and the empty ones above it. */
+  #prune(node: TileNode): void {
+    for (let at: TileNode | null = node; at !== null; at = at.parent) {
+      if (isHeld(at) || at.children.some((child) => child !== undefined)) return;
+      this.#nodes.delete(at.key);
+      if (at.parent === null) this.#tops.delete(at);
+      else at.parent.children[octantOf(at.id)] = undefined;
     }
-    return true;
   }
+
+  /** Brings the ranks of a tile that has changed, and of those above it, up to date. */
+  #changed(node: TileNode): void {
+    this.#selectionDirty = true;
+    for (let at: TileNode | null = node; at !== null; at = at.parent) {
+      at.coverRank = coverRankOf(at);
+      const bestRank = Math.max(at.coverRank, at.shown?.rank ?? NOTHING);
+      if (bestRank === at.bestRank) return;
+      at.bestRank = bestRank;
+    }
+  }
+
+  #select(node: TileNode): void {
+    if (node.shown !== null && node.coverRank < node.shown.rank) {
+      this.#drawn.add(node);
+      if (node.isDrawn) return;
+      node.isDrawn = true;
+      node.shown.drawable.setVisible(true);
+      return;
+    }
+    node.replacedIn = this.#selectionCount;
+    // Of tiles that are not held themselves, and not all of whose children are, whatever is there is drawn.
+    for (const child of node.children) if (child !== undefined) this.#select(child);
+  }
+}
+
+function octantOf(id: TileId): number {
+  return (id.x & 1) + (id.y & 1) * 2 + (id.z & 1) * 4;
+}
+
+function isHeld(node: TileNode): boolean {
+  return node.shown !== null || node.waitingGeometry !== null || node.waitingColours !== null;
+}
+
+function coverRankOf(node: TileNode): number {
+  if (node.child_mask === 0) return NOTHING;
+  let oldest = Number.POSITIVE_INFINITY;
+  for (const octant of OCTANTS) {
+    if ((node.child_mask & (1 << octant)) !== 0) oldest = Math.min(oldest, node.children[octant]?.bestRank ?? NOTHING);
+  }
+  return oldest;
 }

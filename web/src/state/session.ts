@@ -1,5 +1,5 @@
 import { DecodePool, Superseded } from '../decode/pool';
-import type { DecodeJob, DecodeResult } from '../decode/messages';
+import type { DecodeJob } from '../decode/messages';
 import { decodeTileFrame, FrameKind, type TileFrame, tileKey } from '../protocol/frame';
 import {
   type CameraPose,
@@ -22,6 +22,7 @@ import {
   streamStats,
   type Vec3,
 } from '../protocol/messages';
+import { Arrivals } from '../scene/arrivals';
 import {
   fittedView,
   guessUpAxis,
@@ -50,11 +51,6 @@ const TICK_MS = 100;
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
 
-interface Decoded {
-  frame: TileFrame;
-  result: DecodeResult;
-}
-
 function createDecodeWorker(): Worker {
   return new Worker(new URL('../decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' });
 }
@@ -73,8 +69,8 @@ export class Session {
   readonly #hoverAsker: Coalescer<{ x: number; y: number }>;
   readonly #ticker: ReturnType<typeof setInterval>;
 
-  /** Decoded, waiting for the next picture; the newest per tile and kind. */
-  #decoded = new Map<string, Decoded>();
+  readonly #arrivals: Arrivals;
+  #nextPicture: ReturnType<typeof setTimeout> | undefined;
   #removedAt = new Map<string, number>();
   #connectionNumber = 0;
   #lastSequence = 0;
@@ -104,6 +100,7 @@ export class Session {
       beforeRender: () => this.#bringIn(),
     });
     this.tiles = new TileSet((geometry, rgba) => this.viewport.tiles.create(geometry, rgba));
+    this.#arrivals = new Arrivals(this.tiles, (error) => this.#say(error));
     this.#connection = new Connection(url, {
       onHello: (message) => this.#greeted(message),
       onNotification: (method, params) => this.#notified(method, params),
@@ -161,6 +158,7 @@ export class Session {
 
   dispose(): void {
     clearInterval(this.#ticker);
+    clearTimeout(this.#nextPicture);
     this.#connection.stop();
     this.#pool.dispose();
     this.tiles.clear();
@@ -308,7 +306,7 @@ export class Session {
     this.#connectionNumber += 1;
     this.#acknowledger.reset();
     this.#pool.clear();
-    this.#decoded.clear();
+    this.#arrivals.clear();
     this.#removedAt.clear();
     this.#lastSequence = 0;
     this.#completeAfter = null;
@@ -492,8 +490,7 @@ export class Session {
     } else {
       if (frame.kind === FrameKind.remove) {
         this.#removedAt.set(key, frame.sequence);
-        this.#decoded.delete(`geometry ${key}`);
-        this.#decoded.delete(`colours ${key}`);
+        this.#arrivals.drop(frame.tile);
         this.tiles.remove(frame.tile);
         this.viewport.invalidate();
       }
@@ -515,11 +512,8 @@ export class Session {
       .decode(key, job)
       .then((result) => {
         if (connectionNumber !== this.#connectionNumber) return;
-        const waiting = this.#decoded.get(key);
         const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
-        if (frame.sequence > removed && (waiting === undefined || waiting.frame.sequence < frame.sequence)) {
-          this.#decoded.set(key, { frame, result });
-        }
+        if (frame.sequence > removed) this.#arrivals.add(frame, result, performance.now());
         this.viewport.invalidate();
       })
       .catch((error: unknown) => {
@@ -530,31 +524,19 @@ export class Session {
       });
   }
 
-  /** Brings decoded tiles into the picture, as many as one picture can take. */
+  /** Brings decoded tiles into the picture, as many as one picture can take. Returns true when the next one has work, too. */
   #bringIn(): boolean {
-    let bytes = 0;
-    for (const [key, { frame, result }] of this.#decoded) {
-      if (bytes > BYTES_PER_PICTURE) break;
-      this.#decoded.delete(key);
-      try {
-        if (result.kind === 'geometry') {
-          bytes += result.positions.byteLength + (result.indices?.byteLength ?? 0);
-          this.tiles.addGeometry(frame, result);
-        } else {
-          bytes += result.rgba.byteLength;
-          this.tiles.addColours(frame, result.rgba);
-        }
-      } catch (error) {
-        this.#say(error);
-      }
-    }
     const complete = this.#completeAfter;
-    if (complete !== null && this.#decoded.size === 0 && this.#acknowledger.sequence >= complete.sequence) {
+    const isLast = complete !== null && this.#acknowledger.sequence >= complete.sequence;
+    const { bytes, next_ms } = this.#arrivals.bringIn(performance.now(), BYTES_PER_PICTURE, isLast);
+    if (isLast && this.#arrivals.size === 0) {
       this.#completeAfter = null;
       this.#completed(complete.message);
     }
     if (this.tiles.updateSelection() || bytes > 0) this.store.shown = this.tiles.counts();
-    return this.#decoded.size > 0;
+    clearTimeout(this.#nextPicture);
+    if (next_ms !== null && next_ms > 0) this.#nextPicture = setTimeout(() => this.viewport.invalidate(), next_ms);
+    return next_ms === 0;
   }
 
   #completed(message: StreamComplete): void {
@@ -640,10 +622,16 @@ export class Session {
     this.#rateWindow = this.#rateWindow.filter(({ at }) => now - at < 2000);
     store.rate_bytes_per_s = this.#rateWindow.reduce((sum, { bytes }) => sum + bytes, 0) / 2;
     if (store.behindSince !== null) {
-      const { current, total } = this.tiles.progress(store.generation);
-      const expected = store.complete === null ? Math.max(total, store.scene?.tile_count ?? 0) : total;
-      store.progress = expected === 0 ? 0 : current / expected;
+      store.progress = this.#progress();
     }
+  }
+
+  #progress(): number {
+    const { store } = this;
+    // Before the first picture is complete nobody can say which tiles it takes; at most it is all of them.
+    if (store.complete === null) return this.tiles.size / Math.max(1, this.tiles.size, store.scene?.tile_count ?? 0);
+    const { current, total } = this.tiles.progress(store.generation);
+    return total === 0 ? 0 : current / total;
   }
 
   #say(error: unknown): void {
