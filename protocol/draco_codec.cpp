@@ -72,6 +72,22 @@ int add_attribute(draco::PointCloud& cloud, draco::GeometryAttribute::Type type,
   return id;
 }
 
+/// Draco codes the values of one attribute with one table of frequencies. Green and the differences from it are spread
+/// differently, so each has an attribute of its own.
+void add_green_and_differences(draco::PointCloud& cloud, std::span<const ColourBytes> colours) {
+  std::vector<std::uint8_t> green;
+  std::vector<std::array<std::uint8_t, 2>> differences;
+  green.reserve(colours.size());
+  differences.reserve(colours.size());
+  for (const auto& [r, g, b] : colours) {
+    green.push_back(g);
+    differences.push_back({static_cast<std::uint8_t>(r - g), static_cast<std::uint8_t>(b - g)});
+  }
+  add_attribute<std::uint8_t>(cloud, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 1, true, green);
+  add_attribute<std::array<std::uint8_t, 2>>(cloud, draco::GeometryAttribute::GENERIC, draco::DT_UINT8, 2, false,
+                                             differences);
+}
+
 /// A float as text that strtod reads back exactly in every locale: a hexadecimal integer times a power of two.
 std::string exact_text(float value) {
   int exponent = 0;
@@ -114,6 +130,11 @@ std::array<float, 3> float_value(const draco::PointAttribute& attribute, std::ui
 
 bool is_position_attribute(const draco::PointAttribute* attribute) {
   return attribute != nullptr && attribute->data_type() == draco::DT_FLOAT32 && attribute->num_components() == 3;
+}
+
+bool is_of_bytes(const draco::PointAttribute* attribute, int component_count) {
+  return attribute != nullptr && attribute->data_type() == draco::DT_UINT8 &&
+         attribute->num_components() == component_count;
 }
 
 /// The triangle turned so that its smallest index comes first; keeps the orientation.
@@ -311,7 +332,8 @@ std::uint8_t rounded_channel(std::uint8_t value, int colour_bits) {
   return static_cast<std::uint8_t>(std::min(255, ((value + half) >> shift) << shift));
 }
 
-Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed) {
+Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed,
+                                               ColourTransform transform) {
   if (colours.empty()) return internal("no colours to encode");
   if (colours.size() > std::numeric_limits<std::int32_t>::max()) return internal("too many colours");
   if (colour_bits < 1 || colour_bits > 8)
@@ -324,7 +346,11 @@ Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colo
 
   draco::PointCloud cloud;
   cloud.set_num_points(static_cast<std::uint32_t>(rounded.size()));
-  add_attribute<ColourBytes>(cloud, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, rounded);
+  if (transform == ColourTransform::None) {
+    add_attribute<ColourBytes>(cloud, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, rounded);
+  } else {
+    add_green_and_differences(cloud, rounded);
+  }
   draco::ExpertEncoder encoder(cloud);
   encoder.SetSpeedOptions(speed, speed);
   encoder.SetEncodingMethod(draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
@@ -370,18 +396,31 @@ Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload) {
   return geometry;
 }
 
-Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload) {
+Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload, ColourTransform transform) {
   draco::DecoderBuffer stream = decoder_buffer(payload);
   draco::Decoder decoder;
   auto decoded = decoder.DecodePointCloudFromBuffer(&stream);
   if (!decoded.ok()) return internal("does not decode: " + decoded.status().error_msg_string());
   const draco::PointCloud& cloud = *decoded.value();
-  const draco::PointAttribute* attribute = cloud.GetNamedAttribute(draco::GeometryAttribute::COLOR);
-  if (attribute == nullptr || attribute->data_type() != draco::DT_UINT8 || attribute->num_components() != 3)
-    return internal("no COLOR attribute of three bytes");
   std::vector<ColourBytes> colours(cloud.num_points());
-  for (std::uint32_t i = 0; i < cloud.num_points(); ++i)
-    attribute->GetMappedValue(draco::PointIndex(i), colours[i].data());
+  const draco::PointAttribute* colour = cloud.GetNamedAttribute(draco::GeometryAttribute::COLOR);
+  if (transform == ColourTransform::None) {
+    if (!is_of_bytes(colour, 3)) return internal("no COLOR attribute of three bytes");
+    for (std::uint32_t i = 0; i < cloud.num_points(); ++i)
+      colour->GetMappedValue(draco::PointIndex(i), colours[i].data());
+    return colours;
+  }
+  const draco::PointAttribute* difference = cloud.GetNamedAttribute(draco::GeometryAttribute::GENERIC);
+  if (!is_of_bytes(colour, 1)) return internal("no COLOR attribute of one byte");
+  if (!is_of_bytes(difference, 2)) return internal("no GENERIC attribute of two bytes");
+  for (std::uint32_t i = 0; i < cloud.num_points(); ++i) {
+    std::uint8_t green = 0;
+    std::array<std::uint8_t, 2> red_and_blue{};
+    colour->GetMappedValue(draco::PointIndex(i), &green);
+    difference->GetMappedValue(draco::PointIndex(i), red_and_blue.data());
+    colours[i] = {static_cast<std::uint8_t>(red_and_blue[0] + green), green,
+                  static_cast<std::uint8_t>(red_and_blue[1] + green)};
+  }
   return colours;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol/rpc_error.hpp"
+#include "protocol/tile_frame.hpp"
 
 namespace spectra::protocol {
 
@@ -31,9 +32,11 @@ struct EncodedGeometry {
 Result<EncodedGeometry> encoded_geometry(std::span<const LatticePoint> positions,
                                          std::span<const TileTriangle> triangles, float step_m, int speed);
 
-/// Encodes colours, value i for decoded vertex i, as a sequential Draco point cloud with one COLOR attribute of 3 bytes.
+/// Encodes colours, value i for decoded vertex i, as a sequential Draco point cloud: one COLOR attribute of 3 bytes, or with
+/// SubtractGreen a COLOR attribute of one byte and a GENERIC one of two.
 /// With colour_bits b < 8 each channel is first rounded to the nearest multiple of 2^(8-b), half up, 256 becoming 255.
-Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed);
+Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed,
+                                               ColourTransform transform = ColourTransform::None);
 
 /// The channel value that a decoder sees for `value` at `colour_bits`.
 std::uint8_t rounded_channel(std::uint8_t value, int colour_bits);
@@ -44,7 +47,8 @@ struct DecodedGeometry {
   std::vector<TileTriangle> triangles;
 };
 Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload);
-Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload);
+Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload,
+                                                 ColourTransform transform = ColourTransform::None);
 
 /// Files for export: a whole mesh with colours and, where given, temperature (GENERIC float) as one Draco stream.
 struct DracoFileInput {

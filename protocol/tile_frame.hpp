@@ -11,7 +11,25 @@
 
 namespace spectra::protocol {
 
-enum class FrameKind : std::uint8_t { Geometry = 1, Colours = 2, Remove = 3, Temperature = 4, Visible = 5 };
+enum class FrameKind : std::uint8_t {
+  Geometry = 1,
+  Colours = 2,
+  Remove = 3,
+  Temperature = 4,
+  Visible = 5,
+  ColoursSubtractGreen = 6,
+};
+
+/// How colours are written into a frame; both decode to the same colours. A client chooses with scene.subscribe.
+enum class ColourTransform : std::uint8_t {
+  None,           ///< One attribute (r, g, b).
+  SubtractGreen,  ///< Two attributes, g and (r - g, b - g) modulo 256: channels of a picture resemble each other.
+};
+
+/// The kind of a frame whose colours are written that way.
+constexpr FrameKind colour_frame_kind(ColourTransform transform) {
+  return transform == ColourTransform::None ? FrameKind::Colours : FrameKind::ColoursSubtractGreen;
+}
 
 /// Names a node of the tile tree; level 0 is the root. Child i of (l,x,y,z) is (l+1, 2x+(i&1), 2y+(i>>1&1), 2z+(i>>2)).
 struct TileId {

@@ -18,6 +18,13 @@ std::span<const EnumWord<StatusLevel>> words_of() {
   return kWords;
 }
 
+template <>
+std::span<const EnumWord<ColourTransform>> words_of() {
+  static constexpr EnumWord<ColourTransform> kWords[] = {{ColourTransform::None, "none"},
+                                                         {ColourTransform::SubtractGreen, "subtract_green"}};
+  return kWords;
+}
+
 static constexpr const char* kPosition = "a list of 3 numbers that fit a 32-bit float";
 
 static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
@@ -27,6 +34,7 @@ static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
   const std::uint32_t in_flight_bytes = message.in_flight_bytes.value_or(1);
   fields.require("in_flight_bytes", in_flight_bytes >= 1 && in_flight_bytes <= 2'147'483'647U,
                  "an integer from 1 to 2147483647");
+  fields.optional("colour_transform", message.colour_transform);
 }
 
 static void describe(auto& fields, Is<CameraSet> auto& message) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/tile_frame.hpp"
 
 namespace spectra::protocol {
 
@@ -15,7 +16,8 @@ enum class Channel { Fused, Temperature, Visible };
 /// Params of scene.subscribe; at least one channel.
 struct SubscribeRequest {
   std::vector<Channel> channels;
-  std::optional<std::uint32_t> in_flight_bytes;  ///< 1..2^31-1; absent: the server's choice.
+  std::optional<std::uint32_t> in_flight_bytes;     ///< 1..2^31-1; absent: the server's choice.
+  std::optional<ColourTransform> colour_transform;  ///< Absent: none.
 };
 
 /// Params of camera.set; metres relative to the scene origin, finite as float.

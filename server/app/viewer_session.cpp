@@ -129,7 +129,7 @@ void ViewerSession::opened() {
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = new_session_id();
   hello.role = protocol::Role::Operator;
-  hello.capabilities = {"histogram", "probe", "extremes", "exports"};
+  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -216,7 +216,8 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
   }
   is_subscribed_ = true;
   in_flight_bytes_ = request.in_flight_bytes.value_or(0);
-  if (stream_) stream_->subscribe(in_flight_bytes_);
+  colour_transform_ = request.colour_transform.value_or(protocol::ColourTransform::None);
+  if (stream_) stream_->subscribe(in_flight_bytes_, colour_transform_);
   peer_.wake();
   return json::object();
 }
@@ -401,7 +402,7 @@ void ViewerSession::begin_stream() {
   });
   if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
   if (camera_) stream_->set_camera(*camera_);
-  if (is_subscribed_) stream_->subscribe(in_flight_bytes_);
+  if (is_subscribed_) stream_->subscribe(in_flight_bytes_, colour_transform_);
 }
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {

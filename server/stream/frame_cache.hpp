@@ -56,8 +56,10 @@ struct ColourKey {
   std::uint32_t revision;
   std::shared_ptr<const PlanIdentity> plan;
   int colour_bits;
+  protocol::ColourTransform transform = protocol::ColourTransform::None;
   friend bool operator<(const ColourKey& a, const ColourKey& b) {
-    return std::tie(a.revision, a.plan, a.colour_bits) < std::tie(b.revision, b.plan, b.colour_bits);
+    return std::tie(a.revision, a.plan, a.colour_bits, a.transform) <
+           std::tie(b.revision, b.plan, b.colour_bits, b.transform);
   }
 };
 

@@ -6,6 +6,8 @@ namespace spectra::server {
 namespace {
 
 constexpr std::array<QualityPoint, 8> kFrontier{{{1, 8}, {1, 7}, {1, 6}, {2, 6}, {2, 5}, {4, 5}, {8, 5}, {8, 4}}};
+constexpr std::array<double, 9> kPlainCost{0, 0, 0, 0, 0.45, 0.70, 1.14, 1.45, 1.78};
+constexpr std::array<double, 9> kSubtractGreenCost{0, 0, 0, 0, 0.44, 0.62, 0.83, 1.11, 1.43};
 constexpr std::size_t kFewestVerticesToLearnFrom = 1000;  // Below, the frame is mostly its fixed part.
 constexpr double kLearningRate = 0.1;
 
@@ -14,6 +16,9 @@ constexpr double kLearningRate = 0.1;
 std::span<const QualityPoint> quality_frontier() {
   return kFrontier;
 }
+
+ColourCost::ColourCost(protocol::ColourTransform transform)
+    : bytes_per_vertex_(transform == protocol::ColourTransform::None ? kPlainCost : kSubtractGreenCost) {}
 
 void ColourCost::learn(int colour_bits, std::size_t vertex_count, std::size_t payload_bytes) {
   if (vertex_count < kFewestVerticesToLearnFrom) return;

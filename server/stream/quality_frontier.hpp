@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <span>
 
+#include "protocol/tile_frame.hpp"
+
 namespace spectra::server {
 
 /// One way to answer a change of the settings: how coarse the tiles, how coarse their colours.
@@ -21,11 +23,12 @@ std::span<const QualityPoint> quality_frontier();
 /// what a scanned outdoor scene needs.
 class ColourCost {
  public:
+  explicit ColourCost(protocol::ColourTransform transform = protocol::ColourTransform::None);
   void learn(int colour_bits, std::size_t vertex_count, std::size_t payload_bytes);
   double bytes_per_vertex(int colour_bits) const;
 
  private:
-  std::array<double, 9> bytes_per_vertex_{0, 0, 0, 0, 0.45, 0.70, 1.14, 1.45, 1.78};
+  std::array<double, 9> bytes_per_vertex_;
 };
 
 }  // namespace spectra::server

@@ -21,7 +21,8 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
 }
 
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
-                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed) {
+                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed,
+                                               protocol::ColourTransform transform) {
   std::vector<float> no_temperature;
   std::span<const float> temperature = tile.temperature_celsius;
   if (temperature.empty()) {
@@ -35,7 +36,7 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
     const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];
     colours[i] = {colour.r, colour.g, colour.b};
   }
-  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed));
+  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 

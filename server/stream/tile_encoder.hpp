@@ -8,6 +8,7 @@
 
 #include "fusion/fusion_plan.hpp"
 #include "protocol/rpc_error.hpp"
+#include "protocol/tile_frame.hpp"
 #include "server/scene/scene_snapshot.hpp"
 
 namespace spectra::server {
@@ -28,6 +29,7 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
 
 /// Fuses a tile and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile.
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
-                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed);
+                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed,
+                                               protocol::ColourTransform transform = protocol::ColourTransform::None);
 
 }  // namespace spectra::server

@@ -80,9 +80,14 @@ struct Demand {
   float position_step_m = 0;
   int encoder_speed = 7;
   int colour_bits = 8;
+  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
   std::shared_ptr<const fusion::FusionPlan> plan;  // Null before the first set_plan().
   std::shared_ptr<const PlanIdentity> plan_identity;
 };
+
+ColourKey colour_key_of(const EncodedTile& geometry, const Demand& demand) {
+  return {geometry.revision, demand.plan_identity, demand.colour_bits, demand.colour_transform};
+}
 
 // One encoding that a job has claimed, and what came of it.
 struct Encoding {
@@ -94,7 +99,7 @@ struct Encoding {
   Payload made_colours = nullptr;
 
   GeometryKey geometry_key() const { return {Identity(tile), demand.position_step_m, demand.encoder_speed}; }
-  ColourKey colour_key() const { return {geometry->revision, demand.plan_identity, demand.colour_bits}; }
+  ColourKey colour_key() const { return colour_key_of(*geometry, demand); }
 };
 
 class Stream final : public ViewerStream, public CacheWaiter {
@@ -124,9 +129,15 @@ class Stream final : public ViewerStream, public CacheWaiter {
     change([&] { adopt(std::move(scene)); });
   }
 
-  void subscribe(std::size_t in_flight_bytes) override {
+  void subscribe(std::size_t in_flight_bytes, protocol::ColourTransform transform) override {
     change([&] {
       window_.set_ceiling(in_flight_bytes);
+      if (transform != demand_.colour_transform) {
+        demand_.colour_transform = transform;
+        ++demand_.colour_epoch;
+        colour_cost_ = ColourCost(transform);
+        is_complete_due_ = true;
+      }
       if (subscribed_) return;
       subscribed_ = true;
       is_complete_due_ = true;
@@ -244,7 +255,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       std::optional<OutgoingFrame> frame;
       if (slot->held_colour_epoch != demand_.colour_epoch) {
         if (!window_.admits(frame_size(slot->colours))) return std::nullopt;
-        auto header = header_of(*slot, FrameKind::Colours);
+        auto header = header_of(*slot, protocol::colour_frame_kind(demand_.colour_transform));
         header.generation = generation_;
         slot->held_colour_epoch = demand_.colour_epoch;
         colour_cost_.learn(demand_.colour_bits, header.vertex_count, slot->colours->size());
@@ -600,7 +611,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const GeometryKey key{Identity(slot.tile), demand_.position_step_m, demand_.encoder_speed};
     auto geometry = cache_->find_geometry(key);
     if (!geometry) return;
-    auto colours = cache_->find_colours({geometry->revision, demand_.plan_identity, demand_.colour_bits});
+    auto colours = cache_->find_colours(colour_key_of(*geometry, demand_));
     if (colours) make_ready(slot, std::move(geometry), std::move(colours));
   }
 
@@ -765,7 +776,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
         reason = result.error().message;
       } else {
         auto result = encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, demand.colour_bits,
-                                           demand.encoder_speed);
+                                           demand.encoder_speed, demand.colour_transform);
         if (result.has_value()) {
           encoding.made_colours = std::move(result).value();
           cache_->store_colours(encoding.colour_key(), encoding.made_colours);

@@ -115,8 +115,10 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
   virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
 
-  /// Starts sending; `in_flight_bytes` bounds the window, 0 = our choice (which is also the largest).
-  virtual void subscribe(std::size_t in_flight_bytes) = 0;
+  /// Starts sending; `in_flight_bytes` bounds the window, 0 = our choice (which is also the largest). A later call
+  /// replaces both; colours that were sent with another transform are sent anew.
+  virtual void subscribe(std::size_t in_flight_bytes,
+                         protocol::ColourTransform transform = protocol::ColourTransform::None) = 0;
   virtual void unsubscribe() = 0;
 
   /// Called before subscribe(): geometry that the viewer says it holds. What is still current is not sent again (its

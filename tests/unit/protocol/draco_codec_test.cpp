@@ -177,15 +177,50 @@ TEST(EncodedColours, DecodeInOrderToTheRoundedColours) {
       for (std::uint8_t& value : colour) value = static_cast<std::uint8_t>(channel(random));
     for (int bits = 4; bits <= 8; ++bits)
       for (const int speed : {0, 5, 7, 10}) {
-        const auto encoded = encoded_colours(colours, bits, speed);
-        ASSERT_TRUE(encoded.has_value()) << encoded.error().message;
-        const auto decoded = decoded_colours(encoded.value());
-        ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-        ASSERT_EQ(decoded.value().size(), count);
-        for (std::size_t i = 0; i < count; ++i)
-          for (std::size_t c = 0; c < 3; ++c) ASSERT_EQ(decoded.value()[i][c], rounded_channel(colours[i][c], bits));
+        for (const ColourTransform transform : {ColourTransform::None, ColourTransform::SubtractGreen}) {
+          const auto encoded = encoded_colours(colours, bits, speed, transform);
+          ASSERT_TRUE(encoded.has_value()) << encoded.error().message;
+          const auto decoded = decoded_colours(encoded.value(), transform);
+          ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+          ASSERT_EQ(decoded.value().size(), count);
+          for (std::size_t i = 0; i < count; ++i)
+            for (std::size_t c = 0; c < 3; ++c) ASSERT_EQ(decoded.value()[i][c], rounded_channel(colours[i][c], bits));
+        }
       }
   }
+}
+
+TEST(EncodedColours, SubtractGreenGivesBackTheExtremes) {
+  std::vector<ColourBytes> colours;
+  for (const int r : {0, 1, 127, 128, 255})
+    for (const int g : {0, 1, 127, 128, 255})
+      for (const int b : {0, 1, 127, 128, 255})
+        colours.push_back({static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g), static_cast<std::uint8_t>(b)});
+  const auto encoded = encoded_colours(colours, 8, 7, ColourTransform::SubtractGreen);
+  ASSERT_TRUE(encoded.has_value());
+  EXPECT_EQ(decoded_colours(encoded.value(), ColourTransform::SubtractGreen).value(), colours);
+}
+
+TEST(EncodedColours, AreNotReadTheOtherWay) {
+  const std::vector<ColourBytes> colours{{1, 2, 3}, {200, 100, 50}};
+  const auto plain = encoded_colours(colours, 8, 7);
+  const auto transformed = encoded_colours(colours, 8, 7, ColourTransform::SubtractGreen);
+  EXPECT_TRUE(decoded_colours(plain.value(), ColourTransform::SubtractGreen).has_error());
+  EXPECT_TRUE(decoded_colours(transformed.value()).has_error());
+}
+
+TEST(EncodedColours, OfAPictureAreSmallerWithSubtractGreen) {
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> light(40, 200);
+  std::uniform_int_distribution<int> tint(-3, 3);
+  std::vector<ColourBytes> colours(20'000);
+  for (ColourBytes& colour : colours) {
+    const int shared = light(random);
+    for (std::uint8_t& value : colour) value = static_cast<std::uint8_t>(shared + tint(random));
+  }
+  const auto plain = encoded_colours(colours, 8, 7);
+  const auto transformed = encoded_colours(colours, 8, 7, ColourTransform::SubtractGreen);
+  EXPECT_LT(transformed.value().size(), plain.value().size() * 3 / 4);
 }
 
 TEST(EncodedColours, RefusesNoColoursAndBitsThatDoNotExist) {

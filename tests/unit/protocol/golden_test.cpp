@@ -206,8 +206,10 @@ json frame_json(const TileFrameView& frame) {
     if (!geometry) return geometry.error().message;
     described["positions_m"] = geometry.value().positions_m;
     described["triangles"] = geometry.value().triangles;
-  } else if (frame.header.kind == FrameKind::Colours) {
-    const auto colours = decoded_colours(frame.payload);
+  } else if (frame.header.kind == FrameKind::Colours || frame.header.kind == FrameKind::ColoursSubtractGreen) {
+    const auto colours =
+        decoded_colours(frame.payload, frame.header.kind == FrameKind::Colours ? ColourTransform::None
+                                                                               : ColourTransform::SubtractGreen);
     if (!colours) return colours.error().message;
     described["colours"] = colours.value();
   }
@@ -262,6 +264,13 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.sequence = 3;
   header.generation = 10;
   frames["colours_6_bits"] = frame_bytes(header, encoded_colours(decoded_order, 6, 7).value());
+
+  header.kind = FrameKind::ColoursSubtractGreen;
+  frames["colours_subtract_green_6_bits"] =
+      frame_bytes(header, encoded_colours(decoded_order, 6, 7, ColourTransform::SubtractGreen).value());
+  header.generation = 9;
+  frames["colours_subtract_green"] =
+      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
 
   header.kind = FrameKind::Remove;
   header.sequence = 4;

@@ -66,6 +66,11 @@ TEST(SubscribeRequest, KnowsItsChannels) {
   EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":0})"), "in_flight_bytes");
   EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":2147483648})"),
             "in_flight_bytes");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"colour_transform":"subtract_green"})"),
+            "accepted");
+  for (const std::string transform : {"\"ycocg\"", "\"\"", "6", "null"})
+    EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"colour_transform":)" + transform + "}"),
+              "colour_transform");
 }
 
 TEST(FusionChange, KeepsWhatIsAbsentAbsent) {

@@ -105,6 +105,18 @@ TEST(FrameCache, AGeometryThatComesBackTheSameKeepsItsRevision) {
   EXPECT_EQ(cache.size_bytes(), 0U);
 }
 
+TEST(FrameCache, KeepsColoursApartThatAreWrittenOtherwise) {
+  FrameCache cache(1 << 20);
+  auto& state = *cache.state();
+  const ColourKey plain{1, std::make_shared<const PlanIdentity>(), 8, protocol::ColourTransform::None};
+  ColourKey transformed = plain;
+  transformed.transform = protocol::ColourTransform::SubtractGreen;
+  state.claim_colours(plain, {});
+  state.store_colours(plain, colours(10));
+  EXPECT_EQ(state.find_colours(transformed), nullptr);
+  EXPECT_EQ(state.claim_colours(transformed, {}).kind, Claim<std::vector<std::byte>>::Kind::Yours);
+}
+
 TEST(FrameCache, IdentityOutlivesItsObject) {
   // Not make_shared, so that the memory of the dead tile is free for the next one.
   auto tile = std::shared_ptr<const Tile>(new Tile());

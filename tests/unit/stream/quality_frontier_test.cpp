@@ -19,7 +19,12 @@ TEST(QualityFrontier, FallsFromFullQualityStepByStep) {
 
 TEST(ColourCost, LearnsFromWhatIsSent) {
   ColourCost cost;
-  for (int bits = 5; bits <= 8; ++bits) EXPECT_GT(cost.bytes_per_vertex(bits), cost.bytes_per_vertex(bits - 1));
+  const ColourCost smaller(protocol::ColourTransform::SubtractGreen);
+  for (int bits = 5; bits <= 8; ++bits) {
+    EXPECT_GT(cost.bytes_per_vertex(bits), cost.bytes_per_vertex(bits - 1));
+    EXPECT_GT(smaller.bytes_per_vertex(bits), smaller.bytes_per_vertex(bits - 1));
+    EXPECT_LT(smaller.bytes_per_vertex(bits), cost.bytes_per_vertex(bits));
+  }
   for (int frame = 0; frame < 100; ++frame) cost.learn(6, 30'000, 15'000);
   EXPECT_NEAR(cost.bytes_per_vertex(6), 0.5, 0.01);
   const double before = cost.bytes_per_vertex(8);

@@ -99,7 +99,9 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       }
       break;
     }
-    case protocol::FrameKind::Colours: {
+    case protocol::FrameKind::Colours:
+    case protocol::FrameKind::ColoursSubtractGreen: {
+      EXPECT_EQ(header.kind, protocol::colour_frame_kind(colour_transform));
       const auto held = tiles.find(header.tile);
       ASSERT_NE(held, tiles.end()) << "colours without geometry";
       EXPECT_EQ(held->second.geometry.revision, header.revision);
@@ -107,7 +109,7 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       EXPECT_GE(header.generation, held->second.generation);
       EXPECT_EQ(header.generation, stream_->generation());
       held->second.generation = header.generation;
-      held->second.colours = protocol::decoded_colours(frame.value().payload).value();
+      held->second.colours = protocol::decoded_colours(frame.value().payload, colour_transform).value();
       EXPECT_EQ(held->second.colours.size(), header.vertex_count);
       break;
     }

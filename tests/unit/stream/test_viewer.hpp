@@ -42,7 +42,8 @@ class TestViewer {
   /// Acknowledges everything that was taken.
   void acknowledge();
 
-  bool acknowledges = true;  ///< After every frame.
+  bool acknowledges = true;                                                      ///< After every frame.
+  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;  ///< What it subscribed with.
   std::map<protocol::TileId, HeldTile> tiles;
   std::vector<protocol::TileFrameHeader> frames;  ///< All that was ever taken.
   std::vector<StreamComplete> completes;

@@ -351,6 +351,38 @@ TEST_F(ViewerStreamTest, FewerColourBitsSendColoursOnly) {
   EXPECT_EQ(viewer.stream().stats().colour_levels, 32);
 }
 
+TEST_F(ViewerStreamTest, SubtractGreenShowsTheSameColours) {
+  TestViewer plain(scene_, cache_, pool_);
+  TestViewer transformed(scene_, cache_, pool_);
+  transformed.colour_transform = protocol::ColourTransform::SubtractGreen;
+  for (TestViewer* viewer : {&plain, &transformed}) {
+    StreamQuality quality = viewer->stream().quality();
+    quality.colour_bits = 6;
+    viewer->stream().set_quality(quality);
+    viewer->stream().subscribe(0, viewer->colour_transform);
+    show(*viewer, 0.3);
+    viewer->complete();
+    expect_picture(*viewer, *scene_, 0.3, 6);
+  }
+  EXPECT_EQ(plain.count(FrameKind::Colours), scene_->tiles().size());
+  EXPECT_EQ(transformed.count(FrameKind::ColoursSubtractGreen), scene_->tiles().size());
+  EXPECT_EQ(cache_.miss_count(), 3 * scene_->tiles().size()) << "one geometry, two ways to write colours";
+}
+
+TEST_F(ViewerStreamTest, AnotherTransformWhileFramesFlowSendsColoursAnew) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  viewer.complete();
+  show(viewer, 0.6);
+  wait_until_idle(pool_);  // Prepared, not taken: written the old way.
+  viewer.colour_transform = protocol::ColourTransform::SubtractGreen;
+  viewer.stream().subscribe(0, viewer.colour_transform);
+  viewer.complete();
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), scene_->tiles().size());
+  expect_picture(viewer, *scene_, 0.6);
+}
+
 TEST_F(ViewerStreamTest, AnotherPositionStepSendsGeometryUnderANewRevision) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe(0);

@@ -23,6 +23,10 @@ export type Colour = [number, number, number];
  */
 export type ColourBytes = [number, number, number];
 /**
+ * How colours are written: none = frames of kind 2 (r, g, b), subtract_green = kind 6 (g and r - g, b - g).
+ */
+export type ColourTransform = "none" | "subtract_green";
+/**
  * number, integer, toggle (boolean), choice (string) or temperature (degC; null = automatic).
  */
 export type ParameterValue = number | string | boolean | null;
@@ -45,6 +49,7 @@ export interface ProtocolDefinitions {
   Channel: Channel;
   Colour: Colour;
   ColourBytes: ColourBytes;
+  ColourTransform: ColourTransform;
   Empty: Empty;
   Extreme: Extreme;
   ExtremesReply: ExtremesReply;
@@ -555,4 +560,8 @@ export interface SubscribeRequest {
    * Most frame bytes beyond the last stream.ack; absent: the server's choice.
    */
   in_flight_bytes?: number;
+  /**
+   * How colours are written: none = frames of kind 2 (r, g, b), subtract_green = kind 6 (g and r - g, b - g).
+   */
+  colour_transform?: "none" | "subtract_green";
 }
