@@ -1,7 +1,8 @@
 // A parameter change against sending the whole mesh again, both over loopback and both decoded by Node, taken in turns in
 // one run:
 //   node tests/bench/stream/parameter_change.mjs [SCENE.ply] [ROUNDS]     (default: a generated scene of 1,000,000 vertices)
-// Prints the medians and the ratios of time and bytes.
+// Prints the medians and the ratios of time and bytes; then what a change costs with colours as they are and with
+// subtract_green, at 8 and 6 bits.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import net from "node:net";
@@ -62,18 +63,25 @@ class WholeMeshClient {
   }
 }
 
+async function subscribed(colour_transform) {
+  const client = await SpectraClient.connect(server.url);
+  await client.request("scene.subscribe", { channels: ["fused"], colour_transform });
+  await client.complete((await client.request("fusion.get")).generation);
+  return client;
+}
+
 const server = await serve([scene]);
-const client = await SpectraClient.connect(server.url);
-await client.request("scene.subscribe", { channels: ["fused"] });
-await client.complete((await client.request("fusion.get")).generation);
+const client = await subscribed("none");
 const step = [...client.tiles.values()][0].frame.step;
 const whole = await WholeMeshClient.start(step, client.draco);
 
-async function tileChange(alpha) {
+const blend = (alpha) => ({ method: "thermal_visible_blend", params: { alpha: Number(alpha) } });
+
+async function tileChange(client, change) {
   const bytesBefore = client.received_bytes;
   const framesBefore = client.frames.length;
   const start = performance.now();
-  const { generation } = await client.request("fusion.set", { method: "thermal_visible_blend", params: { alpha: Number(alpha) } });
+  const { generation } = await client.request("fusion.set", change);
   await client.complete(generation);
   const ms = performance.now() - start;
   if (client.failures.length) throw client.failures[0];
@@ -87,7 +95,7 @@ async function tileChange(alpha) {
 const tile = [];
 const mesh = [];
 for (let round = -1; round < rounds; ++round) {
-  const a = await tileChange(alphaOf(round));
+  const a = await tileChange(client, blend(alphaOf(round)));
   const b = await whole.change(alphaOf(round));
   if (round < 0) continue; // warm-up
   tile.push(a);
@@ -101,6 +109,34 @@ console.log(`whole mesh again median ${median(mesh.map((a) => a.ms)).toFixed(1)}
 console.log(`faster by ${median(ratios).toFixed(2)} (min ${Math.min(...ratios).toFixed(2)}), bytes ratio ${(median(tile.map((a) => a.bytes)) / median(mesh.map((a) => a.bytes))).toFixed(3)}`);
 
 whole.stop();
-await client.close();
+
+const clients = { none: client, subtract_green: await subscribed("subtract_green") };
+let settings = 0;
+/** Settings that nobody had before where the method has any, so that nothing comes from the cache. */
+const changes = {
+  thermal_visible_blend: () => blend(0.3 + 0.0001 * ++settings),
+  visible_only: () => ({ method: "visible_only" }),
+};
+for (const colour_bits of [8, 6]) {
+  for (const one of Object.values(clients)) {
+    const done = one.notification("stream.complete");
+    await one.request("quality.set", { mode: "manual", colour_bits });
+    await done;
+  }
+  for (const [method, change] of Object.entries(changes)) {
+    const measured = { none: [], subtract_green: [] };
+    for (let round = 0; round < rounds; ++round) {
+      for (const [transform, one] of Object.entries(clients)) measured[transform].push(await tileChange(one, change()));
+    }
+    const bytes = (transform) => median(measured[transform].map((a) => a.bytes));
+    const saved = 100 * (1 - bytes("subtract_green") / bytes("none"));
+    for (const [transform, results] of Object.entries(measured)) {
+      console.log(`${method}, ${colour_bits} bits, ${transform.padEnd(14)} median ${median(results.map((a) => a.ms)).toFixed(1)} ms, ${bytes(transform)} bytes`);
+    }
+    console.log(`${method}, ${colour_bits} bits: subtract_green saves ${saved.toFixed(1)} %`);
+  }
+}
+
+for (const one of Object.values(clients)) await one.close();
 await server.stop();
 rmSync(folder, { recursive: true });

@@ -7,7 +7,7 @@ import path from "node:path";
 import { after, test } from "node:test";
 import { identityOfPly, identityOfTiles } from "./mesh_identity.mjs";
 import { readPly } from "./ply.mjs";
-import { KIND, SpectraClient } from "./spectra_client.mjs";
+import { isColours, KIND, SpectraClient } from "./spectra_client.mjs";
 import { run, serve } from "./spectra_server.mjs";
 
 const folder = mkdtempSync(path.join(tmpdir(), "spectra-rebuild-"));
@@ -26,32 +26,51 @@ function fused(scene, { method, params, palette, range }) {
   return readPly(output);
 }
 
+/** What is drawn after a change, checked against the file's picture with `shown` applied to its colours. */
+async function checkPicture(client, change, expected, shown = (value) => value) {
+  const { generation, fusion } = await client.request("fusion.set", change);
+  await client.complete(generation);
+  assert.deepEqual(client.failures, []);
+  assert.equal(fusion.method, change.method);
+  const tiles = client.drawnTiles();
+  assert.ok(tiles.every((tile) => tile.generation === generation), "every tile shows the newest generation");
+  const steps = new Set(tiles.map((tile) => tile.frame.step));
+  assert.equal(steps.size, 1, "one lattice");
+  const { origin, vertex_count, triangle_count } = client.hello.scene;
+  assert.equal(vertex_count, expected.vertexCount);
+  assert.equal(triangle_count, expected.triangles.length / 3);
+  const picture = { ...expected };
+  for (const channel of ["red", "green", "blue"]) picture[channel] = expected[channel].map(shown);
+  assert.equal(`${identityOfTiles(tiles)}`, `${identityOfPly(picture, origin, ...steps)}`, JSON.stringify(change));
+}
+
+/** The same scene for two clients, one for each way to write colours. */
 async function checkScene(scene, changes) {
   const server = await serve([scene]);
   try {
-    const client = await SpectraClient.connect(server.url);
-    await client.request("scene.subscribe", { channels: ["fused"] });
-    let geometryFrames = 0;
-    for (const change of changes) {
-      const { generation, fusion } = await client.request("fusion.set", change);
-      await client.complete(generation);
-      assert.deepEqual(client.failures, []);
-      assert.equal(fusion.method, change.method);
-      const tiles = client.drawnTiles();
-      assert.ok(tiles.every((tile) => tile.generation === generation), "every tile shows the newest generation");
-      const steps = new Set(tiles.map((tile) => tile.frame.step));
-      assert.equal(steps.size, 1, "one lattice");
-      const [step] = steps;
-      const expected = fused(scene, change);
-      const { origin, vertex_count, triangle_count } = client.hello.scene;
-      assert.equal(vertex_count, expected.vertexCount);
-      assert.equal(triangle_count, expected.triangles.length / 3);
-      assert.equal(`${identityOfTiles(tiles)}`, `${identityOfPly(expected, origin, step)}`, JSON.stringify(change));
-      const geometryNow = client.frames.filter((frame) => frame.kind === KIND.geometry).length;
-      if (geometryFrames) assert.equal(geometryNow, geometryFrames, "fusion.set sends no geometry");
-      geometryFrames = geometryNow;
+    const clients = [];
+    for (const colour_transform of ["none", "subtract_green"]) {
+      const client = await SpectraClient.connect(server.url);
+      await client.request("scene.subscribe", { channels: ["fused"], colour_transform });
+      clients.push(client);
     }
-    await client.close();
+    const geometryFrames = () => clients.map(({ frames }) => frames.filter(({ kind }) => kind === KIND.geometry).length);
+    let before;
+    for (const change of changes) {
+      const expected = fused(scene, change);
+      for (const client of clients) await checkPicture(client, change, expected);
+      before ??= geometryFrames();
+      assert.deepEqual(geometryFrames(), before, "fusion.set sends no geometry");
+    }
+    const rounded = (value) => Math.min(255, (value + 2) & ~3);
+    const expected = fused(scene, changes.at(-1));
+    for (const client of clients) {
+      await client.request("quality.set", { mode: "manual", colour_bits: 6 });
+      await checkPicture(client, changes.at(-1), expected, rounded);
+    }
+    const kinds = clients.map(({ frames }) => [...new Set(frames.filter(isColours).map(({ kind }) => kind))]);
+    assert.deepEqual(kinds, [[KIND.colours], [KIND.colours_subtract_green]], "each got the frames it asked for");
+    for (const client of clients) await client.close();
   } finally {
     await server.stop();
   }

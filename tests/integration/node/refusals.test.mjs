@@ -56,6 +56,8 @@ const cases = [
   ["scene.probe", { position: [1, 2] }, -32602, "position"],
   ["scene.probe", { position: [1, 2, "three"] }, -32602, "position"],
   ["scene.subscribe", { channels: ["sound"] }, -32602, "channels"],
+  ["scene.subscribe", { channels: ["fused"], colour_transform: "ycocg" }, -32602, "colour_transform"],
+  ["scene.subscribe", { channels: ["fused"], colour_transform: 6 }, -32602, "colour_transform"],
   ["quality.set", { mode: "manual", colour_bits: 3 }, -32602, "colour_bits"],
   ["quality.set", { mode: "manual", encoder_speed: 11 }, -32602, "encoder_speed"],
   ["quality.set", { mode: "manual", position_step_mm: -1 }, -32602, "position_step_mm"],

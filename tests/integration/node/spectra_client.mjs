@@ -3,7 +3,8 @@
 import draco3d from "draco3d";
 import WebSocket from "ws";
 
-export const KIND = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5 };
+export const KIND = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5, colours_subtract_green: 6 };
+export const isColours = ({ kind }) => kind === KIND.colours || kind === KIND.colours_subtract_green;
 const MAGIC = 0x31435053;
 
 /** Reads the header of a binary message; throws on anything docs/protocol.md does not allow. */
@@ -67,6 +68,7 @@ export class DracoReader {
     const id = decoder.GetAttributeId(geometry, semantic);
     if (id < 0) throw new Error("draco: attribute missing");
     const attribute = decoder.GetAttribute(geometry, id);
+    if (attribute.num_components() !== components) throw new Error("draco: attribute of another size");
     const ArrayType = type === module.DT_FLOAT32 ? Float32Array : Uint8Array;
     const count = geometry.num_points() * components;
     const size = count * ArrayType.BYTES_PER_ELEMENT;
@@ -110,6 +112,22 @@ export class DracoReader {
     return this.#decoded(bytes, (decoder, geometry) =>
       this.#values(decoder, geometry, module.COLOR, module.DT_UINT8, 3),
     );
+  }
+
+  /** Colours of kind 6: green, and red and blue as differences from it modulo 256. */
+  coloursSubtractGreen(bytes) {
+    const { module } = this;
+    return this.#decoded(bytes, (decoder, geometry) => {
+      const green = this.#values(decoder, geometry, module.COLOR, module.DT_UINT8, 1);
+      const differences = this.#values(decoder, geometry, module.GENERIC, module.DT_UINT8, 2);
+      const colours = new Uint8Array(3 * green.length); // stores modulo 256
+      for (let i = 0; i < green.length; ++i) {
+        colours[3 * i] = green[i] + differences[2 * i];
+        colours[3 * i + 1] = green[i];
+        colours[3 * i + 2] = green[i] + differences[2 * i + 1];
+      }
+      return colours;
+    });
   }
 }
 
@@ -235,11 +253,12 @@ export class SpectraClient {
       const geometry = this.draco.geometry(frame.payload);
       if (geometry.positions.length !== 3 * frame.vertexCount) throw new Error("geometry: vertex count differs");
       this.tiles.set(frame.tile, { frame, geometry, colours: null, generation: 0 });
-    } else if (frame.kind === KIND.colours) {
+    } else if (isColours(frame)) {
       const tile = this.tiles.get(frame.tile);
       if (!tile || tile.frame.revision !== frame.revision) throw new Error("colours before their geometry");
       if (frame.generation < tile.generation) throw new Error("colours of an older generation after newer ones");
-      const colours = this.draco.colours(frame.payload);
+      const isPlain = frame.kind === KIND.colours;
+      const colours = isPlain ? this.draco.colours(frame.payload) : this.draco.coloursSubtractGreen(frame.payload);
       if (colours.length !== tile.geometry.positions.length) throw new Error("colours: vertex count differs");
       tile.colours = colours;
       tile.generation = frame.generation;
