@@ -11,19 +11,29 @@
 #define HWY_TARGET_INCLUDE "fusion/methods/histogram_bin.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once per instruction set
 
+#include "fusion/methods/bin_set.hpp"
 #include "fusion/methods/vertex_lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
 
-void fuse_histogram_bin(const ThermalTable& thermal, const HistogramBinning& binning, const float* weight_of_bin,
+void fuse_histogram_bin(const ThermalTable& thermal, const HistogramBinning& binning, const BinSet& shown, float alpha,
                         const VertexSpan& span) {
   const auto fill = [&](const float* temperature, const std::uint8_t*, std::size_t count, float* weight) HWY_ATTR {
     const FloatTag d;
+    const BitsTag bits;
     alignas(64) std::int32_t bin[kBlock];
     histogram_bins(binning, temperature, count, bin);
+    const bool fits_register = shown.word_count() <= kLanes;
+    const auto first_words = hn::LoadU(bits, shown.words());
     for (std::size_t i = 0; i < count; i += kLanes) {
-      hn::Store(hn::GatherIndex(d, weight_of_bin, hn::Load(IntTag(), bin + i)), d, weight + i);
+      const auto index = hn::Load(IntTag(), bin + i);
+      const auto word_index = hn::ShiftRight<5>(index);
+      const auto word = fits_register ? hn::TableLookupLanes(first_words, hn::IndicesFromVec(bits, word_index))
+                                      : hn::GatherIndex(bits, shown.words(), word_index);
+      const auto bit = hn::Shl(hn::Set(bits, 1), hn::And(hn::BitCast(bits, index), hn::Set(bits, 31)));
+      const auto is_shown = hn::RebindMask(d, hn::TestBit(word, bit));
+      hn::Store(hn::IfThenElseZero(is_shown, all(alpha)), d, weight + i);
     }
   };
   fuse_thermal(span, thermal, Weights(fill), Mix());
@@ -124,13 +134,14 @@ PreparedMethod prepare(const HistogramBin& params, const MethodContext& context)
   }
   histogram.counts.resize(static_cast<std::size_t>(params.bins));
   const std::vector<std::uint8_t> flags = highlighted_bins(params, histogram.counts);
-  std::vector<float> weights;
-  for (const std::uint8_t flag : flags) weights.push_back(flag ? static_cast<float>(params.alpha) : 0.0F);
-  weights.push_back(0);  // the bin of what is missing
+  BinSet shown(flags.size());
+  for (std::size_t index = 0; index < flags.size(); ++index) {
+    if (flags[index]) shown.insert(index);
+  }
   std::vector<TemperatureInterval> highlighted = intervals(flags, histogram);
-  const auto fuse = [thermal = ThermalTable(context), bin = HistogramBinning(histogram),
-                     weights = std::move(weights)](const VertexSpan& span) {
-    HWY_DYNAMIC_DISPATCH(fuse_histogram_bin)(thermal, bin, weights.data(), span);
+  const auto fuse = [thermal = ThermalTable(context), bin = HistogramBinning(histogram), shown = std::move(shown),
+                     alpha = static_cast<float>(params.alpha)](const VertexSpan& span) {
+    HWY_DYNAMIC_DISPATCH(fuse_histogram_bin)(thermal, bin, shown, alpha, span);
   };
   return {lane_kernel(context, fuse), std::move(highlighted)};
 }

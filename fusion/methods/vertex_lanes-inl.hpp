@@ -24,8 +24,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 using FloatTag = hn::ScalableTag<float>;
 using Floats = hn::Vec<FloatTag>;
 using IntTag = hn::RebindToSigned<FloatTag>;
+using BitsTag = hn::RebindToUnsigned<FloatTag>;
 using DoubleTag = hn::ScalableTag<double>;
 using Doubles = hn::Vec<DoubleTag>;
+using ByteTag = hn::ScalableTag<std::uint8_t>;
 
 /// Adding it makes a float of small magnitude a whole number, rounded half to even, in the low bits.
 constexpr float kWholeFloat = 12582912.0F;           // 1.5 * 2^23
@@ -77,43 +79,34 @@ HWY_INLINE void map_in_double(const float* temperature, std::size_t count, float
   }
 }
 
-/// Interleaving three channels: lane e of register j belongs to vertex (j * lanes + e) / 3.
-class ChannelOrder {
- public:
-  ChannelOrder() {
-    for (std::size_t j = 0; j < 3; ++j) {
-      for (std::size_t e = 0; e < kLanes; ++e) vertex_[j][e] = static_cast<std::int32_t>((j * kLanes + e) / 3);
-    }
-  }
-  /// One value per vertex, spread over its channels in register j.
-  HWY_INLINE Floats spread(Floats values, std::size_t j) const {
-    return hn::TableLookupLanes(values, hn::SetTableIndices(FloatTag(), vertex_[j]));
-  }
-  /// Register j of one colour over and over.
-  HWY_INLINE Floats repeated(Rgb8 colour, std::size_t j) const {
-    alignas(64) float lanes[kLanes];
-    for (std::size_t e = 0; e < kLanes; ++e) {
-      const std::size_t channel = (j * kLanes + e) % 3;
-      lanes[e] = static_cast<float>(channel == 0 ? colour.r : channel == 1 ? colour.g : colour.b);
-    }
-    return hn::Load(FloatTag(), lanes);
-  }
+/// As many vertices as a float register has lanes are a group; its colours are four registers of padded colours: block k
+/// (128 bits) of register j holds r, g, b and a pad of vertex 4 k + j. What stands per vertex then reaches its channels
+/// by a broadcast within blocks.
+constexpr std::size_t kRegisters = 4;
 
- private:
-  alignas(64) std::int32_t vertex_[3][kLanes];
-};
+/// Of one value per vertex of a group: those of register j, for each channel.
+template <int kRegister>
+HWY_INLINE Floats spread(Floats values) {
+#if HWY_TARGET == HWY_SCALAR
+  return values;
+#else
+  return hn::Broadcast<kRegister>(values);
+#endif
+}
 
-/// The palette colours of a block of vertices, interleaved like the colours of the vertices.
+/// One colour for every vertex of a register.
+HWY_INLINE Floats repeated(Rgb8 colour) {
+  alignas(64) float lanes[kLanes];
+  const float channels[4] = {static_cast<float>(colour.r), static_cast<float>(colour.g), static_cast<float>(colour.b),
+                             0};
+  for (std::size_t e = 0; e < kLanes; ++e) lanes[e] = channels[e % 4];
+  return hn::Load(FloatTag(), lanes);
+}
+
+/// Where the palette colours of a block of vertices stand in the table.
 class ThermalColours {
  public:
-  explicit ThermalColours(const ThermalTable& table) : table_(table) {
-    for (std::size_t e = 0; e < kLanes; ++e) {
-      without_pad_[e] = static_cast<std::int32_t>(e < 3 * kRowsPerRegister ? e / 3 * 4 + e % 3 : 0);
-      for (std::size_t k = 0; k < kLanes / kRowsPerRegister; ++k) {
-        vertex_[k][e] = static_cast<std::int32_t>(k * kRowsPerRegister + e / 4);
-      }
-    }
-  }
+  explicit ThermalColours(const ThermalTable& table) : table_(table) {}
 
   HWY_INLINE void prepare(const float* temperature, std::size_t count) {
     if (table_.single_precision) {
@@ -121,40 +114,33 @@ class ThermalColours {
     } else {
       locate_in_double(temperature, count);
     }
-    const float* rows = table_.rows[0].data();
-#if HWY_TARGET == HWY_SCALAR
-    for (std::size_t i = 0; i < count; ++i) {
-      const float* row = rows + 8 * (static_cast<std::uint8_t>(row_[i]));
-      for (std::size_t c = 0; c < 3; ++c) colour_[3 * i + c] = row[c] + part_[i] * row[4 + c];
-    }
-#else
-    const FloatTag d;
-    const auto without_pad = hn::SetTableIndices(d, without_pad_);
-    for (std::size_t i = 0; i < count; i += kLanes) {
-      const Floats part = hn::Load(d, part_ + i);
-      for (std::size_t k = 0; k < kLanes / kRowsPerRegister; ++k) {
-        const std::size_t first = i + k * kRowsPerRegister;
-        const Floats way = hn::TableLookupLanes(part, hn::SetTableIndices(d, vertex_[k]));
-        const Floats padded =
-            hn::Add(gathered(d, rows, row_ + first), hn::Mul(way, gathered(d, rows + 4, row_ + first)));
-        // The lanes beyond the last channel are overwritten by the next store.
-        hn::StoreU(hn::TableLookupLanes(padded, without_pad), d, colour_ + 3 * first);
-      }
-    }
-#endif
   }
 
-  /// Register number `index` of the block's channels.
-  HWY_INLINE Floats channels(std::size_t index) const {
-    return hn::Load(FloatTag(), colour_ + index * kLanes);
+#if HWY_TARGET == HWY_SCALAR
+  HWY_INLINE float channel(std::size_t vertex, std::size_t index) const {
+    const float* row = row_at(vertex);
+    return row[index] + part_[vertex] * row[4 + index];
   }
+#else
+  /// Register `kRegister` of the group that begins at vertex `first`.
+  template <int kRegister>
+  HWY_INLINE Floats colours(std::size_t first) const {
+    const FloatTag d;
+    const Floats way = spread<kRegister>(hn::Load(d, part_ + first));
+    return hn::Add(gathered(d, first + kRegister, 0), hn::Mul(way, gathered(d, first + kRegister, 4)));
+  }
+#endif
 
  private:
-  /// Colours with their pad that fit a register.
-  static constexpr std::size_t kRowsPerRegister = kLanes >= 4 ? kLanes / 4 : 1;
+  static constexpr int kRowBytesLog2 = 5;
+  static_assert(sizeof(ThermalTable::rows) == 256 << kRowBytesLog2);
+
+  HWY_INLINE const float* row_at(std::size_t vertex) const {
+    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(table_.rows.data()) + row_bytes_[vertex]);
+  }
 
   /// Row and part of the way to the next row, to within 6.1e-5 rows where ThermalTable allows it. A whole position may
-  /// take the row below with a part of 1: the same colour. The low byte is the row even of a NaN.
+  /// take the row below with a part of 1: the same colour. The row is within the table even for a NaN.
   HWY_INLINE void locate_in_float(const float* temperature, std::size_t count) {
     const FloatTag d;
     const hn::RebindToUnsigned<FloatTag> bits;
@@ -162,7 +148,7 @@ class ThermalColours {
       const Floats above = hn::Sub(hn::Sub(hn::LoadU(d, temperature + i), all(table_.origin)), all(table_.origin_rest));
       const Floats position = hn::Min(hn::Max(hn::Mul(above, all(table_.slope)), all(0)), all(255));
       const Floats shifted = hn::Add(hn::Sub(position, all(0.5F)), all(kWholeFloat));
-      hn::Store(hn::BitCast(bits, shifted), bits, row_ + i);
+      hn::Store(row_bytes(bits, hn::BitCast(bits, shifted)), bits, row_bytes_ + i);
       hn::Store(hn::Sub(position, hn::Sub(shifted, all(kWholeFloat))), d, part_ + i);
     }
   }
@@ -176,30 +162,33 @@ class ThermalColours {
     for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
       const Doubles position = on_ramp(table_.position, hn::PromoteTo(d, hn::LoadU(narrow, temperature + i)));
       const Doubles shifted = hn::Add(hn::Sub(position, hn::Set(d, 0.5)), whole);
-      hn::StoreU(hn::TruncateTo(bits, hn::BitCast(bits64, shifted)), bits, row_ + i);
+      hn::StoreU(row_bytes(bits, hn::TruncateTo(bits, hn::BitCast(bits64, shifted))), bits, row_bytes_ + i);
       hn::StoreU(hn::DemoteTo(narrow, hn::Sub(position, hn::Sub(shifted, whole))), narrow, part_ + i);
     }
   }
 
+  /// From a row in the low byte.
+  template <class Tag, class Row>
+  static HWY_INLINE Row row_bytes(Tag d, Row row) {
+    return hn::ShiftLeft<kRowBytesLog2>(hn::And(row, hn::Set(d, 0xFFU)));
+  }
+
 #if HWY_TARGET != HWY_SCALAR
-  /// Four floats of the rows of as many vertices as fit.
+  /// Four floats, from number `offset` on, of the rows of every fourth vertex from `first` on, as many as fit.
   template <class Tag>
-  static HWY_INLINE hn::Vec<Tag> gathered(Tag d, const float* rows, const std::uint32_t* row) {
+  HWY_INLINE hn::Vec<Tag> gathered(Tag d, std::size_t first, std::size_t offset) const {
     if constexpr (hn::MaxLanes(Tag()) == 4) {
-      return hn::Load(d, rows + 8 * static_cast<std::uint8_t>(row[0]));
+      return hn::Load(d, row_at(first) + offset);
     } else {
       const hn::Half<Tag> half;
-      return hn::Combine(d, gathered(half, rows, row + hn::MaxLanes(Tag()) / 8), gathered(half, rows, row));
+      return hn::Combine(d, gathered(half, first + hn::MaxLanes(Tag()) / 2, offset), gathered(half, first, offset));
     }
   }
 #endif
 
   const ThermalTable& table_;
-  alignas(64) std::int32_t without_pad_[kLanes];
-  alignas(64) std::int32_t vertex_[kLanes / kRowsPerRegister][kLanes];
-  alignas(64) std::uint32_t row_[kBlock];
+  alignas(64) std::uint32_t row_bytes_[kBlock];
   alignas(64) float part_[kBlock];
-  alignas(64) float colour_[3 * kBlock + kLanes];
 };
 
 /// The same weight for every vertex.
@@ -207,7 +196,7 @@ class ConstantWeight {
  public:
   explicit ConstantWeight(float weight) : weight_(weight) {}
   HWY_INLINE bool prepare(const float*, const std::uint8_t*, std::size_t) { return weight_ != 0; }
-  HWY_INLINE Floats spread(const ChannelOrder&, std::size_t, std::size_t) const { return all(weight_); }
+  HWY_INLINE Floats values(std::size_t) const { return all(weight_); }
 
  private:
   float weight_;
@@ -227,9 +216,7 @@ class Weights {
     for (std::size_t i = 0; i < count; i += kLanes) any = hn::Or(any, hn::Load(d, weight_ + i));
     return !hn::AllTrue(d, hn::Eq(any, all(0)));
   }
-  HWY_INLINE Floats spread(const ChannelOrder& order, std::size_t i, std::size_t j) const {
-    return order.spread(hn::Load(FloatTag(), weight_ + i), j);
-  }
+  HWY_INLINE Floats values(std::size_t i) const { return hn::Load(FloatTag(), weight_ + i); }
 
  private:
   Fill fill_;
@@ -252,14 +239,13 @@ class ValueStage {
   alignas(64) float value_[kBlock];
 };
 
-/// The one rounding: half up, for values within 1 of 0..255. Whatever comes within 2^-13 of the next level from below
-/// counts as that tie, which makes up for the rounding of the arithmetic before.
-HWY_INLINE hn::Vec<hn::Rebind<std::uint8_t, FloatTag>> levels(Floats value) {
-  const hn::Rebind<std::uint8_t, FloatTag> bytes;
-  const hn::RebindToUnsigned<FloatTag> bits;
-  const Floats whole = hn::Add(hn::Add(value, all(0x1p-13F)), all(kWholeFloat));
-  return hn::TruncateTo(bytes, hn::BitCast(bits, whole));
+/// The one rounding: half up, for values within 0..255. Whatever comes within 2^-13 of the next level from below counts
+/// as that tie, which makes up for the rounding of the arithmetic before. The level is the low byte; above it stands
+/// kAboveLevel.
+HWY_INLINE hn::Vec<BitsTag> levels(Floats value) {
+  return hn::BitCast(BitsTag(), hn::Add(hn::Add(value, all(0x1p-13F)), all(kWholeFloat)));
 }
+constexpr std::uint32_t kAboveLevel = 0x4B400000;  // The bits of kWholeFloat.
 
 /// Fuses `count` vertices, a multiple of the lanes of a byte register and at most kBlock.
 /// shade(Vertices, their values) -> Colours.
@@ -289,9 +275,9 @@ HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible
     Colours without = vertices.visible;
     if (missing) without = {all(missing->r), all(missing->g), all(missing->b)};
     const auto finite = hn::IsFinite(vertices.temperature);
-    hn::Store(levels(hn::IfThenElse(finite, colours.r, without.r)), quarter, r + i);
-    hn::Store(levels(hn::IfThenElse(finite, colours.g, without.g)), quarter, g + i);
-    hn::Store(levels(hn::IfThenElse(finite, colours.b, without.b)), quarter, b + i);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.r, without.r))), quarter, r + i);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.g, without.g))), quarter, g + i);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.b, without.b))), quarter, b + i);
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(bytes)) {
     hn::StoreInterleaved3(hn::Load(bytes, r + i), hn::Load(bytes, g + i), hn::Load(bytes, b + i), bytes, fused + 3 * i);
@@ -321,27 +307,110 @@ HWY_INLINE bool all_finite(const float* temperature, std::size_t count) {
   return hn::AllTrue(bits, hn::Lt(largest, hn::Set(bits, 0xFF000000U)));
 }
 
-/// combine(weight, palette channel, visible channel) for every channel of a block, as they lie in memory.
-template <bool kSomeMissing, class Weight, class Combine>
-HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weight, const ChannelOrder& order,
-                              const Combine& combine, const float* temperature, const std::uint8_t* visible,
-                              std::uint8_t* fused, std::size_t count, const MissingDisplay& missing) {
-  const FloatTag d;
-  const IntTag di;
-  const hn::Rebind<std::uint8_t, FloatTag> quarter;
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      const std::size_t begin = 3 * i + j * kLanes;
-      const Floats v = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(quarter, visible + begin)));
-      Floats f = combine(weight.spread(order, i, j), thermal.channels(begin / kLanes), v);
-      if constexpr (kSomeMissing) {
-        const auto finite = hn::IsFinite(hn::LoadU(d, temperature + i));
-        const auto keep = hn::Gt(order.spread(hn::IfThenElseZero(finite, all(1)), j), all(0));
-        f = hn::IfThenElse(keep, f, missing ? order.repeated(*missing, j) : v);
+#if HWY_TARGET == HWY_SCALAR
+struct PaddedColours {};
+#else
+/// Colours of a group between memory, 3 bytes a vertex, and its registers.
+class PaddedColours {
+ public:
+  PaddedColours() {
+    for (std::size_t e = 0; e < kLanes; ++e) {
+      const std::size_t block = e / 4;
+      const std::size_t within = e % 4;
+      apart_[e] = static_cast<std::int32_t>(within < 3 ? 3 * block + within : 0);
+      together_[e] = static_cast<std::int32_t>(e < 3 * (kLanes / 4) ? e / 3 * 4 + e % 3 : 0);
+      for (std::size_t c = 0; c < 4; ++c) {  // Byte c of lane e.
+        for (std::size_t j = 0; j < kRegisters; ++j) {
+          channel_[j][4 * e + c] = static_cast<std::uint8_t>(c == 0 && within < 3 ? 3 * j + within : kNone);
+        }
+        const std::size_t to = 4 * within + c;
+        without_pad_[4 * e + c] = static_cast<std::uint8_t>(to < 12 ? 4 * (to % 3) + to / 3 : kNone);
       }
-      hn::StoreU(levels(f), quarter, fused + begin);
     }
   }
+
+  /// Four vertices to a block, 12 bytes of it.
+  HWY_INLINE hn::Vec<ByteTag> load(const std::uint8_t* from) const {
+    const ByteTag d;
+    const hn::Half<ByteTag> half;
+    const hn::Half<decltype(half)> quarter;
+    const auto near = hn::LoadU(half, from);
+    const auto far = hn::ZeroExtendVector(half, hn::LoadU(quarter, from + 2 * kLanes));
+    return moved(hn::Combine(d, far, near), apart_);
+  }
+
+  /// Register j of what load() gave.
+  HWY_INLINE Floats channels(hn::Vec<ByteTag> loaded, std::size_t j) const {
+    const auto bytes = hn::TableLookupBytesOr0(loaded, hn::Load(ByteTag(), channel_[j]));
+    return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), bytes));
+  }
+
+  /// Writes what levels() gave for four registers.
+  HWY_INLINE void store(const hn::Vec<BitsTag> (&level)[kRegisters], std::uint8_t* to) const {
+    const ByteTag d;
+    const hn::Half<ByteTag> half;
+    const hn::Half<decltype(half)> quarter;
+    constexpr std::uint32_t kAbove = kAboveLevel ^ (kAboveLevel << 8) ^ (kAboveLevel << 16) ^ (kAboveLevel << 24);
+    const auto even = hn::Xor(level[0], hn::ShiftLeft<16>(level[2]));
+    const auto odd = hn::Xor(hn::ShiftLeft<8>(level[1]), hn::ShiftLeft<24>(level[3]));
+    const auto bytes = hn::BitCast(d, hn::Xor(hn::Xor(even, odd), hn::Set(BitsTag(), kAbove)));
+    const auto packed = moved(hn::TableLookupBytesOr0(bytes, hn::Load(d, without_pad_)), together_);
+    hn::StoreU(hn::LowerHalf(half, packed), half, to);
+    hn::StoreU(hn::LowerHalf(quarter, hn::UpperHalf(half, packed)), quarter, to + 2 * kLanes);
+  }
+
+ private:
+  static constexpr std::uint8_t kNone = 0x80;
+
+  static HWY_INLINE hn::Vec<ByteTag> moved(hn::Vec<ByteTag> bytes, const std::int32_t* lane) {
+    const IntTag d;
+    return hn::BitCast(ByteTag(), hn::TableLookupLanes(hn::BitCast(d, bytes), hn::SetTableIndices(d, lane)));
+  }
+
+  alignas(64) std::int32_t apart_[kLanes];
+  alignas(64) std::int32_t together_[kLanes];
+  alignas(64) std::uint8_t channel_[kRegisters][4 * kLanes];
+  alignas(64) std::uint8_t without_pad_[4 * kLanes];
+};
+#endif
+
+/// combine(weight, palette channel, visible channel) for every channel of a block.
+template <bool kSomeMissing, class Weight, class Combine>
+HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weight, const Combine& combine,
+                              [[maybe_unused]] const PaddedColours& padded, const float* temperature,
+                              const std::uint8_t* visible, std::uint8_t* fused, std::size_t count,
+                              const MissingDisplay& missing) {
+  const FloatTag d;
+#if HWY_TARGET == HWY_SCALAR
+  for (std::size_t i = 0; i < 3 * count; ++i) {
+    const std::size_t vertex = i / 3;
+    const Floats v = all(visible[i]);
+    Floats f = combine(weight.values(vertex), all(thermal.channel(vertex, i % 3)), v);
+    if (kSomeMissing && !hn::AllTrue(d, hn::IsFinite(hn::LoadU(d, temperature + vertex)))) {
+      const std::uint8_t fixed[3] = {missing ? missing->r : visible[i], missing ? missing->g : visible[i],
+                                     missing ? missing->b : visible[i]};
+      f = all(fixed[i % 3]);
+    }
+    fused[i] = static_cast<std::uint8_t>(hn::GetLane(levels(f)) & 0xFF);
+  }
+#else
+  const Floats fixed = repeated(missing.value_or(Rgb8{}));
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    const auto loaded = padded.load(visible + 3 * i);
+    const Floats weights = weight.values(i);
+    Floats finite = all(1);
+    if constexpr (kSomeMissing) finite = hn::IfThenElseZero(hn::IsFinite(hn::LoadU(d, temperature + i)), finite);
+    const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) HWY_ATTR {
+      const Floats v = padded.channels(loaded, kRegister);
+      const Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
+      if constexpr (!kSomeMissing) return levels(f);
+      return levels(hn::IfThenElse(hn::Gt(spread<kRegister>(finite), all(0)), f, missing ? fixed : v));
+    };
+    padded.store({level(std::integral_constant<int, 0>()), level(std::integral_constant<int, 1>()),
+                  level(std::integral_constant<int, 2>()), level(std::integral_constant<int, 3>())},
+                 fused + 3 * i);
+  }
+#endif
 }
 
 /// weight * palette + (1 - weight) * visible; exactly one of them where the weight is 0 or 1.
@@ -357,7 +426,7 @@ struct ThermalBlock {
   ThermalColours thermal;
   Weight weight;
   Combine combine;
-  ChannelOrder order = {};
+  PaddedColours padded = {};
 
   HWY_INLINE void operator()(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
                              std::size_t count, const MissingDisplay& missing) {
@@ -368,9 +437,9 @@ struct ThermalBlock {
     }
     thermal.prepare(temperature, count);
     if (complete) {
-      combine_block<false>(thermal, weight, order, combine, temperature, visible, fused, count, missing);
+      combine_block<false>(thermal, weight, combine, padded, temperature, visible, fused, count, missing);
     } else {
-      combine_block<true>(thermal, weight, order, combine, temperature, visible, fused, count, missing);
+      combine_block<true>(thermal, weight, combine, padded, temperature, visible, fused, count, missing);
     }
   }
 };

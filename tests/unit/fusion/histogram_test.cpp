@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "fusion/statistics/temperature_statistics.hpp"
+#include "tests/property/instruction_sets.hpp"
 
 namespace spectra::fusion {
 namespace {
@@ -23,6 +24,37 @@ TEST(Histogram, FollowsTheFormulaAtComputedEdges) {
     const double position = (double{value} - double{17.3F}) / (double{41.9F} - double{17.3F}) * 64.0;
     const auto bin = static_cast<std::size_t>(std::clamp(std::floor(position), 0.0, 63.0));
     EXPECT_EQ(histogram.counts[bin], 1U) << edge;
+  }
+}
+
+// Every float next to an edge, where a bin computed in float32 may be one off.
+TEST(Histogram, FollowsTheFormulaNextToEveryEdgeOnEveryInstructionSet) {
+  const float after_one = std::nextafter(1.0F, 2.0F);
+  const std::pair<float, float> ranges[] = {{17.3F, 41.9F},      {-5, 12},           {300, 300.2F},
+                                            {1, after_one},      {1e-25F, 3.3e-25F}, {-3e29F, 2e29F},
+                                            {-3.4e38F, 3.4e38F}, {-1e-31F, 1e-31F},  {-273.15F, 16'000.0F}};
+  for (const auto& [minimum, maximum] : ranges) {
+    for (const std::size_t bins : {1U, 2U, 64U, 513U, 4096U, 5000U}) {
+      Histogram expected = empty_histogram(minimum, maximum, bins);
+      const HistogramBinning binning(expected);
+      std::vector<float> values(5000, minimum);  // So many that they are counted a register at a time.
+      for (std::size_t edge = 0; edge <= bins; ++edge) {
+        float value = static_cast<float>(histogram_edge(expected, edge));
+        for (int step = 0; step < 3; ++step) value = std::nextafter(value, minimum);
+        for (int step = 0; step < 7; ++step) {
+          if (value >= minimum && value <= maximum) values.push_back(value);
+          value = std::nextafter(value, std::numeric_limits<float>::infinity());
+        }
+      }
+      for (const float value : values) ++expected.counts[binning(value)];
+      for (const std::int64_t target : test::instruction_sets()) {
+        const test::UsingInstructionSet using_it(target);
+        Histogram counted = empty_histogram(minimum, maximum, bins);
+        add_to_histogram(values, counted);
+        EXPECT_EQ(counted.counts, expected.counts)
+            << bins << " bins of " << minimum << " .. " << maximum << " on " << test::name_of(target);
+      }
+    }
   }
 }
 
