@@ -12,9 +12,13 @@ const SHOTS = here('./screenshots/');
 /** Starts `spectra serve` with the built client and waits until it says where it listens. */
 export async function startServer(args, port = 0) {
   if (!existsSync(PROGRAM)) throw new Error(`there is no server program at ${PROGRAM}; build it or set SPECTRA_BIN`);
-  const child = spawn(PROGRAM, ['serve', ...args, '--listen', `127.0.0.1:${port}`, '--web', here('../dist')], {
-    stdio: ['ignore', 'pipe', 'pipe'],
-  });
+  const child = spawn(
+    PROGRAM,
+    ['serve', ...args, '--listen', `127.0.0.1:${port}`, '--web', process.env.SPECTRA_WEB ?? here('../dist')],
+    {
+      stdio: ['ignore', 'pipe', 'pipe'],
+    },
+  );
   let output = '';
   const exited = new Promise((resolve) => child.once('exit', resolve));
   const url = await new Promise((resolve, reject) => {
@@ -68,7 +72,13 @@ export async function settled(page, timeout = 60_000) {
     null,
     { timeout },
   );
-  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  await drawn(page);
+}
+
+/** Waits until what is to be drawn has been drawn and is on the screen. */
+export async function drawn(page) {
+  await page.waitForFunction(() => globalThis.spectra.viewport.isUpToDate, null, { polling: 'raf' });
+  for (let i = 0; i < 3; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
 }
 
 export async function screenshot(page, name) {

@@ -30,22 +30,18 @@ const state = () =>
     );
   });
 
-/** Puts the camera close before the vertex nearest to a position, on a side from which it can be seen, and says where it is on the screen. */
+/**
+ * Puts the camera close before the vertex drawn for a position (the nearest point of the lattice), on a side from which it can be
+ * seen, and says where it is on the screen.
+ */
 function lookAt(position) {
   return page.evaluate(async (wanted) => {
     const session = globalThis.spectra;
-    const { viewport, tiles, store } = session;
+    const { viewport, store } = session;
     const { min, max } = store.scene.bounds;
     const distance = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 400;
-    const geometries = [...tiles.shownGeometries()].filter(({ visible }) => visible).map(({ geometry }) => geometry);
-    let target = wanted;
-    let least = Infinity;
-    for (const { positions } of geometries) {
-      for (let i = 0; i < positions.length; i += 3) {
-        const d = Math.hypot(positions[i] - wanted[0], positions[i + 1] - wanted[1], positions[i + 2] - wanted[2]);
-        if (d < least) [least, target] = [d, [positions[i], positions[i + 1], positions[i + 2]]];
-      }
-    }
+    const step_m = store.quality.position_step_mm / 1000;
+    const target = wanted.map((value) => Math.round(value / step_m) * step_m);
     for (let i = 0; i < 100; i += 1) {
       const z = 1 - (2 * i + 1) / 100;
       const angle = i * 2.39996;
@@ -54,7 +50,7 @@ function lookAt(position) {
       session.setView({ eye, target });
       await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
       const place = viewport.project(target);
-      const hit = viewport.pick(place.x, place.y, geometries);
+      const hit = await viewport.pick(place.x, place.y);
       if (hit !== null && Math.hypot(hit[0] - target[0], hit[1] - target[1], hit[2] - target[2]) < distance / 200) return place;
     }
     return null;
@@ -199,7 +195,7 @@ test('Palette and range move the axis with them', async () => {
   await settled(page);
   const { palette, fusion } = await state();
   assert.equal(palette.id, 'viridis');
-  const strip = await page.locator('section.axis canvas').boundingBox();
+  const strip = await page.locator('section.axis .strip').boundingBox();
   const image = await screenshot(page, 'viridis');
   const y = Number(await page.locator('[data-handle="range.max"] line').getAttribute('y1')) + strip.y;
   assertColour(image.at(strip.x + 7, y + 4), palette.colours[253].map(Math.round), 6, 'top of the strip');
@@ -240,11 +236,10 @@ test('The background has exactly the colour that was chosen', async () => {
 
 test('A click reads the temperature', async () => {
   await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 600)));
-  const place = await page.evaluate(() => {
-    const { viewport, tiles } = globalThis.spectra;
-    const geometries = [...tiles.shownGeometries()].map(({ geometry }) => geometry);
+  const place = await page.evaluate(async () => {
+    const { viewport } = globalThis.spectra;
     for (let y = 300; y < 700; y += 20) {
-      for (let x = 300; x < 1000; x += 20) if (viewport.pick(x, y, geometries) !== null) return { x, y };
+      for (let x = 300; x < 1000; x += 20) if ((await viewport.pick(x, y)) !== null) return { x, y };
     }
     return null;
   });

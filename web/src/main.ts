@@ -4,4 +4,5 @@ import './ui/app.css';
 
 const target = document.getElementById('app');
 if (target === null) throw new Error('the page has no #app');
-mount(App, { target });
+// In a task of its own: together with reading the program it would be a long one.
+setTimeout(() => mount(App, { target }));

@@ -1,7 +1,10 @@
 /** Draco payloads to plain arrays. Runs in a worker in the browser, and as it is in tests. */
 
 import type { Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
-import type { DecodedColours, DecodedGeometry, DecodeJob, DecodeResult } from './messages';
+import type { DecodedColours, DecodedGeometry, DecodeJob, DecodeResult, GeometrySummary } from './messages';
+
+/** Most vertices of a geometry in its summary's sample. */
+const SAMPLED_VERTICES = 1000;
 
 /** Decodes one job; throws an Error that says what the decoder disliked. */
 export function decodeJob(draco: DecoderModule, job: DecodeJob): DecodeResult {
@@ -47,7 +50,7 @@ function decodeGeometry(draco: DecoderModule, payload: Uint8Array, origin: reado
       positions[i + 2] = positions[i + 2]! + origin[2];
     }
     const indices = type === draco.TRIANGULAR_MESH ? decodeIndices(draco, decoder, geometry as Mesh, vertexCount) : null;
-    return { kind: 'geometry', positions, indices, ...measure(positions, indices) };
+    return { kind: 'geometry', positions, indices, summary: summaryOf(positions, indices) };
   } finally {
     if (geometry !== null) draco.destroy(geometry);
     draco.destroy(decoder);
@@ -99,10 +102,8 @@ function check(status: { ok(): boolean; error_msg(): string }): void {
   if (!status.ok()) throw new Error(`Draco: ${status.error_msg()}`);
 }
 
-type Measures = Pick<DecodedGeometry, 'centre' | 'radius' | 'bounds' | 'normal_sum' | 'area_sum'>;
-
-/** Bounds for culling and fitting, and which way the surface faces, for the first view. */
-function measure(positions: Float32Array, indices: Uint16Array | Uint32Array | null): Measures {
+/** The sphere is for culling; sample and normals are for the first view. */
+function summaryOf(positions: Float32Array, indices: Uint16Array | Uint32Array | null): GeometrySummary {
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < positions.length; i += 3) {
@@ -147,5 +148,25 @@ function measure(positions: Float32Array, indices: Uint16Array | Uint32Array | n
       area += Math.sqrt(nx * nx + ny * ny + nz * nz);
     }
   }
-  return { centre, radius: Math.sqrt(radiusSquared), bounds: { min, max }, normal_sum: normal, area_sum: area };
+  return {
+    vertex_count: positions.length / 3,
+    triangle_count: (indices?.length ?? 0) / 3,
+    centre,
+    radius: Math.sqrt(radiusSquared),
+    sample: sampleOf(positions),
+    normal_sum: normal,
+    area_sum: area,
+  };
+}
+
+function sampleOf(positions: Float32Array): Float32Array<ArrayBuffer> {
+  const vertexCount = positions.length / 3;
+  const stride = Math.max(1, Math.ceil(vertexCount / SAMPLED_VERTICES));
+  const sample = new Float32Array(Math.ceil(vertexCount / stride) * 3);
+  for (let to = 0, from = 0; to < sample.length; to += 3, from += 3 * stride) {
+    sample[to] = positions[from]!;
+    sample[to + 1] = positions[from + 1]!;
+    sample[to + 2] = positions[from + 2]!;
+  }
+  return sample;
 }

@@ -11,18 +11,26 @@ export interface ColoursJob {
 }
 export type DecodeJob = GeometryJob | ColoursJob;
 
+/** What the page keeps of a geometry, whose arrays go on to where they are drawn. */
+export interface GeometrySummary {
+  vertex_count: number;
+  /** 0 in a point cloud. */
+  triangle_count: number;
+  centre: [number, number, number];
+  radius: number;
+  /** Some of the vertices, evenly spread: x, y, z each. */
+  sample: Float32Array<ArrayBuffer>;
+  /** Sum of the triangles' normals, each as long as twice the triangle's area, and the sum of those lengths. */
+  normal_sum: [number, number, number];
+  area_sum: number;
+}
 export interface DecodedGeometry {
   kind: 'geometry';
   /** Metres relative to the scene origin. */
   positions: Float32Array<ArrayBuffer>;
   /** Null: a point cloud. */
   indices: Uint16Array<ArrayBuffer> | Uint32Array<ArrayBuffer> | null;
-  centre: [number, number, number];
-  radius: number;
-  bounds: { min: [number, number, number]; max: [number, number, number] };
-  /** Sum of the triangles' normals, each as long as twice the triangle's area, and the sum of those lengths. */
-  normal_sum: [number, number, number];
-  area_sum: number;
+  summary: GeometrySummary;
 }
 export interface DecodedColours {
   kind: 'colours';

@@ -79,21 +79,35 @@ export function oneOf<const T extends string>(...words: readonly T[]): Decoder<T
 export function array<T>(inner: Decoder<T>): Decoder<T[]> {
   return (value, path) => {
     if (!Array.isArray(value)) throw new DecodeError(path, 'an array', value);
-    return value.map((item: unknown, index) => inner(item, `${path}[${index}]`));
+    const items: unknown[] = value;
+    try {
+      return items.map((item) => inner(item, path));
+    } catch {
+      // Palettes are long: the place of an item is only spelled out when there is something to say about it.
+      return items.map((item, index) => inner(item, `${path}[${index}]`));
+    }
   };
+}
+
+function item<T>(inner: Decoder<T>, values: readonly unknown[], index: number, path: string): T {
+  try {
+    return inner(values[index], path);
+  } catch {
+    return inner(values[index], `${path}[${index}]`);
+  }
 }
 
 export function pair<T>(inner: Decoder<T>): Decoder<[T, T]> {
   return (value, path) => {
     if (!Array.isArray(value) || value.length !== 2) throw new DecodeError(path, 'a pair', value);
-    return [inner(value[0], `${path}[0]`), inner(value[1], `${path}[1]`)];
+    return [item(inner, value, 0, path), item(inner, value, 1, path)];
   };
 }
 
 export function triple<T>(inner: Decoder<T>): Decoder<[T, T, T]> {
   return (value, path) => {
     if (!Array.isArray(value) || value.length !== 3) throw new DecodeError(path, 'three values', value);
-    return [inner(value[0], `${path}[0]`), inner(value[1], `${path}[1]`), inner(value[2], `${path}[2]`)];
+    return [item(inner, value, 0, path), item(inner, value, 1, path), item(inner, value, 2, path)];
   };
 }
 

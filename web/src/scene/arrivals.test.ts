@@ -13,11 +13,15 @@ const geometry: DecodedGeometry = {
   kind: 'geometry',
   positions: new Float32Array(3),
   indices: null,
-  centre: [0, 0, 0],
-  radius: 1,
-  bounds: { min: [0, 0, 0], max: [1, 1, 1] },
-  normal_sum: [0, 0, 0],
-  area_sum: 0,
+  summary: {
+    vertex_count: 1,
+    triangle_count: 0,
+    centre: [0, 0, 0],
+    radius: 1,
+    sample: new Float32Array(3),
+    normal_sum: [0, 0, 0],
+    area_sum: 0,
+  },
 };
 const colours: DecodedColours = { kind: 'colours', rgba: new Uint8Array(4) };
 

@@ -1,4 +1,4 @@
-import type { DecodedGeometry } from '../decode/messages';
+import type { GeometrySummary } from '../decode/messages';
 import type { Scene, Vec3 } from '../protocol/messages';
 
 export type UpAxis = 'y' | 'z';
@@ -23,7 +23,7 @@ const sum = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const normalised = (a: Vec3): Vec3 => scaled(a, 1 / (Math.hypot(...a) || 1));
 
 /** The mean normal of a surface, of length 0 (closed) to 1 (flat); zero for a point cloud. */
-export function meanNormal(geometries: readonly DecodedGeometry[]): Vec3 {
+export function meanNormal(geometries: readonly GeometrySummary[]): Vec3 {
   let normal: Vec3 = [0, 0, 0];
   let area = 0;
   for (const geometry of geometries) {
@@ -63,13 +63,13 @@ export function viewDirection(facing: Vec3, up: UpAxis): Vec3 {
   );
 }
 
-/** An even sample of the scene's vertices; the bounds' corners when there are none. */
-export function samplePoints(geometries: readonly DecodedGeometry[], bounds: Scene['bounds'], wanted = 3000): Vec3[] {
-  const vertexCount = geometries.reduce((n, geometry) => n + geometry.positions.length / 3, 0);
+/** Some vertices of every part of the scene; the bounds' corners when there are none. */
+export function samplePoints(geometries: readonly GeometrySummary[], bounds: Scene['bounds'], wanted = 3000): Vec3[] {
+  const available = geometries.reduce((n, { sample }) => n + sample.length / 3, 0);
   const points: Vec3[] = [];
-  const stride = Math.max(1, Math.floor(vertexCount / wanted)) * 3;
-  for (const { positions } of geometries) {
-    for (let i = 0; i + 2 < positions.length; i += stride) points.push([positions[i]!, positions[i + 1]!, positions[i + 2]!]);
+  const stride = Math.max(1, Math.floor(available / wanted)) * 3;
+  for (const { sample } of geometries) {
+    for (let i = 0; i + 2 < sample.length; i += stride) points.push([sample[i]!, sample[i + 1]!, sample[i + 2]!]);
   }
   if (points.length > 0) return points;
   for (let corner = 0; corner < 8; corner += 1) {

@@ -1,17 +1,13 @@
 import { describe, expect, it } from 'vitest';
-import type { DecodedGeometry } from '../decode/messages';
 import { nearestHit } from './picking';
+import type { TileArrays } from './render_messages';
 
-function square(z: number, indexed: boolean): DecodedGeometry {
+function square(z: number, indexed: boolean): Omit<TileArrays, 'rgba'> {
   return {
-    kind: 'geometry',
     positions: Float32Array.from([-1, -1, z, 1, -1, z, 1, 1, z, -1, 1, z]),
     indices: indexed ? Uint16Array.from([0, 1, 2, 0, 2, 3]) : null,
     centre: [0, 0, z],
     radius: Math.SQRT2,
-    bounds: { min: [-1, -1, z], max: [1, 1, z] },
-    normal_sum: [0, 0, 8],
-    area_sum: 8,
   };
 }
 const downwards = (x: number, y: number) => ({

@@ -1,5 +1,5 @@
-import type { DecodedGeometry } from '../decode/messages';
 import type { Vec3 } from '../protocol/messages';
+import type { TileArrays } from './render_messages';
 
 export interface Ray {
   origin: Vec3;
@@ -11,7 +11,7 @@ export interface Ray {
  * Distance along the ray to the nearest surface, or null. Of a point cloud, the nearest point within `cone` (tangent of the angle
  * between the ray and the point) counts.
  */
-export function nearestHit(geometries: Iterable<DecodedGeometry>, ray: Ray, cone: number): number | null {
+export function nearestHit(geometries: Iterable<Omit<TileArrays, 'rgba'>>, ray: Ray, cone: number): number | null {
   let nearest = Infinity;
   for (const geometry of geometries) {
     if (!meetsSphere(ray, geometry.centre, geometry.radius, cone, nearest)) continue;

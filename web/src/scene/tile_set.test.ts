@@ -10,11 +10,15 @@ function geometry(vertices = 3): DecodedGeometry {
     kind: 'geometry',
     positions: new Float32Array(vertices * 3),
     indices: Uint16Array.from([0, 1, 2]),
-    centre: [0, 0, 0],
-    radius: 1,
-    bounds: { min: [0, 0, 0], max: [1, 1, 1] },
-    normal_sum: [0, 0, 1],
-    area_sum: 1,
+    summary: {
+      vertex_count: vertices,
+      triangle_count: 1,
+      centre: [0, 0, 0],
+      radius: 1,
+      sample: new Float32Array(3),
+      normal_sum: [0, 0, 1],
+      area_sum: 1,
+    },
   };
 }
 

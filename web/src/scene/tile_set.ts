@@ -1,4 +1,4 @@
-import type { DecodedGeometry } from '../decode/messages';
+import type { DecodedGeometry, GeometrySummary } from '../decode/messages';
 import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 
 /** What the drawing side keeps for one tile; the tile set owns it and disposes of it. */
@@ -12,7 +12,7 @@ export type CreateDrawable = (geometry: DecodedGeometry, rgba: Uint8Array<ArrayB
 
 interface Shown {
   drawable: Drawable;
-  geometry: DecodedGeometry;
+  geometry: GeometrySummary;
   revision: number;
   /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
   rank: number;
@@ -77,7 +77,7 @@ export class TileSet {
   }
 
   /** Every tile that has something to draw, drawn or not. */
-  *shownGeometries(): Iterable<{ geometry: DecodedGeometry; visible: boolean }> {
+  *shownGeometries(): Iterable<{ geometry: GeometrySummary; visible: boolean }> {
     for (const { shown, isDrawn } of this.#nodes.values()) {
       if (shown !== null) yield { geometry: shown.geometry, visible: isDrawn };
     }
@@ -114,7 +114,7 @@ export class TileSet {
     if (shown !== null && !this.#isStale(shown) && shown.revision === frame.revision) {
       const rank = this.#rank(frame.generation);
       if (rank < shown.rank) return;
-      if (rgba.length !== (shown.geometry.positions.length / 3) * 4) {
+      if (rgba.length !== shown.geometry.vertex_count * 4) {
         throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for another geometry`);
       }
       shown.rank = rank;
@@ -181,8 +181,8 @@ export class TileSet {
     for (const { shown } of this.#drawn) {
       if (shown === null) continue;
       counts.tiles += 1;
-      counts.vertices += shown.geometry.positions.length / 3;
-      counts.triangles += (shown.geometry.indices?.length ?? 0) / 3;
+      counts.vertices += shown.geometry.vertex_count;
+      counts.triangles += shown.geometry.triangle_count;
     }
     return counts;
   }
@@ -255,14 +255,13 @@ export class TileSet {
     node.waitingGeometry = null;
     node.waitingColours = null;
     const { geometry, revision } = waitingGeometry;
-    if (waitingColours.rgba.length !== (geometry.positions.length / 3) * 4) {
-      throw new Error(
-        `tile ${node.key}: colours of ${waitingColours.rgba.length / 4} vertices for ${geometry.positions.length / 3}`,
-      );
+    const { summary } = geometry;
+    if (waitingColours.rgba.length !== summary.vertex_count * 4) {
+      throw new Error(`tile ${node.key}: colours of ${waitingColours.rgba.length / 4} vertices for ${summary.vertex_count}`);
     }
     node.shown?.drawable.dispose();
     const drawable = this.createDrawable(geometry, waitingColours.rgba);
-    node.shown = { drawable, geometry, revision, rank: this.#rank(waitingColours.generation) };
+    node.shown = { drawable, geometry: summary, revision, rank: this.#rank(waitingColours.generation) };
     if (node.isDrawn) drawable.setVisible(true);
     this.#changed(node);
   }

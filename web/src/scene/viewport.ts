@@ -1,34 +1,32 @@
 import CameraControls from 'camera-controls';
+import type { DecodedGeometry } from '../decode/messages';
+import type { CameraPose, Vec3 } from '../protocol/messages';
+import { type Insets, UP, type UpAxis, type View } from './first_view';
+import type { Ray } from './picking';
+import type { GpuObjects, RenderCommand, RenderReply } from './render_messages';
+import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
 import {
   Box3,
-  ColorManagement,
-  LinearSRGBColorSpace,
   MathUtils,
   Matrix4,
   PerspectiveCamera,
   Quaternion,
   Raycaster,
-  Scene as ThreeScene,
   Sphere,
   Spherical,
   Vector2,
   Vector3,
   Vector4,
-  WebGLRenderer,
-} from 'three';
-import type { DecodedGeometry } from '../decode/messages';
-import type { CameraPose, Vec3 } from '../protocol/messages';
-import { type Insets, UP, type UpAxis, type View } from './first_view';
-import { nearestHit } from './picking';
-import { TileDrawing } from './tile_drawing';
+} from './three_math';
+import type { Drawable } from './tile_set';
 
-// Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
-ColorManagement.enabled = false;
 CameraControls.install({
   THREE: { Box3, MathUtils, Matrix4, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4 },
 });
 
 export const FIELD_OF_VIEW_DEG = 45;
+/** Pictures that may be on their way to the drawing side: one that it draws and one that waits. */
+const MOST_UNDRAWN = 2;
 
 export interface ViewportEvents {
   /** The camera has moved, or the picture has changed its size. */
@@ -39,13 +37,13 @@ export interface ViewportEvents {
   onUserMove: () => void;
   /** Called before each picture, to bring in what has been decoded. Returns true when more waits for the next picture. */
   beforeRender: () => boolean;
+  /** The drawing side has failed; `everDrew` false: it could not even start. */
+  onFailure: (message: string, everDrew: boolean) => void;
 }
 
-/** The 3D picture: camera, controls and renderer. Renders only when something has changed. */
+/** The 3D picture: camera, controls, and the way to what draws it. Draws only when something has changed. */
 export class Viewport {
-  readonly tiles = new TileDrawing(() => this.invalidate());
-  readonly #renderer: WebGLRenderer;
-  readonly #scene = new ThreeScene();
+  readonly #port: RenderPort;
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
   readonly #controls: CameraControls;
   readonly #resize: ResizeObserver;
@@ -56,18 +54,25 @@ export class Viewport {
   #up: UpAxis = 'y';
   #sceneCentre = new Vector3();
   #sceneRadius = 1;
-  #pictures = 0;
-  #ready = false;
+
+  /** Changes that the next picture takes along, and the buffers that move with them. */
+  #commands: RenderCommand[] = [];
+  #transfer: Transferable[] = [];
+  #tileNumber = 0;
+  #sent = 0;
+  #drawn = 0;
+  #isHeldUp = false;
+  #gpu: GpuObjects = { geometries: 0, textures: 0, programs: 0, triangles: 0, calls: 0 };
+  #questionId = 0;
+  #questions = new Map<number, (reply: RenderReply) => void>();
 
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewportEvents,
+    inWorker: boolean,
   ) {
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
-    this.#renderer.debug.checkShaderErrors = import.meta.env.DEV;
-    this.#renderer.outputColorSpace = LinearSRGBColorSpace;
-    this.#scene.add(this.tiles.group);
-    this.#scene.matrixAutoUpdate = false;
+    const start = inWorker ? startRenderWorker : startRenderingHere;
+    this.#port = start(canvas, (reply) => this.#replied(reply));
     this.#controls = new CameraControls(this.#camera, canvas);
     this.#controls.dollyToCursor = true;
     this.#controls.smoothTime = this.#reducedMotion.matches ? 0 : 0.06;
@@ -80,43 +85,44 @@ export class Viewport {
       this.#controls.addEventListener(wake, () => this.invalidate());
     }
     this.#fitToElement();
-    const removeSpecimens = this.tiles.addSpecimens();
-    const compiled = () => {
-      // The first use of a program asks the GPU about it and waits for the answer: here, where nothing keeps it busy yet.
-      this.#renderer.render(this.#scene, this.#camera);
-      removeSpecimens();
-      this.#ready = true;
-      this.invalidate();
-    };
-    if (this.#renderer.extensions.has('KHR_parallel_shader_compile')) {
-      this.#renderer.compileAsync(this.#scene, this.#camera).then(compiled, compiled);
-    } else {
-      this.#renderer.compile(this.#scene, this.#camera);
-      setTimeout(compiled);
-    }
     this.#resize = new ResizeObserver(() => {
       this.#fitToElement();
       this.events.onResize();
       this.events.onCamera(this.pose);
     });
     this.#resize.observe(canvas);
-    canvas.addEventListener('webglcontextrestored', () => this.invalidate());
   }
 
-  /** Pictures drawn so far. */
+  /** Pictures drawn so far; of several that were asked for within one frame of the screen all count. */
   get pictures(): number {
-    return this.#pictures;
+    return this.#drawn;
   }
 
-  /** Objects the renderer holds on the GPU. */
-  get gpuObjects(): { geometries: number; textures: number; programs: number; triangles: number; calls: number } {
-    const { memory, programs, render } = this.#renderer.info;
+  /** True when the last picture that was asked for has been drawn, and none is due. */
+  get isUpToDate(): boolean {
+    return this.#drawn > 0 && this.#frame === 0 && !this.#isHeldUp && this.#drawn === this.#sent;
+  }
+
+  /** Objects held on the GPU when the last picture was drawn. */
+  get gpuObjects(): GpuObjects {
+    return this.#gpu;
+  }
+
+  /** Makes one tile, hidden until it is shown. The arrays are moved away with the next picture. */
+  createTile(geometry: DecodedGeometry, rgba: Uint8Array<ArrayBuffer>): Drawable {
+    this.#tileNumber += 1;
+    const tile = this.#tileNumber;
+    const { positions, indices } = geometry;
+    const { centre, radius } = geometry.summary;
+    this.#change({ change: 'create', tile, arrays: { positions, indices, rgba, centre, radius } }, [
+      positions.buffer,
+      rgba.buffer,
+      ...(indices === null ? [] : [indices.buffer]),
+    ]);
     return {
-      geometries: memory.geometries,
-      textures: memory.textures,
-      programs: programs?.length ?? 0,
-      triangles: render.triangles,
-      calls: render.calls,
+      setColours: (next) => this.#change({ change: 'colours', tile, rgba: next }, [next.buffer]),
+      setVisible: (visible) => this.#change({ change: 'visible', tile, visible }),
+      dispose: () => this.#change({ change: 'dispose', tile }),
     };
   }
 
@@ -147,8 +153,7 @@ export class Viewport {
   }
 
   setBackground(colour: string): void {
-    this.#renderer.setClearColor(Number.parseInt(colour.slice(1), 16), 1);
-    this.invalidate();
+    this.#change({ change: 'background', colour: Number.parseInt(colour.slice(1), 16) });
   }
 
   setUpAxis(up: UpAxis): void {
@@ -208,14 +213,17 @@ export class Viewport {
   }
 
   /** Point of the scene under a place on the canvas (CSS pixels from its corner), or null. */
-  pick(x: number, y: number, geometries: Iterable<DecodedGeometry>): Vec3 | null {
+  async pick(x: number, y: number): Promise<Vec3 | null> {
     const [width, height] = this.#size;
+    this.#camera.updateMatrixWorld();
     const place = new Vector3((x / width) * 2 - 1, 1 - (y / height) * 2, 0.5).unproject(this.#camera);
-    const eye = this.#camera.position;
+    const eye = this.#camera.position.clone();
     const direction = place.sub(eye).normalize();
     const cone = (4 * Math.tan((this.#camera.fov * Math.PI) / 360) * 2) / height;
-    const distance = nearestHit(geometries, { origin: eye.toArray(), direction: direction.toArray() }, cone);
-    return distance === null ? null : direction.multiplyScalar(distance).add(eye).toArray();
+    const ray = { origin: eye.toArray(), direction: direction.toArray() };
+    const reply = await this.#ask((id) => ({ kind: 'pick', id, ray, cone }));
+    if (reply.kind !== 'picked' || reply.distance === null) return null;
+    return direction.multiplyScalar(reply.distance).add(eye).toArray();
   }
 
   /** Where a point of the scene is on the canvas, in CSS pixels; null behind the camera. */
@@ -227,10 +235,12 @@ export class Viewport {
     return { x: ((clip.x + 1) / 2) * this.#size[0], y: ((1 - clip.y) / 2) * this.#size[1], depth: -inView.z };
   }
 
-  /** Draws now and hands the canvas over while it still holds the picture. */
-  withPicture<T>(use: (canvas: HTMLCanvasElement) => T): T {
-    this.#draw();
-    return use(this.canvas);
+  /** The picture as it is now; the caller closes it. */
+  async copy(): Promise<ImageBitmap> {
+    this.#send();
+    const reply = await this.#ask((id) => ({ kind: 'copy', id }));
+    if (reply.kind !== 'copied') throw new Error('the picture could not be copied');
+    return reply.picture;
   }
 
   invalidate(): void {
@@ -241,22 +251,32 @@ export class Viewport {
     cancelAnimationFrame(this.#frame);
     this.#resize.disconnect();
     this.#controls.dispose();
-    this.tiles.dispose();
-    this.#renderer.dispose();
+    this.#port.dispose();
+    this.#questions.clear();
+  }
+
+  #change(command: RenderCommand, transfer: Transferable[] = []): void {
+    this.#commands.push(command);
+    this.#transfer.push(...transfer);
+    this.invalidate();
   }
 
   #tick(now: number): void {
     this.#frame = 0;
+    if (this.#sent - this.#drawn >= MOST_UNDRAWN) {
+      this.#isHeldUp = true;
+      return;
+    }
     const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
     this.#lastFrameAt = now;
-    const more = this.#ready && this.events.beforeRender();
+    const more = this.events.beforeRender();
     const moved = this.#controls.update(elapsed_s);
-    this.#draw();
+    this.#send();
     if (moved) this.events.onCamera(this.pose);
     if (moved || more) this.invalidate();
   }
 
-  #draw(): void {
+  #send(): void {
     const distance = this.#camera.position.distanceTo(this.#sceneCentre);
     const near = Math.max(distance - this.#sceneRadius * 1.05, this.#sceneRadius * 5e-4, distance * 1e-4);
     const far = distance + this.#sceneRadius * 1.05;
@@ -265,24 +285,51 @@ export class Viewport {
       this.#camera.far = far;
       this.#camera.updateProjectionMatrix();
     }
-    if (!this.#ready) {
-      this.#renderer.clear();
-      return;
+    this.#camera.updateMatrixWorld();
+    this.#sent += 1;
+    const camera = {
+      world_from_camera: this.#camera.matrixWorld.toArray(),
+      clip_from_camera: this.#camera.projectionMatrix.toArray(),
+    };
+    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, camera }, this.#transfer);
+    this.#commands = [];
+    this.#transfer = [];
+  }
+
+  #ask(question: (id: number) => { kind: 'pick'; id: number; ray: Ray; cone: number } | { kind: 'copy'; id: number }) {
+    this.#questionId += 1;
+    const id = this.#questionId;
+    return new Promise<RenderReply>((resolve) => {
+      this.#questions.set(id, resolve);
+      this.#port.send(question(id), []);
+    });
+  }
+
+  #replied(reply: RenderReply): void {
+    switch (reply.kind) {
+      case 'drawn':
+        this.#drawn = reply.number;
+        this.#gpu = reply.gpu;
+        if (!this.#isHeldUp) break;
+        this.#isHeldUp = false;
+        this.invalidate();
+        break;
+      case 'failed':
+        this.events.onFailure(reply.message, this.#drawn > 0);
+        break;
+      default:
+        this.#questions.get(reply.id)?.(reply);
+        this.#questions.delete(reply.id);
     }
-    this.#renderer.render(this.#scene, this.#camera);
-    this.#pictures += 1;
   }
 
   #fitToElement(): void {
     const width = Math.max(1, this.canvas.clientWidth);
     const height = Math.max(1, this.canvas.clientHeight);
     this.#size = [width, height];
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
     this.#camera.updateProjectionMatrix();
-    // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
-    this.#draw();
+    this.#change({ change: 'size', width, height, pixel_ratio: Math.min(devicePixelRatio, 2) });
   }
 }
 

@@ -34,7 +34,7 @@ import {
   viewDirection,
 } from '../scene/first_view';
 import { TileSet } from '../scene/tile_set';
-import { FIELD_OF_VIEW_DEG, Viewport } from '../scene/viewport';
+import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
 import { Acknowledger } from '../transport/acknowledger';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
@@ -76,6 +76,7 @@ export class Session {
   #lastSequence = 0;
   #completeAfter: { sequence: number; message: StreamComplete } | null = null;
   #userMoved = false;
+  #isHovering = false;
   #viewedScene: string | null = null;
   #qualityChanged = false;
   #bytesBefore = 0;
@@ -88,8 +89,9 @@ export class Session {
     canvas: HTMLCanvasElement,
     readonly store: Store,
     url: string,
+    drawing: { inWorker: boolean; onFailure: (message: string, everDrew: boolean) => void },
   ) {
-    this.viewport = new Viewport(canvas, {
+    const events: ViewportEvents = {
       onCamera: (pose) => this.#cameraMoved(pose),
       onResize: () => {
         if (!this.#userMoved && store.scene) this.#firstView(store.scene, false);
@@ -98,8 +100,10 @@ export class Session {
         this.#userMoved = true;
       },
       beforeRender: () => this.#bringIn(),
-    });
-    this.tiles = new TileSet((geometry, rgba) => this.viewport.tiles.create(geometry, rgba));
+      onFailure: drawing.onFailure,
+    };
+    this.viewport = new Viewport(canvas, events, drawing.inWorker);
+    this.tiles = new TileSet((geometry, rgba) => this.viewport.createTile(geometry, rgba));
     this.#arrivals = new Arrivals(this.tiles, (error) => this.#say(error));
     this.#connection = new Connection(url, {
       onHello: (message) => this.#greeted(message),
@@ -269,6 +273,7 @@ export class Session {
 
   /** The pointer is over this place of the canvas; null when it has left. */
   hover(place: { x: number; y: number } | null): void {
+    this.#isHovering = place !== null;
     if (place === null) {
       this.#hoverAsker.reset();
       this.store.hover = null;
@@ -279,12 +284,12 @@ export class Session {
 
   /** Reads the scene at a place of the canvas and keeps the reading on the screen. */
   async pin(place: { x: number; y: number }): Promise<void> {
-    const point = this.#pick(place);
-    if (point === null) {
-      this.store.pinned = null;
-      return;
-    }
     try {
+      const point = await this.viewport.pick(place.x, place.y);
+      if (point === null) {
+        this.store.pinned = null;
+        return;
+      }
       const answer = probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
       this.store.pinned = { reading: { ...place, probe: answer }, place: this.viewport.project(answer.position) };
     } catch (error) {
@@ -586,22 +591,11 @@ export class Session {
     this.viewport.setView(fittedView(points, direction, this.store.upAxis, fov, this.viewport.aspect, this.#insets), animated);
   }
 
-  #pick(place: { x: number; y: number }): Vec3 | null {
-    const visible = function* (tiles: TileSet) {
-      for (const { geometry, visible: drawn } of tiles.shownGeometries()) if (drawn) yield geometry;
-    };
-    return this.viewport.pick(place.x, place.y, visible(this.tiles));
-  }
-
   async #askHover(place: { x: number; y: number }): Promise<void> {
-    const point = this.#pick(place);
-    if (point === null) {
-      this.store.hover = null;
-      return;
-    }
     try {
-      const answer = probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
-      this.store.hover = { ...place, probe: answer };
+      const point = await this.viewport.pick(place.x, place.y);
+      const answer = point && probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
+      this.store.hover = answer === null || !this.#isHovering ? null : { ...place, probe: answer };
     } catch {
       this.store.hover = null;
     }

@@ -2,7 +2,7 @@ import type { Session } from '../state/session';
 import { celsius } from './format';
 
 /** The picture as it is on the screen with its scale beside it, so that it can be read without the program. */
-function composed(session: Session, picture: HTMLCanvasElement): HTMLCanvasElement {
+function composed(session: Session, picture: ImageBitmap): HTMLCanvasElement {
   const { store } = session;
   const canvas = document.createElement('canvas');
   canvas.width = picture.width;
@@ -42,8 +42,10 @@ function composed(session: Session, picture: HTMLCanvasElement): HTMLCanvasEleme
 }
 
 /** Saves the picture as a PNG file. */
-export function saveScreenshot(session: Session): void {
-  const canvas = session.viewport.withPicture((picture) => composed(session, picture));
+export async function saveScreenshot(session: Session): Promise<void> {
+  const picture = await session.viewport.copy();
+  const canvas = composed(session, picture);
+  picture.close();
   canvas.toBlob((blob) => {
     if (blob === null) return;
     const address = URL.createObjectURL(blob);
