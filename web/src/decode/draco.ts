@@ -1,14 +1,14 @@
 /** Draco payloads to plain arrays. Runs in a worker in the browser, and as it is in tests. */
 
 import type { Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
-import type { DecodedColours, DecodedGeometry, DecodeJob, DecodeResult, GeometrySummary } from './messages';
+import type { ColoursJob, DecodedColours, DecodedGeometry, DecodeJob, DecodeResult, GeometrySummary } from './messages';
 
 /** Most vertices of a geometry in its summary's sample. */
 const SAMPLED_VERTICES = 1000;
 
 /** Decodes one job; throws an Error that says what the decoder disliked. */
 export function decodeJob(draco: DecoderModule, job: DecodeJob): DecodeResult {
-  return job.kind === 'geometry' ? decodeGeometry(draco, job.payload, job.origin_m) : decodeColours(draco, job.payload);
+  return job.kind === 'geometry' ? decodeGeometry(draco, job.payload, job.origin_m) : decodeColours(draco, job);
 }
 
 function decodeGeometry(draco: DecoderModule, payload: Uint8Array, origin: readonly [number, number, number]): DecodedGeometry {
@@ -68,34 +68,64 @@ function decodeIndices(draco: DecoderModule, decoder: Decoder, mesh: Mesh, verte
   return indices as Uint16Array<ArrayBuffer> | Uint32Array<ArrayBuffer>;
 }
 
-function decodeColours(draco: DecoderModule, payload: Uint8Array): DecodedColours {
+function decodeColours(draco: DecoderModule, { payload, transform }: ColoursJob): DecodedColours {
   const decoder = new draco.Decoder();
   const cloud = new draco.PointCloud();
   const bytes = new Int8Array(payload.buffer, payload.byteOffset, payload.byteLength);
   try {
     check(decoder.DecodeArrayToPointCloud(bytes, bytes.byteLength, cloud));
-    const attributeId = decoder.GetAttributeId(cloud, draco.COLOR);
-    if (attributeId < 0) throw new Error('colours: no COLOR attribute');
-    const attribute = decoder.GetAttribute(cloud, attributeId);
-    if (attribute.num_components() !== 3) throw new Error(`colours: ${attribute.num_components()} components, not 3`);
-    const vertexCount = cloud.num_points();
-    const size = vertexCount * 3;
-    const heap = draco._malloc(size);
-    decoder.GetAttributeDataArrayForAllPoints(cloud, attribute, draco.DT_UINT8, size, heap);
-    const rgb = new Uint8Array(draco.HEAPF32.buffer, heap, size);
-    const rgba = new Uint8Array(vertexCount * 4);
-    for (let from = 0, to = 0; from < size; from += 3, to += 4) {
-      rgba[to] = rgb[from]!;
-      rgba[to + 1] = rgb[from + 1]!;
-      rgba[to + 2] = rgb[from + 2]!;
-      rgba[to + 3] = 255;
+    const rgba = new Uint8Array(cloud.num_points() * 4);
+    if (transform === 'none') {
+      withBytes(draco, decoder, cloud, draco.COLOR, 3, (rgb) => {
+        for (let from = 0, to = 0; to < rgba.length; from += 3, to += 4) {
+          rgba[to] = rgb[from]!;
+          rgba[to + 1] = rgb[from + 1]!;
+          rgba[to + 2] = rgb[from + 2]!;
+          rgba[to + 3] = 255;
+        }
+      });
+    } else {
+      withBytes(draco, decoder, cloud, draco.COLOR, 1, (green) => {
+        for (let from = 0, to = 1; to < rgba.length; from += 1, to += 4) rgba[to] = green[from]!;
+      });
+      // Sums are stored modulo 256.
+      withBytes(draco, decoder, cloud, draco.GENERIC, 2, (differences) => {
+        for (let from = 0, to = 0; to < rgba.length; from += 2, to += 4) {
+          const green = rgba[to + 1]!;
+          rgba[to] = differences[from]! + green;
+          rgba[to + 2] = differences[from + 1]! + green;
+          rgba[to + 3] = 255;
+        }
+      });
     }
-    draco._free(heap);
     return { kind: 'colours', rgba };
   } finally {
     draco.destroy(cloud);
     draco.destroy(decoder);
   }
+}
+
+/** Lends an attribute of bytes, in the order of the points. */
+function withBytes(
+  draco: DecoderModule,
+  decoder: Decoder,
+  cloud: PointCloud,
+  type: number,
+  components: number,
+  use: (values: Uint8Array) => void,
+): void {
+  const name = type === draco.COLOR ? 'COLOR' : 'GENERIC';
+  const attributeId = decoder.GetAttributeId(cloud, type);
+  if (attributeId < 0) throw new Error(`colours: no ${name} attribute`);
+  const attribute = decoder.GetAttribute(cloud, attributeId);
+  if (attribute.num_components() !== components) {
+    throw new Error(`colours: ${attribute.num_components()} components of ${name}, not ${components}`);
+  }
+  const size = cloud.num_points() * components;
+  const heap = draco._malloc(size);
+  decoder.GetAttributeDataArrayForAllPoints(cloud, attribute, draco.DT_UINT8, size, heap);
+  use(new Uint8Array(draco.HEAPF32.buffer, heap, size));
+  draco._free(heap);
 }
 
 function check(status: { ok(): boolean; error_msg(): string }): void {

@@ -36,6 +36,7 @@ declare module 'draco3d/draco_decoder_nodejs.js' {
     POINT_CLOUD: number;
     POSITION: number;
     COLOR: number;
+    GENERIC: number;
     DT_FLOAT32: number;
     DT_UINT8: number;
     HEAPF32: Float32Array<ArrayBuffer>;

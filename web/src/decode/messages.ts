@@ -8,6 +8,8 @@ export interface GeometryJob {
 export interface ColoursJob {
   kind: 'colours';
   payload: Uint8Array<ArrayBuffer>;
+  /** How the payload writes colours, see docs/protocol.md. */
+  transform: 'none' | 'subtract_green';
 }
 export type DecodeJob = GeometryJob | ColoursJob;
 

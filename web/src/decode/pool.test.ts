@@ -24,7 +24,7 @@ class FakeWorker {
   }
 }
 
-const job = (byte: number): DecodeJob => ({ kind: 'colours', payload: Uint8Array.from([byte]) });
+const job = (byte: number): DecodeJob => ({ kind: 'colours', payload: Uint8Array.from([byte]), transform: 'none' });
 const byteOf = (result: DecodeResult) => (result.kind === 'colours' ? result.rgba[0] : undefined);
 
 function setUp(count: number) {

@@ -3,7 +3,7 @@
 export const FRAME_MAGIC = 0x31435053;
 export const FRAME_HEADER_BYTES = 72;
 
-export const FrameKind = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5 } as const;
+export const FrameKind = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5, colours_subtract_green: 6 } as const;
 
 export interface TileId {
   level: number;

@@ -165,6 +165,9 @@ export const probe: Decoder<Probe> = object({
 const extreme = object({ position: triple(number), temperature: number });
 export const extremes: Decoder<Extremes> = object({ hottest: nullable(extreme), coldest: nullable(extreme) });
 
+/** `resumed_tiles` is there when the request had `resume`. */
+export const subscribed = object({ resumed_tiles: optional(count) });
+
 export const sceneChanged = object({ scene: nullable(scene) });
 
 export const streamComplete: Decoder<StreamComplete> = object({

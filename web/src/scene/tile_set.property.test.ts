@@ -167,7 +167,7 @@ describe('TileSet, with random trees and arrivals', () => {
           geometries.clear();
           picture.tiles.beginConnection();
         } else if (chance < 0.04 && connection > 0) {
-          picture.tiles.endStale();
+          picture.tiles.settle();
           for (const [key, rank] of held) if (rank < connection * 1000) held.delete(key);
         } else if (chance < 0.08) {
           picture.tiles.remove(tile.id);

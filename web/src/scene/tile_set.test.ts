@@ -160,8 +160,7 @@ describe('TileSet', () => {
     expect([oldA.visible, oldB.visible]).toEqual([true, true]);
     const newA = add(a, { revision: 1, generation: 2 }, 99);
     expect([oldA.disposed, newA.shade, oldB.visible]).toEqual([true, 99, true]);
-    tiles.endStale();
-    tiles.updateSelection();
+    tiles.settle();
     expect(oldB.disposed).toBe(true);
     expect(drawn()).toBe(1);
   });
@@ -201,6 +200,105 @@ describe('TileSet', () => {
   it('gives every tile its own name', () => {
     const names = new Set([0, 1, 2, 3].flatMap((x) => [0, 1].map((y) => tileKey({ level: 2, x, y, z: 0 }))));
     expect(names.size).toBe(8);
+  });
+});
+
+describe('TileSet, after a cut connection', () => {
+  const left = childTile(root, 0);
+  const right = childTile(root, 1);
+  const claim = (tile: TileId, revision: number) => [tile.level, tile.x, tile.y, tile.z, revision];
+
+  it('claims what it holds, what is drawn first, and no more than may be claimed', () => {
+    add(right, { revision: 3 });
+    add(root, { revision: 2, child_mask: 0b11 });
+    tiles.addGeometry(frame(left, { revision: 4 }), geometry());
+    expect(tiles.claims(10)).toEqual([claim(root, 2), claim(right, 3)]);
+    add(left, { revision: 4 });
+    expect(tiles.claims(10)).toEqual([claim(right, 3), claim(left, 4), claim(root, 2)]);
+    expect(tiles.claims(2)).toEqual([claim(right, 3), claim(left, 4)]);
+  });
+
+  it('colours held geometry when the claim is granted', () => {
+    const parent = add(root, { child_mask: 0b11, generation: 40 });
+    const [a, b] = [add(left, { revision: 7, generation: 40 }), add(right, { revision: 8, generation: 40 })];
+    const claims = tiles.claims(10);
+    tiles.beginConnection();
+    tiles.resume(claims, true);
+    tiles.updateSelection();
+    expect([parent.visible, a.visible, b.visible]).toEqual([false, true, true]);
+    recolour(left, 2, 7);
+    recolour(right, 2, 8);
+    expect([a.shade, b.shade, made.length]).toEqual([2, 2, 3]);
+    tiles.settle();
+    expect([parent.disposed, a.visible, b.visible]).toEqual([false, true, true]);
+    recolour(root, 3);
+    expect([parent.shade, parent.visible, a.visible]).toEqual([3, true, false]);
+  });
+
+  it('colours held geometry also when the colours come before the answer to the claim', () => {
+    const drawable = add(root, { revision: 5, generation: 9 });
+    const claims = tiles.claims(10);
+    tiles.beginConnection();
+    recolour(root, 1, 5);
+    expect(drawable.shade).toBe(1);
+    tiles.addColours(frame(root, { revision: 5, generation: 2 }), colours(77));
+    expect(drawable.shade).toBe(1);
+    tiles.resume(claims, true);
+    expect([drawable.shade, made.length]).toEqual([77, 1]);
+  });
+
+  it('replaces geometry that is not current any more, and drops what was removed', () => {
+    const old = add(left, { revision: 5 });
+    const gone = add(right, { revision: 6 });
+    const claims = tiles.claims(10);
+    tiles.beginConnection();
+    tiles.resume(claims, true);
+    tiles.remove(right);
+    tiles.addColours(frame(left, { revision: 9, generation: 1 }), colours(50));
+    expect(old.disposed).toBe(false);
+    tiles.addGeometry(frame(left, { revision: 9 }), geometry());
+    tiles.settle();
+    expect([old.disposed, gone.disposed, drawn()]).toEqual([true, true, 1]);
+    expect(tiles.claims(10)).toEqual([claim(left, 9)]);
+  });
+
+  it('takes everything anew when the claim is not granted', () => {
+    const old = add(root, { revision: 5, generation: 9 });
+    const claims = tiles.claims(10);
+    tiles.beginConnection();
+    tiles.resume(claims, false);
+    tiles.addColours(frame(root, { revision: 5, generation: 1 }), colours(50));
+    expect([old.shade, old.disposed]).toEqual([1, false]);
+    expect(tiles.claims(10)).toEqual([]);
+    tiles.addGeometry(frame(root, { revision: 5 }), geometry());
+    expect([old.disposed, made.at(-1)?.shade]).toEqual([true, 50]);
+  });
+
+  it('drops at the end what was not claimed, and claims again what was, through several cuts', () => {
+    add(left, { revision: 5 });
+    const unclaimed = add(right, { revision: 6 });
+    const claims = tiles.claims(1);
+    tiles.beginConnection();
+    tiles.resume(claims, true);
+    tiles.beginConnection();
+    expect(tiles.claims(10)).toEqual([claim(left, 5)]);
+    tiles.resume(tiles.claims(10), true);
+    tiles.settle();
+    expect(unclaimed.disposed).toBe(true);
+    recolour(left, 1, 5);
+    expect(made).toHaveLength(2);
+  });
+
+  it('does not wait for tiles that are kept out of the picture', () => {
+    add(root, { child_mask: 0b11, generation: 2 });
+    add(left, { generation: 1 });
+    add(right, { generation: 1 });
+    expect(tiles.progress(2)).toEqual({ current: 0, total: 2 });
+    tiles.settle();
+    expect(tiles.progress(2)).toEqual({ current: 1, total: 1 });
+    expect(tiles.progress(3)).toEqual({ current: 0, total: 1 });
+    recolour(left, 3);
+    expect(tiles.progress(3)).toEqual({ current: 1, total: 2 });
   });
 });
 

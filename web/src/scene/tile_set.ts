@@ -16,7 +16,12 @@ interface Shown {
   revision: number;
   /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
   rank: number;
+  /** The server that is or was connected knows that this geometry is held here. */
+  isKnownToServer: boolean;
 }
+
+/** Geometry held, as scene.subscribe claims it: level, x, y, z, revision. */
+export type TileClaim = [number, number, number, number, number];
 
 /** A place in the tile tree. It is there while its tile, or one beneath it, is held. */
 interface TileNode {
@@ -38,6 +43,8 @@ interface TileNode {
   /** Number of the selection in which the children took this tile's place. */
   replacedIn: number;
   isDrawn: boolean;
+  /** Drawn when all had been sent the last time, and nothing finer has come since. */
+  isEnd: boolean;
 }
 
 export interface TileCounts {
@@ -66,6 +73,8 @@ export class TileSet {
   #selectionDirty = false;
   #selectionCount = 0;
   #connection = 0;
+  /** The geometry of the earlier connection is still good: its colours come alone. */
+  #isResumed = false;
 
   constructor(private readonly createDrawable: CreateDrawable) {}
 
@@ -83,9 +92,23 @@ export class TileSet {
     }
   }
 
-  /** The server's frames start anew: what is held stays on the screen, but everything that comes is newer. */
+  /** What the server of the last connection knows to be held here, at most `most` tiles: coarse before fine, what is drawn before what is not. */
+  claims(most: number): TileClaim[] {
+    const known = [...this.#nodes.values()].filter(({ shown }) => shown?.isKnownToServer);
+    const order = ({ id, isDrawn }: TileNode) => id.level + (isDrawn ? 0 : 256);
+    return known
+      .sort((a, b) => order(a) - order(b))
+      .slice(0, most)
+      .map(({ id, shown }) => [id.level, id.x, id.y, id.z, shown?.revision ?? 0]);
+  }
+
+  /**
+   * The server's frames start anew: what is held stays on the screen, but everything that comes is newer, and geometry comes again
+   * unless resume() follows.
+   */
   beginConnection(): void {
     this.#connection += 1;
+    this.#isResumed = false;
     for (const node of [...this.#nodes.values()]) {
       node.waitingGeometry = null;
       node.waitingColours = null;
@@ -93,9 +116,31 @@ export class TileSet {
     }
   }
 
-  /** The new connection has sent all it has: what it did not send again is no longer part of the scene. */
-  endStale(): void {
-    for (const node of [...this.#nodes.values()]) if (node.shown !== null && this.#isStale(node.shown)) this.#delete(node);
+  /**
+   * The server has answered the claims: it takes them into account (and sends no geometry again that is still good, replaces what is
+   * not, removes what is gone), or it does not know them.
+   */
+  resume(claims: readonly TileClaim[], isGranted: boolean): void {
+    this.#isResumed = isGranted;
+    const claimed = new Set(claims.map(([level, x, y, z]) => tileKey({ level, x, y, z })));
+    for (const node of this.#nodes.values()) {
+      if (node.shown === null || !this.#isStale(node.shown)) continue;
+      node.shown.isKnownToServer = isGranted && claimed.has(node.key);
+      this.#join(node);
+    }
+  }
+
+  /**
+   * The server has sent all that it is asked for: what is drawn now is the picture, and what an earlier connection has left here goes
+   * unless the server knows of it.
+   */
+  settle(): void {
+    for (const node of [...this.#nodes.values()]) {
+      const { shown } = node;
+      if (shown !== null && this.#isStale(shown) && !(this.#isResumed && shown.isKnownToServer)) this.#delete(node);
+    }
+    this.updateSelection();
+    for (const node of this.#nodes.values()) node.isEnd = node.isDrawn;
   }
 
   addGeometry(frame: TileFrame, geometry: DecodedGeometry): void {
@@ -110,18 +155,7 @@ export class TileSet {
   addColours(frame: TileFrame, rgba: Uint8Array<ArrayBuffer>): void {
     const node = this.#node(frame.tile);
     this.#setChildMask(node, frame.child_mask);
-    const { shown, waitingColours } = node;
-    if (shown !== null && !this.#isStale(shown) && shown.revision === frame.revision) {
-      const rank = this.#rank(frame.generation);
-      if (rank < shown.rank) return;
-      if (rgba.length !== shown.geometry.vertex_count * 4) {
-        throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for another geometry`);
-      }
-      shown.rank = rank;
-      shown.drawable.setColours(rgba);
-      this.#changed(node);
-      return;
-    }
+    const { waitingColours } = node;
     if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation)
       return;
     node.waitingColours = { revision: frame.revision, generation: frame.generation, rgba };
@@ -188,15 +222,15 @@ export class TileSet {
   }
 
   /**
-   * How much of the finest picture that can be drawn of the tiles held shows this generation, in tiles. Tiles whose place is taken by
-   * their children do not count: they may keep older colours.
+   * How much of the picture shows this generation, in tiles. The picture is what was drawn when all had been sent the last time, and
+   * where finer tiles have come since, the finest of them. Others do not count: they may keep older colours.
    */
   progress(generation: number): { current: number; total: number } {
     const wanted = this.#rank(generation);
     const progress = { current: 0, total: 0 };
     const visit = (node: TileNode): void => {
-      const isEnd = node.coverRank === NOTHING && (node.shown !== null || node.waitingGeometry !== null);
-      if (isEnd) {
+      const isHeldHere = node.shown !== null || node.waitingGeometry !== null;
+      if (node.isEnd || (isHeldHere && node.coverRank === NOTHING)) {
         progress.total += 1;
         if (node.shown !== null && node.shown.rank >= wanted) progress.current += 1;
       } else {
@@ -235,6 +269,7 @@ export class TileSet {
       bestRank: NOTHING,
       replacedIn: 0,
       isDrawn: false,
+      isEnd: false,
     };
     this.#nodes.set(key, node);
     if (parent === null) this.#tops.add(node);
@@ -248,21 +283,34 @@ export class TileSet {
     this.#changed(node);
   }
 
+  /** Brings together what has come of a tile, as far as it fits together. */
   #join(node: TileNode): void {
-    const { waitingGeometry, waitingColours } = node;
-    if (waitingGeometry === null || waitingColours === null) return;
-    if (waitingGeometry.revision !== waitingColours.revision) return;
-    node.waitingGeometry = null;
-    node.waitingColours = null;
-    const { geometry, revision } = waitingGeometry;
-    const { summary } = geometry;
-    if (waitingColours.rgba.length !== summary.vertex_count * 4) {
-      throw new Error(`tile ${node.key}: colours of ${waitingColours.rgba.length / 4} vertices for ${summary.vertex_count}`);
+    const { shown, waitingGeometry, waitingColours } = node;
+    if (waitingColours === null) return;
+    const { revision, generation, rgba } = waitingColours;
+    const rank = this.#rank(generation);
+    if (shown !== null && shown.revision === revision && (!this.#isStale(shown) || (this.#isResumed && shown.isKnownToServer))) {
+      node.waitingColours = null;
+      if (rank < shown.rank) return;
+      checkLength(node, rgba, shown.geometry);
+      shown.rank = rank;
+      shown.drawable.setColours(rgba);
+      this.#arrived(node);
+    } else if (waitingGeometry !== null && waitingGeometry.revision === revision) {
+      node.waitingGeometry = null;
+      node.waitingColours = null;
+      const { geometry } = waitingGeometry;
+      checkLength(node, rgba, geometry.summary);
+      shown?.drawable.dispose();
+      const drawable = this.createDrawable(geometry, rgba);
+      node.shown = { drawable, geometry: geometry.summary, revision, rank, isKnownToServer: true };
+      if (node.isDrawn) drawable.setVisible(true);
+      this.#arrived(node);
     }
-    node.shown?.drawable.dispose();
-    const drawable = this.createDrawable(geometry, waitingColours.rgba);
-    node.shown = { drawable, geometry: summary, revision, rank: this.#rank(waitingColours.generation) };
-    if (node.isDrawn) drawable.setVisible(true);
+  }
+
+  #arrived(node: TileNode): void {
+    for (let at = node.parent; at !== null; at = at.parent) at.isEnd = false;
     this.#changed(node);
   }
 
@@ -273,6 +321,7 @@ export class TileSet {
     node.waitingColours = null;
     node.child_mask = 0;
     node.isDrawn = false;
+    node.isEnd = false;
     this.#drawn.delete(node);
     this.#changed(node);
     this.#prune(node);
@@ -311,6 +360,11 @@ export class TileSet {
     // Of tiles that are not held themselves, and not all of whose children are, whatever is there is drawn.
     for (const child of node.children) if (child !== undefined) this.#select(child);
   }
+}
+
+function checkLength(node: TileNode, rgba: Uint8Array, { vertex_count }: GeometrySummary): void {
+  if (rgba.length === vertex_count * 4) return;
+  throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for a geometry of ${vertex_count}`);
 }
 
 function octantOf(id: TileId): number {

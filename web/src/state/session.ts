@@ -20,6 +20,7 @@ import {
   type StreamComplete,
   streamComplete,
   streamStats,
+  subscribed,
   type Vec3,
 } from '../protocol/messages';
 import { Arrivals } from '../scene/arrivals';
@@ -48,6 +49,8 @@ const CAMERA_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
 const BUSY_WAIT_MS = 300;
 const TICK_MS = 100;
+/** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
+const MOST_CLAIMED = 1500;
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
 
@@ -73,6 +76,8 @@ export class Session {
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   #removedAt = new Map<string, number>();
   #connectionNumber = 0;
+  /** Session whose server knows what the tile set claims. */
+  #claimableSession: string | null = null;
   #lastSequence = 0;
   #completeAfter: { sequence: number; message: StreamComplete } | null = null;
   #userMoved = false;
@@ -307,7 +312,7 @@ export class Session {
     const { store } = this;
     const returning = store.scene !== undefined;
     const before = returning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
-    const qualityBefore = store.quality;
+    const qualityBefore = returning && this.#qualityChanged ? store.quality : null;
     this.#connectionNumber += 1;
     this.#acknowledger.reset();
     this.#pool.clear();
@@ -323,23 +328,43 @@ export class Session {
     store.methods = message.methods;
     store.palettes = message.palettes;
     store.fusionInForce = message.fusion;
-    store.wanted = null;
-    store.quality = message.quality;
+    store.wanted = before;
+    store.refusals = {};
+    store.quality = qualityBefore ?? message.quality;
     store.generation = 0;
     store.lostAt = null;
     store.statuses = [];
     store.complete = null;
     this.tiles.beginConnection();
-    if (before !== null) {
-      this.#change(before);
-      this.#fusionSender.flush();
-    }
-    if (returning && this.#qualityChanged && qualityBefore !== null) this.setQuality(qualityBefore);
     this.#setScene(message.scene, true);
-    void this.#connection.request('scene.subscribe', { channels: ['fused'] }).catch((error: unknown) => this.#say(error));
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
     this.#rememberFused(message.fusion);
+    void this.#subscribe(message, before, qualityBefore);
+  }
+
+  /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */
+  async #subscribe(greeting: Hello, fusion: FusionChange | null, quality: Quality | null): Promise<void> {
+    const connectionNumber = this.#connectionNumber;
+    await Promise.all([fusion && this.#sendFusion(fusion), quality && this.#sendQuality(quality)]);
+    if (connectionNumber !== this.#connectionNumber) return;
+    if (!this.#fusionSender.busy) this.store.wanted = null;
+    const session_id = this.#claimableSession;
+    const claims = session_id !== null && greeting.capabilities.includes('resume') ? this.tiles.claims(MOST_CLAIMED) : [];
+    try {
+      const answer = await this.#connection.request('scene.subscribe', {
+        channels: ['fused'],
+        ...(greeting.capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
+        ...(claims.length > 0 ? { resume: { session_id, tiles: claims } } : {}),
+      });
+      if (connectionNumber !== this.#connectionNumber) return;
+      const { resumed_tiles = 0 } = subscribed(answer, 'scene.subscribe');
+      this.tiles.resume(claims, resumed_tiles > 0);
+      this.#claimableSession = greeting.session_id;
+      this.viewport.invalidate();
+    } catch (error) {
+      this.#say(error);
+    }
   }
 
   #disconnected(): void {
@@ -490,8 +515,9 @@ export class Session {
     if (frame.kind === FrameKind.geometry) {
       this.#stepIs(frame.position_step_m * 1000);
       this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
-    } else if (frame.kind === FrameKind.colours) {
-      this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload });
+    } else if (frame.kind === FrameKind.colours || frame.kind === FrameKind.colours_subtract_green) {
+      const transform = frame.kind === FrameKind.colours ? 'none' : 'subtract_green';
+      this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload, transform });
     } else {
       if (frame.kind === FrameKind.remove) {
         this.#removedAt.set(key, frame.sequence);
@@ -546,7 +572,8 @@ export class Session {
 
   #completed(message: StreamComplete): void {
     const { store } = this;
-    this.tiles.endStale();
+    this.tiles.settle();
+    store.shown = this.tiles.counts();
     store.complete = message;
     if (message.generation >= store.generation && !this.#fusionSender.busy) {
       if (store.behindSince !== null) {
