@@ -5,6 +5,8 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { decodePng, openClient, runTests, screenshot, settled, startBrowser, startServer, test } from './harness.mjs';
+import { addLinkTests } from './links.mjs';
+import { addLoadTests } from './load.mjs';
 
 const scratch = mkdtempSync(join(tmpdir(), 'spectra-e2e-'));
 const browser = await startBrowser();
@@ -336,6 +338,9 @@ test('Nothing broke the content policy', () => {
     [],
   );
 });
+
+addLinkTests(browser);
+addLoadTests(browser, scratch);
 
 await runTests();
 await browser.close();

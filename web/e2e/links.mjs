@@ -1,0 +1,105 @@
+// What a user sees over a link that is slow, and one that is cut.
+import assert from 'node:assert/strict';
+import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { startLink } from './link.mjs';
+
+const GEOMETRY = 1;
+const COLOURS = [2, 6];
+
+/** Some pixels of the scene's part of the window. */
+function sample(image) {
+  const pixels = [];
+  for (let x = 200; x < 1100; x += 9) for (let y = 40; y < 860; y += 9) pixels.push(image.at(x, y).join());
+  return pixels;
+}
+
+const shownTiles = (page) => page.evaluate(() => globalThis.spectra.store.shown.tiles);
+
+export function addLinkTests(browser) {
+  test('On a slow link the coarse answer is seen first, then the fine one', async () => {
+    const server = await startServer(['--demo']);
+    const link = await startLink(server.port);
+    const { page, problems } = await openClient(browser, link.url);
+    await settled(page);
+    await page.keyboard.press('2');
+    await settled(page);
+    const tiles = await shownTiles(page);
+    assert.ok(tiles > 1, `the scene has ${tiles} tile, too few for this test`);
+    const visible = sample(await screenshot(page, 'slow-before'));
+
+    link.rate = 100_000;
+    await page.keyboard.press('1');
+    await page.waitForFunction((all) => globalThis.spectra.store.shown.tiles < all, tiles, { polling: 'raf' });
+    await drawn(page);
+    const during = await page.evaluate(() => ({
+      isBehind: globalThis.spectra.store.behindSince !== null,
+      tiles: globalThis.spectra.store.shown.tiles,
+    }));
+    const coarse = sample(await screenshot(page, 'slow-coarse'));
+    assert.deepEqual(during, { isBehind: true, tiles: 1 }, 'the root alone is drawn while the rest is on its way');
+
+    await settled(page);
+    assert.equal(await shownTiles(page), tiles);
+    const fine = sample(await screenshot(page, 'slow-fine'));
+    const changed = (a, b) => a.filter((pixel, index) => pixel !== b[index]).length / a.length;
+    // The coarse answer has the palette's colours already: it is much nearer to the fine one than to what stood there before.
+    const distance = (a, b) =>
+      a.reduce((sum, pixel, index) => {
+        const [p, q] = [pixel.split(','), b[index].split(',')];
+        return sum + Math.abs(p[0] - q[0]) + Math.abs(p[1] - q[1]) + Math.abs(p[2] - q[2]);
+      }, 0);
+    assert.ok(changed(visible, fine) > 0.2, 'the two settings look alike');
+    assert.ok(distance(coarse, fine) < 0.3 * distance(visible, fine), 'what was seen first was not the answer');
+    assert.deepEqual(problems, []);
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+
+  test('After a cut the picture goes on without its geometry being sent again', async () => {
+    const server = await startServer(['--demo']);
+    const link = await startLink(server.port);
+    const { page, problems } = await openClient(browser, 'about:blank');
+    let kinds = [];
+    page.on('websocket', (socket) =>
+      socket.on('framereceived', ({ payload }) => {
+        if (typeof payload !== 'string') kinds.push(payload[4]);
+      }),
+    );
+    await page.goto(link.url);
+    await settled(page);
+    await page.locator('[data-method="thermal_visible_blend"]').click();
+    await settled(page);
+    const tiles = await shownTiles(page);
+    assert.equal(kinds.filter((kind) => kind === GEOMETRY).length >= tiles, true);
+    const before = sample(await screenshot(page, 'cut-before'));
+
+    kinds = [];
+    link.down();
+    await page.getByText('Reconnecting').waitFor();
+    link.up();
+    await page.waitForFunction(() => globalThis.spectra.store.connected, null, { timeout: 20_000 });
+    await settled(page);
+    assert.ok(
+      kinds.some((kind) => COLOURS.includes(kind)),
+      'no colours came',
+    );
+    assert.equal(kinds.filter((kind) => kind === GEOMETRY).length, 0, 'geometry came again');
+    assert.equal(await shownTiles(page), tiles);
+    assert.deepEqual(sample(await screenshot(page, 'cut-after')), before, 'the picture is another one');
+
+    // What was resumed follows the settings as before.
+    await page.keyboard.press('1');
+    await settled(page);
+    const thermal = sample(await screenshot(page, 'cut-thermal'));
+    assert.notDeepEqual(thermal, before);
+    assert.equal(kinds.filter((kind) => kind === GEOMETRY).length, 0);
+    assert.deepEqual(
+      problems.filter((text) => !/WebSocket connection|ERR_/.test(text)),
+      [],
+    );
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+}

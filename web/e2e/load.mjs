@@ -1,0 +1,123 @@
+// What the page bears: a million vertices, and hundreds of changes.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { join } from 'node:path';
+import { PROGRAM, drawn, openClient, settled, startServer, test } from './harness.mjs';
+
+/** Longest task of the page's main thread. */
+const LONGEST_TASK_MS = 50;
+
+/** Records what the browser does until the returned function is called, which hands over the events of the page's main thread. */
+async function trace(page) {
+  const session = await page.context().newCDPSession(page);
+  const events = [];
+  session.on('Tracing.dataCollected', ({ value }) => events.push(...value));
+  await session.send('Tracing.start', {
+    transferMode: 'ReportEvents',
+    traceConfig: { includedCategories: ['toplevel', 'gpu', 'blink.user_timing'] },
+  });
+  return async () => {
+    await page.evaluate(() => performance.mark('end of trace'));
+    const complete = new Promise((resolve) => session.once('Tracing.tracingComplete', resolve));
+    await session.send('Tracing.end');
+    await complete;
+    const mark = events.find(({ name }) => name === 'end of trace');
+    return events.filter(({ pid, tid, ph }) => pid === mark.pid && tid === mark.tid && ph === 'X');
+  };
+}
+
+export function addLoadTests(browser, scratch) {
+  test('No task of the page is long while a million vertices stream in', async () => {
+    const real = join(process.env.SPECTRA_TEST_DATA ?? '/nowhere', 'arco_castle_1m.ply');
+    const scene = existsSync(real) ? real : join(scratch, 'million.ply');
+    if (scene !== real) execFileSync(PROGRAM, ['demo-scene', scene, '--vertices', '1000000']);
+    const server = await startServer([scene]);
+    // The same process as the page that follows, and past its own beginnings.
+    const { page } = await openClient(browser, `${server.url}icon.svg`);
+    const finish = await trace(page);
+    await page.goto(server.url);
+    await settled(page, 180_000);
+    const vertices = await page.evaluate(() => globalThis.spectra.store.shown.vertices);
+    const events = await finish();
+    const tasks = events.filter(({ name }) => /RunTask$/.test(name));
+    const cpu = tasks.map(({ tdur }) => (tdur ?? 0) / 1000).sort((a, b) => b - a);
+    const wall = tasks.map(({ dur }) => dur / 1000).sort((a, b) => b - a);
+    const waits = events.filter(({ name }) => /WaitForGetOffset|WaitForTokenInRange/.test(name));
+    const figures = (times) => times.slice(0, 3).map((ms) => ms.toFixed(0));
+    console.log(
+      `        ${vertices} vertices on the screen, ${tasks.length} tasks; the longest took ${figures(cpu)} ms of processor time, ` +
+        `${figures(wall)} ms by the clock, ${wall.filter((ms) => ms > LONGEST_TASK_MS).length} over ${LONGEST_TASK_MS} ms`,
+    );
+    assert.ok(vertices > 400_000, `${vertices} vertices`);
+    assert.ok(tasks.length > 100 && cpu[0] > 0, 'the trace does not say how long tasks took');
+    // On a machine with other work the clock tells more about that than about the page. What the page itself does: compute, and wait.
+    assert.ok(cpu[0] < LONGEST_TASK_MS, `a task of ${cpu[0]} ms`);
+    assert.equal(waits.length, 0, 'the page waited for the GPU');
+    await page.close();
+    await server.stop();
+  });
+
+  test('Five hundred changes leave no more behind than fifty', async () => {
+    const scene = join(scratch, 'small.ply');
+    execFileSync(PROGRAM, ['demo-scene', scene, '--vertices', '60000']);
+    const server = await startServer([scene]);
+    const { page, problems } = await openClient(browser, server.url);
+    await settled(page);
+    const session = await page.context().newCDPSession(page);
+    const workers = new Map();
+    session.on('Target.attachedToTarget', ({ sessionId, targetInfo }) =>
+      workers.set(sessionId, targetInfo.title || targetInfo.url),
+    );
+    let answered = () => undefined;
+    session.on('Target.receivedMessageFromTarget', ({ message }) => answered(JSON.parse(message)));
+    await session.send('Target.setAutoAttach', { autoAttach: true, waitForDebuggerOnStart: false, flatten: false });
+    const heap = (send) => async () => {
+      await send('HeapProfiler.collectGarbage');
+      const { usedSize, backingStorageSize = 0 } = await send('Runtime.getHeapUsage');
+      return usedSize + backingStorageSize;
+    };
+    const ofWorker = (sessionId) => (method) =>
+      new Promise((resolve) => {
+        answered = ({ result }) => resolve(result);
+        void session.send('Target.sendMessageToTarget', { sessionId, message: JSON.stringify({ id: 1, method, params: {} }) });
+      });
+    const held = async () => {
+      await settled(page);
+      await drawn(page);
+      const bytes = { page: await heap((method) => session.send(method))() };
+      for (const [sessionId, name] of workers) bytes[name] = await heap(ofWorker(sessionId))();
+      const { geometries, textures, programs } = await page.evaluate(() => globalThis.spectra.viewport.gpuObjects);
+      return { bytes, gpu: { geometries, textures, programs } };
+    };
+    const change = (count) =>
+      page.evaluate(async (many) => {
+        const { store } = globalThis.spectra;
+        for (let i = 0; i < many; i += 1) {
+          const generation = store.generation;
+          globalThis.spectra.setParameter('alpha', ((i * 37) % 100) / 100, true);
+          while (store.generation === generation) await new Promise((resolve) => setTimeout(resolve, 1));
+        }
+      }, count);
+
+    await page.locator('[data-method="thermal_visible_blend"]').click();
+    await settled(page);
+    await change(50);
+    const after50 = await held();
+    await change(450);
+    const after500 = await held();
+    const mega = (bytes) => Object.entries(bytes).map(([name, value]) => `${name} ${(value / 1e6).toFixed(2)} MB`);
+    console.log(
+      `        after 50: ${mega(after50.bytes)}; after 500: ${mega(after500.bytes)}; GPU ${JSON.stringify(after500.gpu)}`,
+    );
+    assert.ok(Object.keys(after500.bytes).length >= 3, 'page, decoder and picture');
+    assert.deepEqual(after500.gpu, after50.gpu);
+    for (const [name, bytes] of Object.entries(after500.bytes)) {
+      // A kilobyte for each change would be 0.45 MB.
+      assert.ok(bytes - after50.bytes[name] < 300_000, `${name} grew from ${after50.bytes[name]} to ${bytes} bytes`);
+    }
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+}
