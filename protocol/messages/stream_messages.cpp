@@ -1,5 +1,7 @@
 #include "protocol/messages/stream_messages.hpp"
 
+#include <algorithm>
+
 #include "protocol/messages/fields.hpp"
 
 namespace spectra::protocol {
@@ -27,6 +29,18 @@ std::span<const EnumWord<ColourTransform>> words_of() {
 
 static constexpr const char* kPosition = "a list of 3 numbers that fit a 32-bit float";
 
+// With the largest numbers they stay within 64 KiB, and within 10,000 JSON values.
+static constexpr std::size_t kMostResumedTiles = 1500;
+
+static void describe(auto& fields, Is<ResumeRequest> auto& message) {
+  fields.field("session_id", message.session_id);
+  fields.field("tiles", message.tiles);
+  fields.require("tiles", message.tiles.size() <= kMostResumedTiles, "a list of at most 1500 tiles");
+  const bool are_tiles =
+      std::all_of(message.tiles.begin(), message.tiles.end(), [](const auto& t) { return t[0] <= 255 && t[4] >= 1; });
+  fields.require("tiles", are_tiles, "a list of [level from 0 to 255, x, y, z, revision from 1]");
+}
+
 static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
   fields.field("channels", message.channels);
   fields.require("channels", !message.channels.empty(), "a list of at least one channel");
@@ -35,6 +49,11 @@ static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
   fields.require("in_flight_bytes", in_flight_bytes >= 1 && in_flight_bytes <= 2'147'483'647U,
                  "an integer from 1 to 2147483647");
   fields.optional("colour_transform", message.colour_transform);
+  fields.optional("resume", message.resume);
+}
+
+static void describe(auto& fields, Is<SubscribeReply> auto& message) {
+  fields.optional("resumed_tiles", message.resumed_tiles);
 }
 
 static void describe(auto& fields, Is<CameraSet> auto& message) {
@@ -85,10 +104,26 @@ static void describe(auto& fields, Is<Status> auto& message) {
 }
 
 template <>
+Result<ResumeRequest> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ResumeRequest>(value, path);
+}
+nlohmann::json to_json(const ResumeRequest& message) {
+  return written_message(message);
+}
+
+template <>
 Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path) {
   return read_message<SubscribeRequest>(value, path);
 }
 nlohmann::json to_json(const SubscribeRequest& message) {
+  return written_message(message);
+}
+
+template <>
+Result<SubscribeReply> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SubscribeReply>(value, path);
+}
+nlohmann::json to_json(const SubscribeReply& message) {
   return written_message(message);
 }
 

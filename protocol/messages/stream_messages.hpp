@@ -13,11 +13,23 @@ namespace spectra::protocol {
 
 enum class Channel { Fused, Temperature, Visible };
 
+/// Tiles that a client still has, with colours, from an earlier connection.
+struct ResumeRequest {
+  std::string session_id;                           ///< Of the hello of that connection.
+  std::vector<std::array<std::uint32_t, 5>> tiles;  ///< Level (0..255), x, y, z, revision (from 1); at most 1,500.
+};
+
 /// Params of scene.subscribe; at least one channel.
 struct SubscribeRequest {
   std::vector<Channel> channels;
   std::optional<std::uint32_t> in_flight_bytes;     ///< 1..2^31-1; absent: the server's choice.
   std::optional<ColourTransform> colour_transform;  ///< Absent: none.
+  std::optional<ResumeRequest> resume;
+};
+
+/// Result of scene.subscribe.
+struct SubscribeReply {
+  std::optional<std::uint32_t> resumed_tiles;  ///< There when the request had `resume`: claims that hold.
 };
 
 /// Params of camera.set; metres relative to the scene origin, finite as float.
@@ -68,9 +80,15 @@ struct Status {
   std::optional<std::string> message;
 };
 
+nlohmann::json to_json(const ResumeRequest& message);
+template <>
+Result<ResumeRequest> from_json(const nlohmann::json& value, std::string_view path);
 nlohmann::json to_json(const SubscribeRequest& message);
 template <>
 Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const SubscribeReply& message);
+template <>
+Result<SubscribeReply> from_json(const nlohmann::json& value, std::string_view path);
 nlohmann::json to_json(const CameraSet& message);
 template <>
 Result<CameraSet> from_json(const nlohmann::json& value, std::string_view path);

@@ -5,7 +5,6 @@
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <utility>
 
 #include "fusion/colour/palette.hpp"
@@ -26,17 +25,6 @@ namespace {
 /// Answers that one viewer may have computing at once, and changes it may have waiting.
 constexpr std::size_t kMaxComputing = 16;
 constexpr std::size_t kMaxWaiting = 512;
-
-std::string new_session_id() {
-  std::random_device random;
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string id;
-  for (int word = 0; word < 4; ++word) {
-    unsigned bits = random();
-    for (int digit = 0; digit < 8; ++digit, bits >>= 4U) id += kDigits[bits & 15U];
-  }
-  return id;
-}
 
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
   return scene ? scene->temperature() : fusion::SceneTemperature{};
@@ -127,9 +115,9 @@ void ViewerSession::opened() {
 
   protocol::Hello hello;
   hello.server = {"Spectra", std::string(kVersion)};
-  hello.session_id = new_session_id();
+  hello.session_id = served_.session_ids.next();
   hello.role = protocol::Role::Operator;
-  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green"};
+  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green", "resume"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -214,12 +202,28 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
                      "fused");
     }
   }
+  if (request.resume && is_subscribed_) {
+    return refusal(RpcErrorCode::InvalidParams, "resume must come before the first frame, not while frames flow",
+                   "resume", "the first scene.subscribe, or the first after scene.unsubscribe");
+  }
+  protocol::SubscribeReply reply;
+  if (request.resume) reply.resumed_tiles = resume(*request.resume);
   is_subscribed_ = true;
   in_flight_bytes_ = request.in_flight_bytes.value_or(0);
   colour_transform_ = request.colour_transform.value_or(protocol::ColourTransform::None);
   if (stream_) stream_->subscribe(in_flight_bytes_, colour_transform_);
   peer_.wake();
-  return json::object();
+  return protocol::to_json(reply);
+}
+
+std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
+  if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return 0;
+  std::vector<ResumedTile> tiles;
+  tiles.reserve(request.tiles.size());
+  for (const auto& [level, x, y, z, revision] : request.tiles) {
+    tiles.push_back({{static_cast<std::uint8_t>(level), x, y, z}, revision});
+  }
+  return stream_->resume(tiles);
 }
 
 ViewerSession::Answer ViewerSession::unsubscribe() {

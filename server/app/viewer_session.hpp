@@ -50,6 +50,8 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
 
   Answer scene_get() const;
   Answer subscribe(const nlohmann::json& params);
+  /// Returns the number of tiles that need not be sent again.
+  std::uint32_t resume(const protocol::ResumeRequest& request);
   Answer unsubscribe();
   Answer fusion_get() const;
   Answer set_quality(const nlohmann::json& params);

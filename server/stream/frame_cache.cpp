@@ -156,6 +156,12 @@ std::shared_ptr<const PlanIdentity> FrameCache::State::plan_identity(
   return identity;
 }
 
+std::optional<std::uint32_t> FrameCache::State::issued_revision(const GeometryKey& key) const {
+  const std::lock_guard lock(mutex_);
+  const auto issued = issued_.find(key);
+  return issued == issued_.end() ? std::nullopt : std::optional(issued->second.revision);
+}
+
 std::uint32_t FrameCache::State::unused_revision() {
   const std::lock_guard lock(mutex_);
   return ++last_revision_;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <tuple>
@@ -168,6 +169,10 @@ struct FrameCache::State {
   /// The same object for plans that show the same picture of `scene`, as long as anybody holds it.
   std::shared_ptr<const PlanIdentity> plan_identity(const fusion::FusionPlan& plan,
                                                     const std::shared_ptr<const SceneSnapshot>& scene);
+
+  /// The revision of the newest encoding under that key, whether it is still kept or not; nothing when there was none,
+  /// or when it is too long ago.
+  std::optional<std::uint32_t> issued_revision(const GeometryKey& key) const;
 
   /// A number that names no encoding and never will: for a viewer to whom an encoding must go under another name.
   std::uint32_t unused_revision();

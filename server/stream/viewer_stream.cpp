@@ -73,10 +73,13 @@ struct Slot {
   }
 };
 
+// Older than every epoch of a stream: of colours that the viewer has from an earlier connection.
+constexpr std::uint64_t kEarlierColourEpoch = 1;
+
 // The settings in force, as a job needs them. An epoch rises with each change that makes frames of that kind stale.
 struct Demand {
   std::uint64_t geometry_epoch = 1;
-  std::uint64_t colour_epoch = 1;
+  std::uint64_t colour_epoch = kEarlierColourEpoch + 1;
   float position_step_m = 0;
   int encoder_speed = 7;
   int colour_bits = 8;
@@ -84,6 +87,10 @@ struct Demand {
   std::shared_ptr<const fusion::FusionPlan> plan;  // Null before the first set_plan().
   std::shared_ptr<const PlanIdentity> plan_identity;
 };
+
+GeometryKey geometry_key_of(const std::shared_ptr<const Tile>& tile, const Demand& demand) {
+  return {Identity(tile), demand.position_step_m, demand.encoder_speed};
+}
 
 ColourKey colour_key_of(const EncodedTile& geometry, const Demand& demand) {
   return {geometry.revision, demand.plan_identity, demand.colour_bits, demand.colour_transform};
@@ -98,7 +105,7 @@ struct Encoding {
   std::shared_ptr<const EncodedTile> made_geometry = nullptr;
   Payload made_colours = nullptr;
 
-  GeometryKey geometry_key() const { return {Identity(tile), demand.position_step_m, demand.encoder_speed}; }
+  GeometryKey geometry_key() const { return geometry_key_of(tile, demand); }
   ColourKey colour_key() const { return colour_key_of(*geometry, demand); }
 };
 
@@ -147,16 +154,13 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void unsubscribe() override {
     change([&] {
       subscribed_ = false;
-      removed_.clear();
-      // Whoever subscribes again starts from nothing.
-      for (const auto& slot : slots_) {
-        put_down(*slot);
-        slot->forget_held();
-      }
+      // Whoever subscribes again starts from nothing, unless with resume().
+      forget_all_held();
     });
   }
 
-  void resume(std::span<const ResumedTile> tiles) override {
+  std::uint32_t resume(std::span<const ResumedTile> tiles) override {
+    std::uint32_t current_count = 0;
     change([&] {
       if (subscribed_) return;
       std::map<TileId, Slot*> slot_of;
@@ -164,16 +168,17 @@ class Stream final : public ViewerStream, public CacheWaiter {
       std::set<TileId> seen;
       for (const ResumedTile& resumed : tiles) {
         if (resumed.revision == 0 || !seen.insert(resumed.tile).second) continue;
-        if (const auto known = slot_of.find(resumed.tile); known != slot_of.end()) {
-          put_down(*known->second);
-          known->second->forget_held();
-          known->second->held_revision = resumed.revision;
-          known->second->held_name = resumed.revision;
-        } else {
+        const auto known = slot_of.find(resumed.tile);
+        if (known == slot_of.end()) {
           push_removal(resumed.tile, resumed.revision);
+        } else if (hold_resumed(*known->second, resumed.revision)) {
+          ++current_count;
         }
       }
+      if (current_count == 0) forget_all_held();
+      remove_surplus();
     });
+    return current_count;
   }
 
   std::uint32_t set_plan(fusion::FusionPlan plan) override {
@@ -388,6 +393,27 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void remove_from_viewer(Slot& slot) {
     if (slot.held_name != 0) push_removal(slot.tile->id, slot.held_name);
     slot.forget_held();
+  }
+
+  void forget_all_held() {
+    removed_.clear();
+    for (const auto& slot : slots_) {
+      put_down(*slot);
+      slot->forget_held();
+    }
+  }
+
+  // Takes a viewer at its word that it holds that geometry; true when it is the one in force. Otherwise it is replaced.
+  bool hold_resumed(Slot& slot, std::uint32_t revision) {
+    put_down(slot);
+    slot.forget_held();
+    slot.held_name = revision;
+    if (cache_->issued_revision(geometry_key_of(slot.tile, demand_)) != revision) return false;
+    slot.held_revision = revision;
+    slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+    slot.held_geometry_epoch = demand_.geometry_epoch;
+    slot.held_colour_epoch = kEarlierColourEpoch;
+    return true;
   }
 
   // Decides how a change is answered first; see StreamQuality. Ends in apply().
@@ -608,8 +634,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // Takes what the cache has; leaves the slot idle when anything is missing.
   void look_up(Slot& slot) {
-    const GeometryKey key{Identity(slot.tile), demand_.position_step_m, demand_.encoder_speed};
-    auto geometry = cache_->find_geometry(key);
+    auto geometry = cache_->find_geometry(geometry_key_of(slot.tile, demand_));
     if (!geometry) return;
     auto colours = cache_->find_colours(colour_key_of(*geometry, demand_));
     if (colours) make_ready(slot, std::move(geometry), std::move(colours));

@@ -76,7 +76,7 @@ struct StreamLimits {
   std::uint64_t held_vertices = 6'000'000;
 };
 
-/// A tile that a viewer still has from an earlier connection.
+/// A tile that a viewer still has from an earlier connection, geometry and colours.
 struct ResumedTile {
   protocol::TileId tile;
   std::uint32_t revision = 0;
@@ -121,10 +121,12 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
                          protocol::ColourTransform transform = protocol::ColourTransform::None) = 0;
   virtual void unsubscribe() = 0;
 
-  /// Called before subscribe(): geometry that the viewer says it holds. What is still current is not sent again (its
-  /// colours are), what is not is replaced, and what is gone is removed. Safe on untrusted input: a false claim spoils
-  /// only the picture of the viewer who makes it.
-  virtual void resume(std::span<const ResumedTile> tiles) = 0;
+  /// Called before subscribe(): tiles that the viewer says it holds from an earlier stream on the same cache. What is
+  /// still current (the revision was issued for that tile, with the position step and encoder speed in force) is not sent
+  /// again, its colours are, as after a change of the settings; what is not is replaced, and what is gone is removed.
+  /// Returns how many are current; when none is, everything is sent as to a viewer who holds nothing. Safe on untrusted
+  /// input: a false claim spoils only the picture of the viewer who makes it.
+  virtual std::uint32_t resume(std::span<const ResumedTile> tiles) = 0;
 
   /// A plan made (on a worker) for the current scene; returns the generation its colours will carry, from 1.
   virtual std::uint32_t set_plan(fusion::FusionPlan plan) = 0;

@@ -165,12 +165,34 @@ export class SpectraClient {
     this.lastSequence = 0;
   }
 
-  request(method, params = {}) {
+  /** Resolves with the result, after `onResult` was called with it before anything that followed it on the wire. */
+  request(method, params = {}, onResult = () => {}) {
     const id = this.nextId++;
-    return new Promise((resolve, reject) => {
+    return new Promise((fulfil, reject) => {
+      const resolve = (result) => {
+        onResult(result);
+        fulfil(result);
+      };
       this.pending.set(id, { resolve, reject });
       this.socket.send(JSON.stringify({ jsonrpc: "2.0", id, method, params }));
     });
+  }
+
+  /** What it can claim on another connection: its tiles with colours. */
+  claims() {
+    const held = [...this.tiles.values()].filter((tile) => tile.colours);
+    return held.map(({ frame }) => [frame.level, ...frame.position, frame.revision]);
+  }
+
+  /** Subscribes as a client does after a drop-out, with the tiles of the connection before; returns resumed_tiles. */
+  async resume(earlier, { session_id = earlier.hello.session_id, tiles = earlier.claims(), ...params } = {}) {
+    const held = tiles.map((claim) => earlier.tiles.get(claim.slice(0, 4).join("/"))).filter(Boolean);
+    this.tiles = new Map(held.map((tile) => [tile.frame.tile, { ...tile, generation: 0 }]));
+    const request = { channels: ["fused"], ...params, resume: { session_id, tiles } };
+    const { resumed_tiles } = await this.request("scene.subscribe", request, (result) => {
+      if (!result.resumed_tiles) this.tiles.clear();
+    });
+    return resumed_tiles;
   }
 
   notify(method, params) {

@@ -61,7 +61,7 @@ struct MethodPassages {
 
 const std::map<std::string, MethodPassages> kMethods{
     {"scene.get", {unchanged, through<SceneDescription>()}},
-    {"scene.subscribe", {through<SubscribeRequest>(), unchanged}},
+    {"scene.subscribe", {through<SubscribeRequest>(), through<SubscribeReply>()}},
     {"scene.unsubscribe", {unchanged, unchanged}},
     {"fusion.set", {through<FusionChange>(), through<FusionReply>()}},
     {"fusion.get", {unchanged, through<FusionReply>()}},

@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "protocol/incoming_message.hpp"
 #include "protocol/messages/fusion_messages.hpp"
 #include "protocol/messages/quality_messages.hpp"
 #include "protocol/messages/query_messages.hpp"
@@ -71,6 +73,49 @@ TEST(SubscribeRequest, KnowsItsChannels) {
   for (const std::string transform : {"\"ycocg\"", "\"\"", "6", "null"})
     EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"colour_transform":)" + transform + "}"),
               "colour_transform");
+}
+
+TEST(SubscribeRequest, ReadsWhatAClientStillHolds) {
+  const auto request = [](const std::string& resume) { return R"({"channels":["fused"],"resume":)" + resume + "}"; };
+  const auto read = from_json<SubscribeRequest>(
+      json::parse(request(R"({"session_id":"7f","tiles":[[0,0,0,0,4294967295],[255,1,2,4294967295,1]]})")));
+  ASSERT_TRUE(read.has_value());
+  EXPECT_EQ(read.value().resume->session_id, "7f");
+  EXPECT_EQ(read.value().resume->tiles[1], (std::array<std::uint32_t, 5>{255, 1, 2, 4294967295U, 1}));
+  const std::map<std::string, std::string> refused{
+      {"[]", "resume"},
+      {"null", "resume"},
+      {R"({"tiles":[]})", "resume.session_id"},
+      {R"({"session_id":7,"tiles":[]})", "resume.session_id"},
+      {R"({"session_id":""})", "resume.tiles"},
+      {R"({"session_id":"","tiles":{}})", "resume.tiles"},
+      {R"({"session_id":"","tiles":[[0,0,0,0]]})", "resume.tiles[0]"},
+      {R"({"session_id":"","tiles":[[0,0,0,0,1],[0,0,0,0,1,1]]})", "resume.tiles[1]"},
+      {R"({"session_id":"","tiles":[[0,0,-1,0,1]]})", "resume.tiles[0][2]"},
+      {R"({"session_id":"","tiles":[[0,0,0,0,4294967296]]})", "resume.tiles[0][4]"},
+      {R"({"session_id":"","tiles":[[0,0,0,0,1.5]]})", "resume.tiles[0][4]"},
+      {R"({"session_id":"","tiles":[[256,0,0,0,1]]})", "resume.tiles"},
+      {R"({"session_id":"","tiles":[[0,0,0,0,0]]})", "resume.tiles"}};
+  for (const auto& [resume, field] : refused)
+    EXPECT_EQ(refused_field<SubscribeRequest>(request(resume)), field) << resume;
+}
+
+TEST(SubscribeRequest, OfAsManyTilesAsAreAllowedFitsTheLimitsOfAMessage) {
+  const auto request = [](int tile_count) {
+    SubscribeRequest message;
+    message.channels = {Channel::Fused};
+    message.resume.emplace();
+    message.resume->session_id = std::string(32, 'f');
+    for (int i = 0; i < tile_count; ++i) message.resume->tiles.push_back({21, 2097151, 2097151, 2097151, 4294967295U});
+    return message;
+  };
+  const json most = {{"jsonrpc", "2.0"}, {"id", 1}, {"method", "scene.subscribe"}, {"params", to_json(request(1500))}};
+  const auto incoming = incoming_message(most.dump());
+  ASSERT_TRUE(std::holds_alternative<IncomingMessage>(incoming));
+  EXPECT_TRUE(from_json<SubscribeRequest>(std::get<IncomingMessage>(incoming).params).has_value());
+  const auto refused = from_json<SubscribeRequest>(to_json(request(1501)));
+  ASSERT_TRUE(refused.has_error());
+  EXPECT_EQ(refused.error().message, "resume.tiles must be a list of at most 1500 tiles, not a list of 1501");
 }
 
 TEST(FusionChange, KeepsWhatIsAbsentAbsent) {

@@ -101,7 +101,13 @@ TEST(FrameCache, AGeometryThatComesBackTheSameKeepsItsRevision) {
   const auto first = made(key, 1);
   EXPECT_EQ(made(key, 1), first);
   EXPECT_NE(made(key, 2), first);
-  EXPECT_NE(made({Identity(tile), 0.25F, 7}, 1), first);
+  const auto second = made(key, 2);
+  const GeometryKey finer{Identity(tile), 0.25F, 7};
+  EXPECT_EQ(state.issued_revision(finer), std::nullopt);
+  const auto other = made(finer, 1);
+  EXPECT_NE(other, first);
+  EXPECT_EQ(state.issued_revision(key), second);
+  EXPECT_EQ(state.issued_revision(finer), other);
   EXPECT_EQ(cache.size_bytes(), 0U);
 }
 

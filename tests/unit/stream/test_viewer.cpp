@@ -29,6 +29,26 @@ TestViewer::~TestViewer() {
   stream_->close();
 }
 
+std::vector<ResumedTile> TestViewer::claims() const {
+  std::vector<ResumedTile> claims;
+  for (const auto& [id, tile] : tiles) {
+    if (!tile.colours.empty()) claims.push_back({id, tile.geometry.revision});
+  }
+  return claims;
+}
+
+std::uint32_t TestViewer::resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims) {
+  const std::uint32_t current_count = stream_->resume(claims);
+  if (current_count == 0) return 0;
+  for (const ResumedTile& claim : claims) {
+    tiles[claim.tile] = earlier.tiles.at(claim.tile);
+    tiles[claim.tile].generation = 0;
+    // A false claim may be answered with what the viewer has in truth.
+    if (tiles[claim.tile].geometry.revision == claim.revision) revisions_.insert(claim.revision);
+  }
+  return current_count;
+}
+
 std::size_t TestViewer::wake_count() {
   const std::lock_guard lock(mutex_);
   return wake_count_;

@@ -18,7 +18,7 @@ namespace spectra::server::testing {
 struct HeldTile {
   protocol::TileFrameHeader geometry;
   std::vector<std::array<float, 3>> positions_m;  ///< Relative to the scene origin.
-  std::uint32_t generation = 0;                   ///< Of the colours; 0 = none yet.
+  std::uint32_t generation = 0;                   ///< Of the colours; 0 = none of this connection.
   std::vector<protocol::ColourBytes> colours;
 };
 
@@ -32,6 +32,11 @@ class TestViewer {
   TestViewer& operator=(const TestViewer&) = delete;
 
   ViewerStream& stream() { return *stream_; }
+
+  /// The tiles it holds with colours, as another stream is told of them.
+  std::vector<ResumedTile> claims() const;
+  /// Before it subscribes: holds the tiles of `earlier` that it claims. Returns what ViewerStream::resume() does.
+  std::uint32_t resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims);
 
   /// Takes frames as they come, until the stream says complete. Fails the test when nothing comes for a long time.
   StreamComplete complete();

@@ -606,7 +606,7 @@ class ViewerStreamOfATree : public ViewerStreamTest {
     const std::function<bool(protocol::TileId, std::set<protocol::TileId>&)> draw =
         [&](protocol::TileId id, std::set<protocol::TileId>& into) {
           const auto held = viewer.tiles.find(id);
-          if (held == viewer.tiles.end() || held->second.generation == 0) return false;
+          if (held == viewer.tiles.end() || held->second.colours.empty()) return false;
           std::set<protocol::TileId> beneath;
           const auto mask = held->second.geometry.child_mask;
           bool is_replaced = mask != 0;
@@ -754,49 +754,114 @@ TEST_F(ViewerStreamOfATree, TilesLeftLongestAreRemovedBeyondTheLimit) {
   expect_view(viewer, first_corner, 0.3);
 }
 
-TEST_F(ViewerStreamOfATree, ResumesWithTheTilesThatAreStillGood) {
-  std::vector<ResumedTile> held;
-  {
-    TestViewer before(scene_, cache_, pool_);
-    before.stream().subscribe(0);
-    show(before, 0.3);
-    before.complete();
-    for (const auto& [id, tile] : before.tiles) held.push_back({id, tile.geometry.revision});
+/// A viewer who had everything, and one who comes after it on the same server.
+class ResumedStream : public ViewerStreamOfATree {
+ protected:
+  ResumedStream() {
+    before_.stream().subscribe(0);
+    show(before_, 0.3);
+    before_.complete();
   }
-  held[3].revision += 1'000'000;  // Never was, or not of this run.
-  held.push_back({{3, 7, 7, 0}, 5});
+
+  void subscribe_and_complete() {
+    after_.stream().subscribe(0);
+    show(after_, 0.6);
+    after_.complete();
+  }
+
+  TestViewer before_{scene_, cache_, pool_};
+  TestViewer after_{scene_, cache_, pool_};
+};
+
+TEST_F(ResumedStream, CostsWhatAChangeOfSettingsCosts) {
   const auto misses = cache_.miss_count();
-  auto stream = ViewerStream::create(scene_, cache_, pool_, [] {});
-  stream->resume(held);
-  stream->subscribe(0);
-  stream->set_plan(plan_with_alpha(*scene_, 0.6));
-  std::map<FrameKind, std::vector<protocol::TileFrameHeader>> frames;
-  while (!stream->take_complete()) {
-    wait_until_idle(pool_);
-    while (const auto frame = stream->next_frame(0)) {
-      std::vector<std::byte> message(frame->header.begin(), frame->header.end());
-      if (frame->payload) message.insert(message.end(), frame->payload->begin(), frame->payload->end());
-      const auto header = protocol::decoded_frame(message).value().header;
-      frames[header.kind].push_back(header);
-      stream->acknowledge(header.sequence, 0);
-    }
+  EXPECT_EQ(after_.resume(before_, before_.claims()), 21U);
+  subscribe_and_complete();
+  EXPECT_EQ(after_.frames.size(), 17U) << "the root for a quick answer, and the sixteen leaves";
+  EXPECT_EQ(after_.count(FrameKind::Colours), 17U);
+  EXPECT_EQ(cache_.miss_count() - misses, 17U) << "colours alone are made";
+  show(before_, 0.6);
+  before_.complete();
+  EXPECT_EQ(drawn(after_), drawn(before_));
+  for (const auto& id : drawn(after_)) EXPECT_EQ(after_.tiles.at(id).colours, before_.tiles.at(id).colours);
+}
+
+TEST_F(ResumedStream, ReplacesWhatIsNotCurrentAndRemovesWhatIsGone) {
+  auto claims = before_.claims();
+  const protocol::TileId unknown = claims[2].tile;
+  const protocol::TileId mistaken = claims[3].tile;
+  claims[2].revision += 1'000'000;          // Never was.
+  claims[3].revision = claims[4].revision;  // Of another tile.
+  claims.push_back({{3, 7, 7, 0}, 5});
+  before_.tiles[{3, 7, 7, 0}] = {};
+  EXPECT_EQ(after_.resume(before_, claims), 19U);
+  subscribe_and_complete();
+  std::set<protocol::TileId> replaced;
+  std::set<protocol::TileId> removed;
+  for (const auto& frame : after_.frames) {
+    if (frame.kind == FrameKind::Geometry) replaced.insert(frame.tile);
+    if (frame.kind == FrameKind::Remove) removed.insert(frame.tile);
   }
-  stream->close();
-  ASSERT_EQ(frames[FrameKind::Geometry].size(), 1U);
-  EXPECT_EQ(frames[FrameKind::Geometry][0].tile, held[3].tile);
-  EXPECT_EQ(frames[FrameKind::Colours].size(), 21U);
-  for (const auto& header : frames[FrameKind::Colours]) {
-    const auto known =
-        std::find_if(held.begin(), held.end(), [&](const auto& tile) { return tile.tile == header.tile; });
-    ASSERT_NE(known, held.end());
-    if (header.tile == held[3].tile) continue;
-    EXPECT_EQ(header.revision, known->revision);
-  }
-  // The one that is gone, and the one whose claimed revision is newer than any there is.
-  ASSERT_EQ(frames[FrameKind::Remove].size(), 2U);
-  EXPECT_EQ(frames[FrameKind::Remove][0].tile, (protocol::TileId{3, 7, 7, 0}));
-  EXPECT_EQ(frames[FrameKind::Remove][1].tile, held[3].tile);
-  EXPECT_EQ(cache_.miss_count() - misses, 21U) << "colours alone";
+  EXPECT_EQ(replaced, (std::set{unknown, mistaken}));
+  // What takes the place of a revision that is newer than any cannot be newer: removed first.
+  EXPECT_EQ(removed, (std::set{unknown, protocol::TileId{3, 7, 7, 0}}));
+  EXPECT_EQ(drawn(after_).size(), 16U);
+  for (const auto& id : drawn(after_)) EXPECT_EQ(after_.tiles.at(id).generation, 1U);
+}
+
+TEST_F(ResumedStream, SendsEverythingWhenNothingIsCurrent) {
+  StreamQuality quality = after_.stream().quality();
+  quality.position_step_m = lattice_step(0.01);
+  after_.stream().set_quality(quality);
+  EXPECT_EQ(after_.resume(before_, before_.claims()), 0U) << "on another lattice";
+  subscribe_and_complete();
+  EXPECT_EQ(after_.count(FrameKind::Geometry), 21U);
+  EXPECT_EQ(after_.count(FrameKind::Remove), 0U);
+  expect_picture(after_, *scene_, 0.6);
+}
+
+TEST_F(ResumedStream, DoesNotTakeTilesOfAnotherSceneForItsOwn) {
+  const auto next = scene_of(testing::quadtree_tiles(3, 40), 2);
+  TestViewer viewer(next, cache_, pool_);
+  EXPECT_EQ(viewer.resume(before_, before_.claims()), 0U);
+  viewer.stream().subscribe(0);
+  viewer.stream().set_plan(plan_with_alpha(*next, 0.6));
+  viewer.complete();
+  expect_picture(viewer, *next, 0.6);
+}
+
+TEST_F(ResumedStream, IsTakenUpByACacheThatKeptNothing) {
+  FrameCache tiny(0);
+  TestViewer before(scene_, tiny, pool_);
+  TestViewer after(scene_, tiny, pool_);
+  before.stream().subscribe(0);
+  show(before, 0.3);
+  before.complete();
+  EXPECT_EQ(after.resume(before, before.claims()), 21U);
+  after.stream().subscribe(0);
+  show(after, 0.6);
+  after.complete();
+  EXPECT_EQ(after.count(FrameKind::Geometry), 0U);
+}
+
+TEST_F(ResumedStream, KeepsToTheLimitOfVertices) {
+  constexpr std::uint64_t kTileVertices = 40 * 40;
+  TestViewer viewer(scene_, cache_, pool_, {.held_vertices = 14 * kTileVertices});
+  viewer.stream().set_camera(camera_over(0.5F, 0.5F, 0.5F));
+  EXPECT_EQ(viewer.resume(before_, before_.claims()), 21U);
+  viewer.stream().subscribe(0);
+  show(viewer, 0.6);
+  viewer.complete();
+  EXPECT_LE(viewer.tiles.size(), 14U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 0U);
+}
+
+TEST_F(ResumedStream, WhileFramesFlowNothingIsTakenUp) {
+  after_.stream().subscribe(0);
+  EXPECT_EQ(after_.stream().resume(before_.claims()), 0U);
+  show(after_, 0.6);
+  after_.complete();
+  expect_picture(after_, *scene_, 0.6);
 }
 
 TEST_F(ViewerStreamOfATree, TellsTheAccuracyOnTheScreen) {

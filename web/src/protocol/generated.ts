@@ -76,6 +76,7 @@ export interface ProtocolDefinitions {
   QualityState: QualityState;
   RangeChange: RangeChange;
   RangeMode: RangeMode;
+  ResumeRequest: ResumeRequest;
   RpcError: RpcError;
   RpcErrorData: RpcErrorData;
   RpcFailure: RpcFailure;
@@ -93,6 +94,7 @@ export interface ProtocolDefinitions {
   StreamAck: StreamAck;
   StreamComplete: StreamComplete;
   StreamStats: StreamStats;
+  SubscribeReply: SubscribeReply;
   SubscribeRequest: SubscribeRequest;
   Vector3: Vector3;
 }
@@ -422,6 +424,19 @@ export interface QualityReply {
   quality: QualityState;
 }
 /**
+ * Tiles that the client still has, with colours, from an earlier connection.
+ */
+export interface ResumeRequest {
+  /**
+   * Of the hello of that connection.
+   */
+  session_id: string;
+  /**
+   * [level (0..255), x, y, z, revision (from 1)] of each.
+   */
+  tiles: number[][];
+}
+/**
  * A refusal; a refused request changes nothing.
  */
 export interface RpcError {
@@ -549,6 +564,15 @@ export interface StreamStats {
   accuracy: StreamAccuracy;
 }
 /**
+ * Result of scene.subscribe.
+ */
+export interface SubscribeReply {
+  /**
+   * There when the request had resume: how many of the claimed tiles are current and are not sent again.
+   */
+  resumed_tiles?: number;
+}
+/**
  * Params of scene.subscribe.
  */
 export interface SubscribeRequest {
@@ -564,4 +588,18 @@ export interface SubscribeRequest {
    * How colours are written: none = frames of kind 2 (r, g, b), subtract_green = kind 6 (g and r - g, b - g).
    */
   colour_transform?: "none" | "subtract_green";
+  resume?: ResumeRequest1;
+}
+/**
+ * Tiles that the client still has, with colours, from an earlier connection.
+ */
+export interface ResumeRequest1 {
+  /**
+   * Of the hello of that connection.
+   */
+  session_id: string;
+  /**
+   * [level (0..255), x, y, z, revision (from 1)] of each.
+   */
+  tiles: number[][];
 }
