@@ -10,11 +10,12 @@ std::shared_ptr<const SceneSnapshot> SceneStore::current() const {
 }
 
 std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
-                                                         LevelsOfDetail levels) {
+                                                         LevelsOfDetail levels, const Listener& before) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   const std::uint32_t revision = previous ? previous->revision() + 1 : 1;
   const auto snapshot = SceneSnapshot::build(std::move(mesh), revision, pool, kLeafVertexCount, levels);
+  if (before) before(snapshot);
   std::vector<std::shared_ptr<Listener>> listeners;
   {
     const std::lock_guard lock(mutex_);
