@@ -30,4 +30,18 @@ double ColourCost::bytes_per_vertex(int colour_bits) const {
   return bytes_per_vertex_[static_cast<std::size_t>(std::clamp(colour_bits, 4, 8))];
 }
 
+QualityPoint first_answer(const StreamQuality& quality, double rate_bytes_per_s, double round_trip_s,
+                          const ColourCost& cost,
+                          const std::function<std::uint64_t(double pixel_error)>& target_vertex_count) {
+  QualityPoint answer{.pixel_error_factor = 1, .colour_bits = quality.colour_bits};
+  if (!quality.automatic || rate_bytes_per_s <= 0) return answer;
+  for (const QualityPoint& point : quality_frontier()) {
+    answer = {point.pixel_error_factor, std::min(point.colour_bits, quality.colour_bits)};
+    const double bytes = static_cast<double>(target_vertex_count(quality.pixel_error * answer.pixel_error_factor)) *
+                         cost.bytes_per_vertex(answer.colour_bits);
+    if ((bytes / rate_bytes_per_s + round_trip_s) * 1e3 <= quality.latency_target_ms) break;
+  }
+  return answer;
+}
+
 }  // namespace spectra::server

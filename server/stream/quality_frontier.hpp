@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <span>
 
 #include "protocol/tile_frame.hpp"
+#include "server/stream/viewer_stream.hpp"
 
 namespace spectra::server {
 
@@ -30,5 +33,12 @@ class ColourCost {
  private:
   std::array<double, 9> bytes_per_vertex_;
 };
+
+/// The point at which a change of the settings is answered first: in automatic quality the finest that is expected to arrive
+/// within the latency target at this rate (the cheapest when none is), else, or while the rate is unknown (0), full
+/// quality. `target_vertex_count` tells how many vertices are to be coloured at a pixel error.
+QualityPoint first_answer(const StreamQuality& quality, double rate_bytes_per_s, double round_trip_s,
+                          const ColourCost& cost,
+                          const std::function<std::uint64_t(double pixel_error)>& target_vertex_count);
 
 }  // namespace spectra::server

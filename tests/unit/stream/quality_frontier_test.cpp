@@ -32,5 +32,35 @@ TEST(ColourCost, LearnsFromWhatIsSent) {
   EXPECT_EQ(cost.bytes_per_vertex(8), before) << "a tiny tile is mostly its fixed part";
 }
 
+std::uint64_t vertices_at(double pixel_error) {
+  return static_cast<std::uint64_t>(1'000'000 / pixel_error);
+}
+
+TEST(FirstAnswer, IsInFullWhenNothingElseIsAskedForOrKnown) {
+  StreamQuality quality;
+  EXPECT_EQ(first_answer(quality, 1e3, 1, ColourCost(), vertices_at), (QualityPoint{1, 8}));
+  quality.automatic = true;
+  quality.colour_bits = 7;
+  EXPECT_EQ(first_answer(quality, 0, 0, ColourCost(), vertices_at), (QualityPoint{1, 7})) << "rate not known";
+}
+
+TEST(FirstAnswer, IsTheFinestThatArrivesInTime) {
+  StreamQuality quality;
+  quality.automatic = true;
+  const ColourCost cost;
+  const auto rate_for = [&](const QualityPoint& point) {
+    return cost.bytes_per_vertex(point.colour_bits) * static_cast<double>(vertices_at(point.pixel_error_factor)) / 0.2;
+  };
+  for (const QualityPoint& point : quality_frontier()) {
+    EXPECT_EQ(first_answer(quality, rate_for(point) * 1.001, 0, cost, vertices_at), point);
+    if (point != quality_frontier().back()) {
+      EXPECT_NE(first_answer(quality, rate_for(point) * 1.001, 0.1, cost, vertices_at), point) << "a longer way";
+    }
+  }
+  EXPECT_EQ(first_answer(quality, 1, 10, cost, vertices_at), quality_frontier().back());
+  quality.colour_bits = 5;
+  EXPECT_EQ(first_answer(quality, rate_for({1, 5}) * 1.001, 0, cost, vertices_at), (QualityPoint{1, 5}));
+}
+
 }  // namespace
 }  // namespace spectra::server

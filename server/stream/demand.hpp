@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "fusion/fusion_plan.hpp"
+#include "server/stream/frame_cache.hpp"
+
+namespace spectra::server {
+
+/// What one viewer is to be shown, as a job needs it: the settings in force. An epoch rises with each change that makes
+/// frames of that kind stale; 0 stands for none.
+struct Demand {
+  /// Older than every epoch of a stream: of colours that the viewer has from an earlier connection.
+  static constexpr std::uint64_t kEarlierColourEpoch = 1;
+
+  std::uint64_t geometry_epoch = 1;
+  std::uint64_t colour_epoch = kEarlierColourEpoch + 1;
+  float position_step_m = 0;
+  int encoder_speed = 7;
+  int colour_bits = 8;
+  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
+  std::shared_ptr<const fusion::FusionPlan> plan;  ///< Null before there are settings.
+  std::shared_ptr<const PlanIdentity> plan_identity;
+
+  GeometryKey geometry_key(const std::shared_ptr<const Tile>& tile) const {
+    return {Identity(tile), position_step_m, encoder_speed};
+  }
+  ColourKey colour_key(const EncodedTile& geometry) const {
+    return {geometry.revision, plan_identity, colour_bits, colour_transform};
+  }
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,44 @@
+#include "server/stream/screen_accuracy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace spectra::server {
+
+ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<bool>& is_drawable,
+                               const std::optional<Camera>& camera, float position_step_m) {
+  const auto& nodes = tree.nodes();
+  std::vector<bool> is_covered(nodes.size());  // By itself or by its children.
+  const auto is_replaced = [&](std::size_t index) {
+    const auto& children = nodes[index].children;
+    return !children.empty() &&
+           std::all_of(children.begin(), children.end(), [&](std::size_t child) { return is_covered[child]; });
+  };
+  for (std::size_t index = nodes.size(); index-- > 0;) {
+    is_covered[index] = is_drawable[index] || is_replaced(index);
+  }
+  ScreenAccuracy accuracy;
+  std::vector<bool> is_passed(nodes.size());  // Its children are drawn in its place.
+  for (std::size_t index = 0; index < nodes.size(); ++index) {
+    const ViewTree::Node& node = nodes[index];
+    if (!is_covered[index] || (node.parent && !is_passed[*node.parent])) continue;
+    if (is_replaced(index)) {
+      is_passed[index] = true;
+      continue;
+    }
+    if (camera && !may_be_in_view(*camera, node.bounds)) continue;
+    const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+    // Each of three axes may be off by half a step.
+    const double rounding_m = static_cast<double>(position_step_m) / 2 * std::sqrt(3.0);
+    accuracy.position_mm = std::max(accuracy.position_mm, (error_m + rounding_m) * 1e3);
+    if (camera) {
+      const double pixels =
+          std::min(screen_error(*camera, node.bounds, error_m), static_cast<double>(camera->viewport[1]));
+      accuracy.pixel_error = std::max(accuracy.pixel_error, pixels);
+    }
+  }
+  return accuracy;
+}
+
+}  // namespace spectra::server

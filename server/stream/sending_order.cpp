@@ -1,0 +1,56 @@
+#include "server/stream/sending_order.hpp"
+
+namespace spectra::server {
+
+void SendingOrder::choose(ViewerTiles& tiles, const std::vector<SelectedTile>& selected, double most_preview_vertices) {
+  ++choice_count_;
+  for (const auto& slot : tiles.slots()) slot->is_wanted = false;
+  slots_.clear();
+  for (const SelectedTile& tile : selected) {
+    const auto& slot = tiles.slots()[tile.node];
+    slot->is_wanted = true;
+    slot->is_target = tile.is_target;
+    slot->last_wanted = choice_count_;
+    slots_.push_back(slot);
+  }
+  for (const auto& slot : tiles.slots()) {
+    if (!slot->is_wanted) tiles.put_down(*slot);
+  }
+  choose_previews(tiles.tree(), most_preview_vertices);
+  rewind();
+}
+
+void SendingOrder::choose_previews(const ViewTree& tree, double most_vertices) {
+  double preview_vertices = 0;
+  std::size_t index = 0;
+  while (index < slots_.size()) {
+    const auto level = slots_[index]->tile->id.level;
+    std::size_t end = index;
+    for (; end < slots_.size() && slots_[end]->tile->id.level == level; ++end) {
+      if (!slots_[end]->is_target) preview_vertices += static_cast<double>(slots_[end]->tile->positions.size());
+    }
+    for (; index < end; ++index) {
+      slots_[index]->is_preview = !tree.nodes()[slots_[index]->node].parent || preview_vertices <= most_vertices;
+    }
+  }
+}
+
+void SendingOrder::clear() {
+  slots_.clear();
+  rewind();
+}
+
+TileSlot* SendingOrder::head(const ViewerTiles& tiles, const Demand& demand) {
+  while (head_ < slots_.size() && tiles.is_satisfied(*slots_[head_], demand)) ++head_;
+  return head_ < slots_.size() ? slots_[head_].get() : nullptr;
+}
+
+std::uint64_t target_vertex_count(const ViewTree& tree, const std::vector<SelectedTile>& selected) {
+  std::uint64_t count = 0;
+  for (const SelectedTile& tile : selected) {
+    if (tile.is_target) count += tree.nodes()[tile.node].tile->positions.size();
+  }
+  return count;
+}
+
+}  // namespace spectra::server

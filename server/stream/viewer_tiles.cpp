@@ -1,0 +1,188 @@
+#include "server/stream/viewer_tiles.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace spectra::server {
+
+using protocol::TileFrameHeader;
+using protocol::TileId;
+
+void TileSlot::forget_held() {
+  held_revision = 0;
+  held_name = 0;
+  held_vertex_count = 0;
+  held_geometry_epoch = 0;
+  held_colour_epoch = 0;
+}
+
+void ViewerTiles::adopt(const SceneSnapshot& scene) {
+  tree_ = ViewTree(scene);
+  std::map<TileId, std::shared_ptr<TileSlot>> known_slots;
+  for (auto& slot : slots_) known_slots.emplace(slot->tile->id, slot);
+  slots_.clear();
+  for (std::size_t node = 0; node < tree_.nodes().size(); ++node) {
+    const auto& tile = tree_.nodes()[node].tile;
+    auto slot = std::make_shared<TileSlot>();
+    if (const auto known = known_slots.find(tile->id); known != known_slots.end()) {
+      if (known->second->tile == tile) {
+        slot = known->second;
+      } else {
+        slot->held_revision = known->second->held_revision;
+        slot->held_name = known->second->held_name;
+        abandon(*known->second);
+      }
+      known_slots.erase(known);
+    }
+    slot->tile = tile;
+    slot->node = node;
+    slots_.push_back(std::move(slot));
+  }
+  for (const auto& [id, slot] : known_slots) {
+    remove_from_viewer(*slot);
+    abandon(*slot);
+  }
+}
+
+void ViewerTiles::clear() {
+  for (const auto& slot : slots_) slot->is_gone = true;
+  slots_.clear();
+  removals_.clear();
+  tree_ = {};
+}
+
+void ViewerTiles::make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours) {
+  slot.work = TileSlot::Work::Ready;
+  slot.geometry = std::move(geometry);
+  slot.colours = std::move(colours);
+  prepared_bytes_ += prepared_size(slot);
+}
+
+void ViewerTiles::put_down(TileSlot& slot) {
+  if (slot.work != TileSlot::Work::Ready) return;
+  prepared_bytes_ -= prepared_size(slot);
+  slot.work = TileSlot::Work::Idle;
+  slot.geometry = nullptr;
+  slot.colours = nullptr;
+}
+
+void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch) {
+  prepared_bytes_ -= slot.geometry->payload->size();
+  slot.held_name = name;
+  slot.held_revision = slot.geometry->revision;
+  slot.held_geometry_epoch = geometry_epoch;
+  slot.held_colour_epoch = 0;
+}
+
+std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
+  return slot.colours->size() + (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
+}
+
+bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const {
+  if (slot.failed_geometry_epoch == demand.geometry_epoch) return true;
+  if (slot.held_geometry_epoch == demand.geometry_epoch &&
+      (slot.held_colour_epoch == demand.colour_epoch || slot.failed_colour_epoch == demand.colour_epoch)) {
+    return true;
+  }
+  return !slot.is_target && !slot.is_preview && slot.is_drawable() && are_children_drawable(slot);
+}
+
+bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return std::all_of(children.begin(), children.end(),
+                     [this](std::size_t child) { return slots_[child]->is_drawable(); });
+}
+
+std::uint32_t ViewerTiles::resume(std::span<const ResumedTile> claims, const Demand& demand,
+                                  const FrameCache::State& cache) {
+  std::map<TileId, TileSlot*> slot_of;
+  for (const auto& slot : slots_) slot_of.emplace(slot->tile->id, slot.get());
+  std::set<TileId> seen;
+  std::uint32_t current_count = 0;
+  for (const ResumedTile& claim : claims) {
+    if (claim.revision == 0 || !seen.insert(claim.tile).second) continue;
+    const auto known = slot_of.find(claim.tile);
+    if (known == slot_of.end()) {
+      push_removal(claim.tile, claim.revision);
+    } else if (hold_resumed(*known->second, claim.revision, demand, cache)) {
+      ++current_count;
+    }
+  }
+  if (current_count == 0) forget_all_held();
+  return current_count;
+}
+
+// True when that geometry is the one in force. Otherwise it is held under its name alone, so that it is replaced.
+bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand,
+                               const FrameCache::State& cache) {
+  put_down(slot);
+  slot.forget_held();
+  slot.held_name = revision;
+  if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
+  slot.held_revision = revision;
+  slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+  slot.held_geometry_epoch = demand.geometry_epoch;
+  slot.held_colour_epoch = Demand::kEarlierColourEpoch;
+  return true;
+}
+
+void ViewerTiles::forget_all_held() {
+  removals_.clear();
+  for (const auto& slot : slots_) {
+    put_down(*slot);
+    slot->forget_held();
+  }
+}
+
+void ViewerTiles::abandon(TileSlot& slot) {
+  put_down(slot);
+  slot.is_gone = true;
+}
+
+void ViewerTiles::push_removal(TileId tile, std::uint32_t revision) {
+  TileFrameHeader header;
+  header.kind = protocol::FrameKind::Remove;
+  header.tile = tile;
+  header.revision = revision;
+  removals_.push_back(header);
+}
+
+void ViewerTiles::remove_from_viewer(TileSlot& slot) {
+  if (slot.held_name != 0) push_removal(slot.tile->id, slot.held_name);
+  slot.forget_held();
+}
+
+void ViewerTiles::remove_surplus(std::uint64_t most_vertices) {
+  std::uint64_t held_vertices = 0;
+  std::vector<TileSlot*> unused;
+  for (const auto& slot : slots_) {
+    held_vertices += slot->is_wanted ? slot->tile->positions.size() : slot->held_vertex_count;
+    if (!slot->is_wanted && slot->held_vertex_count > 0) unused.push_back(slot.get());
+  }
+  if (held_vertices <= most_vertices) return;
+  std::sort(unused.begin(), unused.end(),
+            [](const TileSlot* a, const TileSlot* b) { return a->last_wanted < b->last_wanted; });
+  for (TileSlot* slot : unused) {
+    if (held_vertices <= most_vertices) break;
+    held_vertices -= slot->held_vertex_count;
+    remove_from_viewer(*slot);
+  }
+}
+
+void ViewerTiles::remove_outdated_beneath(const TileSlot& slot, const Demand& demand) {
+  for (const std::size_t child : tree_.nodes()[slot.node].children) {
+    TileSlot& outdated = *slots_[child];
+    if (outdated.held_name != 0 && outdated.held_colour_epoch != demand.colour_epoch) remove_from_viewer(outdated);
+    remove_outdated_beneath(outdated, demand);
+  }
+}
+
+TileFrameHeader ViewerTiles::take_removal() {
+  const TileFrameHeader header = removals_.front();
+  removals_.pop_front();
+  return header;
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "protocol/tile_frame.hpp"
+#include "server/stream/demand.hpp"
+#include "server/stream/view_selection.hpp"
+
+namespace spectra::server {
+
+/// What one viewer has and needs of one tile.
+struct TileSlot {
+  enum class Work {
+    Idle,     ///< Nobody is at it.
+    Busy,     ///< A job of this viewer encodes it.
+    Waiting,  ///< A job of another viewer encodes it.
+    Ready,    ///< `geometry` and `colours` answer the present demand.
+  };
+
+  std::shared_ptr<const Tile> tile;
+  std::size_t node = 0;  ///< In the tree.
+  bool is_gone = false;  ///< No longer part of the scene, or the stream has ended.
+
+  bool is_wanted = false;   ///< The camera asks for it, ...
+  bool is_target = false;   ///< ... as a tile to be drawn in the end, not only until its children are there.
+  bool is_preview = false;  ///< Coloured even when its children take its place.
+  std::uint64_t last_wanted = 0;
+
+  Work work = Work::Idle;
+  std::shared_ptr<const EncodedTile> geometry;  ///< While Ready.
+  Payload colours;                              ///< While Ready.
+
+  /// What was given out last; 0 = nothing. The name of a geometry is its revision on the wire: it rises with each
+  /// geometry of the tile, even when an encoding comes back that the viewer had before.
+  std::uint32_t held_revision = 0;
+  std::uint32_t held_name = 0;
+  std::uint32_t held_vertex_count = 0;
+  std::uint64_t held_geometry_epoch = 0;
+  std::uint64_t held_colour_epoch = 0;
+  std::uint64_t failed_geometry_epoch = 0;
+  std::uint64_t failed_colour_epoch = 0;
+
+  bool is_drawable() const { return held_geometry_epoch != 0 && held_colour_epoch != 0; }
+  void forget_held();
+};
+
+/// The tiles of the scene as one viewer has them: what is given out, what is prepared for it, and what it is to be told to
+/// remove. Knows nothing of when and why. Not thread-safe: the stream's lock is held.
+class ViewerTiles {
+ public:
+  /// The tiles of another scene. Those that both have stay as they are; of those that have changed the viewer holds
+  /// something outdated; those that are gone are removed.
+  void adopt(const SceneSnapshot& scene);
+  /// The end: nothing is left, and jobs that are under way find their slots gone.
+  void clear();
+
+  const ViewTree& tree() const { return tree_; }
+  /// One for each node of the tree.
+  const std::vector<std::shared_ptr<TileSlot>>& slots() const { return slots_; }
+
+  /// Ready with these frames.
+  void make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours);
+  /// Ready -> Idle; anything else stays as it is.
+  void put_down(TileSlot& slot);
+  /// The geometry of a Ready slot goes out under that name.
+  void give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch);
+  /// Bytes of all frames that are Ready and not given out.
+  std::size_t prepared_bytes() const { return prepared_bytes_; }
+
+  /// True when nothing is to be sent of the tile: it is as demanded, cannot be encoded, or is replaced by its children.
+  bool is_satisfied(const TileSlot& slot, const Demand& demand) const;
+
+  /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume().
+  std::uint32_t resume(std::span<const ResumedTile> claims, const Demand& demand, const FrameCache::State& cache);
+  /// A viewer that starts from nothing.
+  void forget_all_held();
+
+  void remove_from_viewer(TileSlot& slot);
+  /// Removes tiles that are not wanted, the longest unwanted first, until the viewer holds at most so many vertices.
+  void remove_surplus(std::uint64_t most_vertices);
+  /// A viewer draws the children of a tile in its place when it has them all, whatever colours they have. Beneath a tile
+  /// that now shows newer colours than they do, and that is fine enough, they would stay in front of it for good.
+  void remove_outdated_beneath(const TileSlot& slot, const Demand& demand);
+
+  bool has_removals() const { return !removals_.empty(); }
+  /// The next remove frame; there is one.
+  protocol::TileFrameHeader take_removal();
+
+ private:
+  static std::size_t prepared_size(const TileSlot& slot);
+  bool are_children_drawable(const TileSlot& slot) const;
+  bool hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand, const FrameCache::State& cache);
+  void abandon(TileSlot& slot);
+  void push_removal(protocol::TileId tile, std::uint32_t revision);
+
+  ViewTree tree_;
+  std::vector<std::shared_ptr<TileSlot>> slots_;
+  std::deque<protocol::TileFrameHeader> removals_;
+  std::size_t prepared_bytes_ = 0;
+};
+
+}  // namespace spectra::server
