@@ -22,7 +22,10 @@ struct NetLimits {
   std::chrono::milliseconds header_timeout{9'500};
   /// A write may stand still for this long; with two ticks more, within which it is noticed, that is 15 s.
   std::chrono::milliseconds write_timeout{13'000};
-  std::chrono::milliseconds ping_interval{10'000};
+  std::chrono::milliseconds ping_interval{4'000};
+  /// A ping may go unanswered for this long while no waiting write moves either: buffers of the two kernels can take all
+  /// that a viewer is owed, so that writes alone do not tell who never reads. With the interval and two ticks that is 15 s.
+  std::chrono::milliseconds pong_timeout{9'000};
   std::chrono::milliseconds idle_timeout{120'000};  ///< Neither a byte read nor a byte written for this long.
   std::chrono::milliseconds close_timeout{2'000};   ///< For the peer to answer a polite close.
   std::chrono::milliseconds stop_timeout{4'000};    ///< From stop() until everything is cancelled.

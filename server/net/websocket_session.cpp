@@ -150,6 +150,7 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
   std::uint64_t written_bytes = 0;
   std::uint64_t moved_bytes = 0;
   auto last_write_progress = Clock::now();
+  auto last_reading = Clock::now();
   auto last_move = Clock::now();
   auto last_ping = Clock::now();
   while (!is_ended_) {
@@ -158,15 +159,20 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
     if (is_ended_) co_return;
     const auto now = Clock::now();
     if (!is_writing_ || counted.written_bytes() != written_bytes) {
+      // Only a write that waited says that the peer reads; the kernel takes others as they come.
+      if (is_writing_) last_reading = now;
       written_bytes = counted.written_bytes();
       last_write_progress = now;
     }
+    if (!is_pinging_) last_reading = now;
     if (counted.read_bytes() + counted.written_bytes() != moved_bytes) {
       moved_bytes = counted.read_bytes() + counted.written_bytes();
       last_move = now;
     }
     if (now - last_write_progress >= limits.write_timeout) {
       end(true, "it takes no bytes");
+    } else if (now - last_reading >= limits.pong_timeout) {
+      end(true, "it answers no ping");
     } else if (now - last_move >= limits.idle_timeout) {
       end(true, "it is silent");
     } else if (now >= close_deadline_) {

@@ -257,9 +257,30 @@ TEST_F(WebSocketTest, CutsAViewerThatTalksButNeverReads) {
   EXPECT_GE(server_->metrics().viewers_cut, 1U);
 }
 
+// All that he is sent fits the buffers of the kernels, so that no write ever waits for him.
+TEST_F(WebSocketTest, CutsAViewerThatTalksAndIsOwedLittleButNeverReads) {
+  auto options = quick_options();
+  options.limits.ping_interval = milliseconds(50);
+  options.limits.pong_timeout = milliseconds(250);
+  start(std::move(options));
+  record_.frames_left = 2;
+  record_.frame_size_bytes = 10'000;
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open());
+  const auto begin = std::chrono::steady_clock::now();
+  while (record_.closed == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(10)) {
+    viewer.client().send_some(masked_frame(1, "still here"));
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  EXPECT_EQ(record_.closed, 1);
+  EXPECT_EQ(server_->metrics().viewers_cut, 1U);
+}
+
 TEST_F(WebSocketTest, KeepsAViewerThatReadsSlowlyAndSaysNothing) {
   auto options = quick_options();
   options.limits.write_timeout = milliseconds(800);
+  options.limits.ping_interval = milliseconds(100);
+  options.limits.pong_timeout = milliseconds(800);
   start(std::move(options));
   constexpr int kFrames = 4;
   record_.frame_size_bytes = 1'000'000;
@@ -292,6 +313,7 @@ TEST_F(WebSocketTest, CutsASilentPeer) {
 TEST_F(WebSocketTest, PingsAndMeasuresTheRoundTrip) {
   auto options = quick_options();
   options.limits.ping_interval = milliseconds(40);
+  options.limits.pong_timeout = milliseconds(200);
   options.limits.idle_timeout = milliseconds(400);
   start(std::move(options));
   RawWebSocket viewer(port());
