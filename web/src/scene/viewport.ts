@@ -308,7 +308,8 @@ export class Viewport {
   #replied(reply: RenderReply): void {
     switch (reply.kind) {
       case 'drawn':
-        this.#drawn = reply.number;
+        // Of two pictures the GPU may be found to be through with the later one first.
+        this.#drawn = Math.max(this.#drawn, reply.number);
         this.#gpu = reply.gpu;
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
