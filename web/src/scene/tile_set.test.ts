@@ -197,6 +197,17 @@ describe('TileSet', () => {
     expect(tiles.progress(2)).toEqual({ current: 2, total: 2 });
   });
 
+  it('tells how far what is drawn and visible may be from the full mesh', () => {
+    const half_mm = 0.001 / Math.sqrt(3);
+    add(root, { child_mask: 0b11, geometric_error_m: 0.02, position_step_m: half_mm });
+    const all = () => true;
+    expect(tiles.drawnError_m(all)).toBeCloseTo(0.0205, 9);
+    add(childTile(root, 0), { geometric_error_m: 0, position_step_m: half_mm });
+    add(childTile(root, 1), { geometric_error_m: 0.003, position_step_m: half_mm });
+    expect(tiles.drawnError_m(all)).toBeCloseTo(0.0035, 9);
+    expect(tiles.drawnError_m(() => false)).toBeNull();
+  });
+
   it('gives every tile its own name', () => {
     const names = new Set([0, 1, 2, 3].flatMap((x) => [0, 1].map((y) => tileKey({ level: 2, x, y, z: 0 }))));
     expect(names.size).toBe(8);

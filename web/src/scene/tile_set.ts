@@ -1,4 +1,5 @@
 import type { DecodedGeometry, GeometrySummary } from '../decode/messages';
+import type { Vec3 } from '../protocol/messages';
 import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 
 /** What the drawing side keeps for one tile; the tile set owns it and disposes of it. */
@@ -14,6 +15,8 @@ interface Shown {
   drawable: Drawable;
   geometry: GeometrySummary;
   revision: number;
+  /** Farthest that its surface may be from the full mesh, metres. */
+  error_m: number;
   /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
   rank: number;
   /** The server that is or was connected knows that this geometry is held here. */
@@ -33,7 +36,7 @@ interface TileNode {
   child_mask: number;
   shown: Shown | null;
   /** Geometry whose colours have not come yet. */
-  waitingGeometry: { revision: number; geometry: DecodedGeometry } | null;
+  waitingGeometry: { revision: number; geometry: DecodedGeometry; error_m: number } | null;
   /** Colours whose geometry is not decoded yet. */
   waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
   /** Rank of the oldest colours that stand on the screen when the children are drawn in this tile's place; NOTHING when they cannot be. */
@@ -148,7 +151,9 @@ export class TileSet {
     this.#setChildMask(node, frame.child_mask);
     const { shown } = node;
     if (shown !== null && !this.#isStale(shown) && frame.revision < shown.revision) return;
-    node.waitingGeometry = { revision: frame.revision, geometry };
+    // Rounding moves a vertex by half a step along each of three axes at most.
+    const error_m = frame.geometric_error_m + (frame.position_step_m / 2) * Math.sqrt(3);
+    node.waitingGeometry = { revision: frame.revision, geometry, error_m };
     this.#join(node);
   }
 
@@ -219,6 +224,16 @@ export class TileSet {
       counts.triangles += shown.geometry.triangle_count;
     }
     return counts;
+  }
+
+  /** Farthest that what is drawn may be from the full mesh, of the tiles that `isVisible`; null when there are none. */
+  drawnError_m(isVisible: (centre: Vec3, radius: number) => boolean): number | null {
+    let largest: number | null = null;
+    for (const { shown } of this.#drawn) {
+      if (shown === null || shown.error_m <= (largest ?? -1)) continue;
+      if (isVisible(shown.geometry.centre, shown.geometry.radius)) largest = shown.error_m;
+    }
+    return largest;
   }
 
   /**
@@ -299,11 +314,11 @@ export class TileSet {
     } else if (waitingGeometry !== null && waitingGeometry.revision === revision) {
       node.waitingGeometry = null;
       node.waitingColours = null;
-      const { geometry } = waitingGeometry;
+      const { geometry, error_m } = waitingGeometry;
       checkLength(node, rgba, geometry.summary);
       shown?.drawable.dispose();
       const drawable = this.createDrawable(geometry, rgba);
-      node.shown = { drawable, geometry: geometry.summary, revision, rank, isKnownToServer: true };
+      node.shown = { drawable, geometry: geometry.summary, revision, error_m, rank, isKnownToServer: true };
       if (node.isDrawn) drawable.setVisible(true);
       this.#arrived(node);
     }

@@ -7,6 +7,7 @@ import type { GpuObjects, RenderCommand, RenderReply } from './render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
 import {
   Box3,
+  Frustum,
   MathUtils,
   Matrix4,
   PerspectiveCamera,
@@ -150,6 +151,20 @@ export class Viewport {
     const inverse = this.#camera.quaternion.clone().invert();
     const axis = (x: number, y: number, z: number): Vec3 => new Vector3(x, y, z).applyQuaternion(inverse).toArray();
     return { x: axis(1, 0, 0), y: axis(0, 1, 0), z: axis(0, 0, 1) };
+  }
+
+  /** Tells of a sphere (metres) whether any of it may be on the screen. */
+  visibility(): (centre: Vec3, radius: number) => boolean {
+    this.#camera.updateMatrixWorld();
+    const frustum = new Frustum().setFromProjectionMatrix(
+      new Matrix4().multiplyMatrices(this.#camera.projectionMatrix, this.#camera.matrixWorldInverse),
+    );
+    const sphere = new Sphere();
+    return (centre, radius) => {
+      sphere.center.set(...centre);
+      sphere.radius = radius;
+      return frustum.intersectsSphere(sphere);
+    };
   }
 
   setBackground(colour: string): void {

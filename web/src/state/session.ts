@@ -642,9 +642,9 @@ export class Session {
     store.now = now;
     this.#rateWindow = this.#rateWindow.filter(({ at }) => now - at < 2000);
     store.rate_bytes_per_s = this.#rateWindow.reduce((sum, { bytes }) => sum + bytes, 0) / 2;
-    if (store.behindSince !== null) {
-      store.progress = this.#progress();
-    }
+    if (store.behindSince !== null) store.progress = this.#progress();
+    const error_m = this.tiles.drawnError_m(this.viewport.visibility());
+    store.position_error_mm = error_m === null ? null : error_m * 1000;
   }
 
   #progress(): number {

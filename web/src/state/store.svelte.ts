@@ -82,6 +82,8 @@ export class Store {
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
   /** The position step that the server chose by itself. */
   baseStep_mm = $state<number | null>(null);
+  /** Farthest that what is on the screen may be from the full mesh. */
+  position_error_mm = $state<number | null>(null);
   camera = $state.raw<CameraPose | null>(null);
   axes = $state.raw<{ x: Vec3; y: Vec3; z: Vec3 }>({ x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] });
   upAxis = $state<UpAxis>('y');
@@ -103,5 +105,11 @@ export class Store {
   readonly viewMode = $derived<ViewMode>(this.hasThermal ? viewModeOf(this.fusion?.method ?? '') : 'visible');
   readonly connected = $derived(this.link.phase === 'open');
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
+  /** How exact what is on the screen now is. */
+  readonly accuracy = $derived(
+    this.position_error_mm === null
+      ? null
+      : { position_mm: this.position_error_mm, colour_levels: this.stats?.accuracy.colour_levels ?? null },
+  );
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
 }

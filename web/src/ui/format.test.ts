@@ -43,6 +43,6 @@ describe('Numbers', () => {
   it('say how exact the picture is', () => {
     expect(plain(accuracyWords({ position_mm: 2, colour_levels: 256 }))).toBe('within 2 mm, colours exact');
     expect(plain(accuracyWords({ position_mm: null, colour_levels: 64 }))).toBe('colours ±2 of 255');
-    expect(accuracyWords(undefined)).toBeNull();
+    expect(accuracyWords(null)).toBeNull();
   });
 });

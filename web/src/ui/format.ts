@@ -71,13 +71,11 @@ export function duration(seconds: number): string {
 }
 
 /** How exact the picture is, in words. */
-export function accuracyWords(
-  accuracy: { position_mm?: number | null; colour_levels?: number | null } | undefined,
-): string | null {
-  if (accuracy === undefined) return null;
+export function accuracyWords(accuracy: { position_mm: number | null; colour_levels: number | null } | null): string | null {
+  if (accuracy === null) return null;
   const parts: string[] = [];
-  if (accuracy.position_mm != null) parts.push(`within ${length(accuracy.position_mm / 1000)}`);
-  if (accuracy.colour_levels != null) {
+  if (accuracy.position_mm !== null) parts.push(`within ${length(accuracy.position_mm / 1000)}`);
+  if (accuracy.colour_levels !== null) {
     const off = accuracy.colour_levels >= 256 ? 0 : 128 / accuracy.colour_levels;
     parts.push(off === 0 ? 'colours exact' : `colours ±${figures(off, 2)} of 255`);
   }
