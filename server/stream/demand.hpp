@@ -19,6 +19,7 @@ struct Demand {
   float position_step_m = 0;
   int encoder_speed = 7;
   int colour_bits = 8;
+  int preview_colour_bits = 8;  ///< Of tiles that are drawn only until their children are there.
   protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
   std::shared_ptr<const fusion::FusionPlan> plan;  ///< Null before there are settings.
   std::shared_ptr<const PlanIdentity> plan_identity;
@@ -26,8 +27,9 @@ struct Demand {
   GeometryKey geometry_key(const std::shared_ptr<const Tile>& tile) const {
     return {Identity(tile), position_step_m, encoder_speed};
   }
-  ColourKey colour_key(const EncodedTile& geometry) const {
-    return {geometry.revision, plan_identity, colour_bits, colour_transform};
+  /// `bits` is one of the two above.
+  ColourKey colour_key(const EncodedTile& geometry, int bits) const {
+    return {geometry.revision, plan_identity, bits, colour_transform};
   }
 };
 

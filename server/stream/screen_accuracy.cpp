@@ -6,7 +6,7 @@
 
 namespace spectra::server {
 
-ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<bool>& is_drawable,
+ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<int>& colour_bits,
                                const std::optional<Camera>& camera, float position_step_m) {
   const auto& nodes = tree.nodes();
   std::vector<bool> is_covered(nodes.size());  // By itself or by its children.
@@ -16,7 +16,7 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<bool>& is
            std::all_of(children.begin(), children.end(), [&](std::size_t child) { return is_covered[child]; });
   };
   for (std::size_t index = nodes.size(); index-- > 0;) {
-    is_covered[index] = is_drawable[index] || is_replaced(index);
+    is_covered[index] = colour_bits[index] > 0 || is_replaced(index);
   }
   ScreenAccuracy accuracy;
   std::vector<bool> is_passed(nodes.size());  // Its children are drawn in its place.
@@ -28,6 +28,7 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<bool>& is
       continue;
     }
     if (camera && !may_be_in_view(*camera, node.bounds)) continue;
+    accuracy.colour_bits = std::min(accuracy.colour_bits, colour_bits[index]);
     const auto error_m = static_cast<double>(node.tile->geometric_error_m);
     // Each of three axes may be off by half a step.
     const double rounding_m = static_cast<double>(position_step_m) / 2 * std::sqrt(3.0);

@@ -8,6 +8,7 @@ void SendingOrder::choose(ViewerTiles& tiles, const std::vector<SelectedTile>& s
   slots_.clear();
   for (const SelectedTile& tile : selected) {
     const auto& slot = tiles.slots()[tile.node];
+    if (slot->is_target != tile.is_target) tiles.put_down(*slot);
     slot->is_wanted = true;
     slot->is_target = tile.is_target;
     slot->last_wanted = choice_count_;

@@ -13,7 +13,8 @@ namespace spectra::server {
 /// held.
 class SendingOrder {
  public:
-  /// A new order: marks the slots of `tiles` as wanted, target and preview, and puts down what is wanted no more.
+  /// A new order: marks the slots of `tiles` as wanted, target and preview, and puts down what is wanted no more or in
+  /// another part.
   ///
   /// Coarse tiles whose place is taken by finer ones are previews, coloured first for a quick answer: the tops always,
   /// further levels as long as all previews together have at most `most_preview_vertices`.

@@ -37,6 +37,10 @@ bool SendingWindow::admits(std::size_t size_bytes) const {
   return in_flight_bytes_ == 0 || in_flight_bytes_ + size_bytes <= this->size_bytes();
 }
 
+bool SendingWindow::admits_first_picture(std::size_t size_bytes) const {
+  return in_flight_bytes_ == 0 || in_flight_bytes_ + size_bytes <= ceiling_bytes_;
+}
+
 void SendingWindow::on_sent(std::uint32_t sequence, std::size_t size_bytes, double now_s) {
   if (in_flight_bytes_ == 0) delivered_s_ = now_s;  // The link was empty: time starts to count now.
   sent_.push_back({sequence, size_bytes, now_s, delivered_bytes_, delivered_s_, delivered_bytes_ < idle_until_bytes_});

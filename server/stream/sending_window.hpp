@@ -26,6 +26,8 @@ class SendingWindow {
   void set_ceiling(std::size_t bytes);
 
   bool admits(std::size_t size_bytes) const;
+  /// The same for a frame that goes at once, however little is known of the link: only the ceiling holds it back.
+  bool admits_first_picture(std::size_t size_bytes) const;
 
   /// `now_s` is a steady clock, the same as in on_acknowledged().
   void on_sent(std::uint32_t sequence, std::size_t size_bytes, double now_s);

@@ -11,7 +11,8 @@ namespace spectra::server {
 struct Encoding {
   std::shared_ptr<TileSlot> slot;
   std::shared_ptr<const Tile> tile;
-  Demand demand;                                          ///< When it was claimed.
+  Demand demand;  ///< When it was claimed, as is the next.
+  int colour_bits = 8;
   std::shared_ptr<const EncodedTile> geometry = nullptr;  ///< Null: it is to be made; else the colours for it.
   std::shared_ptr<const EncodedTile> made_geometry = nullptr;
   Payload made_colours = nullptr;

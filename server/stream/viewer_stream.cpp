@@ -30,6 +30,10 @@ constexpr std::size_t kPreparedBytes = 1u << 20;
 // answer, as long as that adds no more than this part to the whole.
 constexpr double kPreviewShare = 0.1;
 
+// Over a link that takes longer than the latency target for a whole answer, these coarse tiles have no more than so many
+// bits a channel: hard to tell from eight for the moment that they are seen, and a third to a half of the bytes less.
+constexpr int kPreviewColourBits = 6;
+
 std::size_t frame_size(const Payload& payload) {
   return protocol::kTileFrameHeaderSize + payload->size();
 }
@@ -183,12 +187,16 @@ class Stream final : public ViewerStream, public CacheWaiter {
       slot->held_geometry_epoch = demand_.geometry_epoch;
       slot->held_vertex_count = static_cast<std::uint32_t>(slot->geometry->input_of_decoded.size());
       std::optional<OutgoingFrame> frame;
-      if (slot->held_colour_epoch != demand_.colour_epoch) {
-        if (!window_.admits(frame_size(slot->colours))) return std::nullopt;
+      if (!slot->has_colours(demand_)) {
+        const bool is_first_picture = slot->held_colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
+        const std::size_t size_bytes = frame_size(slot->colours);
+        if (!window_.admits(size_bytes) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
+          return std::nullopt;
+        }
         auto header = header_of(*slot, protocol::colour_frame_kind(demand_.colour_transform));
         header.generation = generation_;
-        slot->held_colour_epoch = demand_.colour_epoch;
-        colour_cost_.learn(demand_.colour_bits, header.vertex_count, slot->colours->size());
+        tiles_.give_colours(*slot, demand_.colour_epoch);
+        colour_cost_.learn(slot->colour_bits, header.vertex_count, slot->colours->size());
         frame = given_out(header, slot->colours, now_s);
         if (slot->is_target && !is_refining_due()) tiles_.remove_outdated_beneath(*slot, demand_);
       }
@@ -227,10 +235,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
     stats.queued_bytes = window_.in_flight_bytes() + tiles_.prepared_bytes();
     stats.skipped_frames = skipped_frame_count_;
     stats.failed_tiles = failed_tile_count_;
-    stats.colour_levels = 1 << demand_.colour_bits;
-    std::vector<bool> is_drawable;
-    for (const auto& slot : tiles_.slots()) is_drawable.push_back(slot->is_drawable());
-    const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), is_drawable, camera_, demand_.position_step_m);
+    std::vector<int> colour_bits;
+    for (const auto& slot : tiles_.slots()) colour_bits.push_back(slot->is_drawable() ? slot->held_colour_bits : 0);
+    const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), colour_bits, camera_, demand_.position_step_m);
+    stats.colour_levels = 1 << std::min(accuracy.colour_bits, demand_.colour_bits);
     stats.position_mm = accuracy.position_mm;
     stats.pixel_error = accuracy.pixel_error;
     return stats;
@@ -328,6 +336,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const double bytes = vertices * colour_cost_.bytes_per_vertex(demand_.colour_bits);
     // No previews of what arrives at once anyway.
     const bool is_quick = rate > 0 && bytes / rate * 1e3 <= quality_.latency_target_ms;
+    const bool is_slow = rate > 0 && !is_quick;
+    demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
     order_.choose(tiles_, selected, is_quick ? 0 : kPreviewShare * vertices);
     tiles_.remove_surplus(limits_.held_vertices);
   }

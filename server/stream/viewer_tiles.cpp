@@ -16,6 +16,7 @@ void TileSlot::forget_held() {
   held_vertex_count = 0;
   held_geometry_epoch = 0;
   held_colour_epoch = 0;
+  held_colour_bits = 0;
 }
 
 void ViewerTiles::adopt(const SceneSnapshot& scene) {
@@ -53,10 +54,12 @@ void ViewerTiles::clear() {
   tree_ = {};
 }
 
-void ViewerTiles::make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours) {
+void ViewerTiles::make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours,
+                             int colour_bits) {
   slot.work = TileSlot::Work::Ready;
   slot.geometry = std::move(geometry);
   slot.colours = std::move(colours);
+  slot.colour_bits = colour_bits;
   prepared_bytes_ += prepared_size(slot);
 }
 
@@ -76,6 +79,11 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   slot.held_colour_epoch = 0;
 }
 
+void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
+  slot.held_colour_epoch = colour_epoch;
+  slot.held_colour_bits = slot.colour_bits;
+}
+
 std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
   return slot.colours->size() + (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
 }
@@ -83,7 +91,7 @@ std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
 bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const {
   if (slot.failed_geometry_epoch == demand.geometry_epoch) return true;
   if (slot.held_geometry_epoch == demand.geometry_epoch &&
-      (slot.held_colour_epoch == demand.colour_epoch || slot.failed_colour_epoch == demand.colour_epoch)) {
+      (slot.has_colours(demand) || slot.failed_colour_epoch == demand.colour_epoch)) {
     return true;
   }
   return !slot.is_target && !slot.is_preview && slot.is_drawable() && are_children_drawable(slot);
@@ -125,6 +133,7 @@ bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Dem
   slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
   slot.held_geometry_epoch = demand.geometry_epoch;
   slot.held_colour_epoch = Demand::kEarlierColourEpoch;
+  slot.held_colour_bits = demand.colour_bits;
   return true;
 }
 

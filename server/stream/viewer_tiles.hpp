@@ -34,6 +34,7 @@ struct TileSlot {
   Work work = Work::Idle;
   std::shared_ptr<const EncodedTile> geometry;  ///< While Ready.
   Payload colours;                              ///< While Ready.
+  int colour_bits = 0;                          ///< Of `colours`.
 
   /// What was given out last; 0 = nothing. The name of a geometry is its revision on the wire: it rises with each
   /// geometry of the tile, even when an encoding comes back that the viewer had before.
@@ -42,9 +43,17 @@ struct TileSlot {
   std::uint32_t held_vertex_count = 0;
   std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
+  int held_colour_bits = 0;
   std::uint64_t failed_geometry_epoch = 0;
   std::uint64_t failed_colour_epoch = 0;
 
+  int wanted_colour_bits(const Demand& demand) const {
+    return is_target ? demand.colour_bits : demand.preview_colour_bits;
+  }
+  /// Holds the newest colours, as exact as the tile's part in the picture asks for.
+  bool has_colours(const Demand& demand) const {
+    return held_colour_epoch == demand.colour_epoch && held_colour_bits >= wanted_colour_bits(demand);
+  }
   bool is_drawable() const { return held_geometry_epoch != 0 && held_colour_epoch != 0; }
   void forget_held();
 };
@@ -64,11 +73,13 @@ class ViewerTiles {
   const std::vector<std::shared_ptr<TileSlot>>& slots() const { return slots_; }
 
   /// Ready with these frames.
-  void make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours);
+  void make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours, int colour_bits);
   /// Ready -> Idle; anything else stays as it is.
   void put_down(TileSlot& slot);
   /// The geometry of a Ready slot goes out under that name.
   void give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch);
+  /// The colours of a Ready slot go out.
+  void give_colours(TileSlot& slot, std::uint64_t colour_epoch);
   /// Bytes of all frames that are Ready and not given out.
   std::size_t prepared_bytes() const { return prepared_bytes_; }
 

@@ -12,10 +12,10 @@ namespace {
 /// Twenty-one tiles with errors of 0.4, 0.2 and 0 m; the root is node 0, its first child node 1.
 class ScreenAccuracyTest : public ::testing::Test {
  protected:
-  ScreenAccuracy of(const std::vector<bool>& is_drawable, const std::optional<Camera>& camera = std::nullopt) const {
-    return screen_accuracy(tree_, is_drawable, camera, kStep);
+  ScreenAccuracy of(const std::vector<int>& colour_bits, const std::optional<Camera>& camera = std::nullopt) const {
+    return screen_accuracy(tree_, colour_bits, camera, kStep);
   }
-  std::vector<bool> none() const { return std::vector<bool>(tree_.nodes().size()); }
+  std::vector<int> none() const { return std::vector<int>(tree_.nodes().size()); }
 
   static constexpr float kStep = 0.001953125F;
   static inline const double kRoundingMm = 1e3 * static_cast<double>(kStep) / 2 * std::sqrt(3.0);
@@ -23,33 +23,42 @@ class ScreenAccuracyTest : public ::testing::Test {
 };
 
 TEST_F(ScreenAccuracyTest, IsThatOfTheCoarsestTileThatIsDrawn) {
-  auto is_drawable = none();
-  EXPECT_EQ(of(is_drawable).position_mm, 0) << "nothing can be drawn";
-  is_drawable[0] = true;
-  EXPECT_NEAR(of(is_drawable).position_mm, 400 + kRoundingMm, 1e-4);
+  auto colour_bits = none();
+  EXPECT_EQ(of(colour_bits).position_mm, 0) << "nothing can be drawn";
+  colour_bits[0] = 8;
+  EXPECT_NEAR(of(colour_bits).position_mm, 400 + kRoundingMm, 1e-4);
   const auto& quarters = tree_.nodes()[0].children;
-  for (const std::size_t quarter : quarters) is_drawable[quarter] = true;
-  EXPECT_NEAR(of(is_drawable).position_mm, 200 + kRoundingMm, 1e-4);
-  is_drawable[quarters.back()] = false;
-  EXPECT_NEAR(of(is_drawable).position_mm, 400 + kRoundingMm, 1e-4) << "one child is missing";
-  for (const std::size_t leaf : tree_.nodes()[quarters.back()].children) is_drawable[leaf] = true;
-  EXPECT_NEAR(of(is_drawable).position_mm, 200 + kRoundingMm, 1e-4) << "its own children stand in for it";
+  for (const std::size_t quarter : quarters) colour_bits[quarter] = 8;
+  EXPECT_NEAR(of(colour_bits).position_mm, 200 + kRoundingMm, 1e-4);
+  colour_bits[quarters.back()] = 0;
+  EXPECT_NEAR(of(colour_bits).position_mm, 400 + kRoundingMm, 1e-4) << "one child is missing";
+  for (const std::size_t leaf : tree_.nodes()[quarters.back()].children) colour_bits[leaf] = 8;
+  EXPECT_NEAR(of(colour_bits).position_mm, 200 + kRoundingMm, 1e-4) << "its own children stand in for it";
+}
+
+TEST_F(ScreenAccuracyTest, ColoursAreThoseOfWhatIsDrawn) {
+  auto colour_bits = none();
+  EXPECT_EQ(of(colour_bits).colour_bits, 8);
+  colour_bits[0] = 6;
+  EXPECT_EQ(of(colour_bits).colour_bits, 6);
+  for (const std::size_t quarter : tree_.nodes()[0].children) colour_bits[quarter] = 8;
+  EXPECT_EQ(of(colour_bits).colour_bits, 8) << "the root is not drawn any more";
 }
 
 TEST_F(ScreenAccuracyTest, CountsWhatIsInView) {
-  auto is_drawable = none();
-  is_drawable[0] = true;
-  for (const std::size_t quarter : tree_.nodes()[0].children) is_drawable[quarter] = true;
-  for (const std::size_t leaf : tree_.nodes()[tree_.nodes()[0].children[0]].children) is_drawable[leaf] = true;
+  auto colour_bits = none();
+  colour_bits[0] = 8;
+  for (const std::size_t quarter : tree_.nodes()[0].children) colour_bits[quarter] = 8;
+  for (const std::size_t leaf : tree_.nodes()[tree_.nodes()[0].children[0]].children) colour_bits[leaf] = 8;
   const Bounds& fine = tree_.nodes()[tree_.nodes()[0].children[0]].bounds;
   const fusion::Vec3f eye{(fine.min.x + fine.max.x) / 2, (fine.min.y + fine.max.y) / 2, fine.max.z + 0.3F};
   const Camera close{.eye = eye, .target = {eye.x, eye.y, 0}, .up = {0, 1, 0}, .fov_y_deg = 50, .viewport = {800, 800}};
-  EXPECT_NEAR(of(is_drawable, close).position_mm, kRoundingMm, 1e-4);
-  EXPECT_EQ(of(is_drawable, close).pixel_error, 0);
+  EXPECT_NEAR(of(colour_bits, close).position_mm, kRoundingMm, 1e-4);
+  EXPECT_EQ(of(colour_bits, close).pixel_error, 0);
   Camera far = close;
   far.eye.z = 40;
-  EXPECT_NEAR(of(is_drawable, far).position_mm, 200 + kRoundingMm, 1e-4);
-  EXPECT_GT(of(is_drawable, far).pixel_error, 1);
+  EXPECT_NEAR(of(colour_bits, far).position_mm, 200 + kRoundingMm, 1e-4);
+  EXPECT_GT(of(colour_bits, far).pixel_error, 1);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "fake_scene.hpp"
+#include "server/stream/sending_window.hpp"
 #include "server/stream/view_selection.hpp"
 #include "test_viewer.hpp"
 
@@ -227,6 +228,21 @@ TEST_F(ViewerStreamTest, AFrameLargerThanTheWindowGoesAlone) {
     viewer.acknowledge();
   }
   expect_picture(viewer, *scene_, 0.3);
+}
+
+TEST_F(ViewerStreamTest, TheFirstPictureGoesInOnePiece) {
+  scene_ = scene_of(tiles_of_tree(8, 200));
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.acknowledges = false;
+  viewer.stream().subscribe(0);
+  show(viewer, 0.3);
+  wait_until_idle(pool_);
+  viewer.take();
+  const protocol::TileId root{};
+  EXPECT_EQ(viewer.count(FrameKind::Colours), 1U);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 1U);
+  EXPECT_GT(viewer.taken_bytes, SendingWindow::kInitialBytes) << "else this shows nothing";
+  EXPECT_EQ(viewer.tiles.at(root).generation, 1U);
 }
 
 TEST_F(ViewerStreamTest, IgnoresAcknowledgementsThatMakeNoSense) {
