@@ -33,8 +33,10 @@ std::size_t SendingWindow::size_bytes() const {
   return static_cast<std::size_t>(std::min(wanted, static_cast<double>(ceiling_bytes_)));
 }
 
-bool SendingWindow::admits(std::size_t size_bytes) const {
-  return in_flight_bytes_ == 0 || in_flight_bytes_ + size_bytes <= this->size_bytes();
+bool SendingWindow::admits(std::size_t size_bytes, Urgency urgency) const {
+  std::size_t most_bytes = this->size_bytes();
+  if (urgency == Urgency::Detail && is_calm()) most_bytes -= std::min(most_bytes, largest_frame_bytes_);
+  return in_flight_bytes_ == 0 || in_flight_bytes_ + size_bytes <= most_bytes;
 }
 
 bool SendingWindow::admits_first_picture(std::size_t size_bytes) const {
@@ -111,8 +113,12 @@ double SendingWindow::shortest_round_trip_s() const {
   return round_trips_.empty() ? 0 : round_trips_.front().value;
 }
 
+bool SendingWindow::is_calm() const {
+  return delivered_bytes_ < calm_until_bytes_;
+}
+
 double SendingWindow::gain() const {
-  if (delivered_bytes_ < calm_until_bytes_) return 1;
+  if (is_calm()) return 1;
   if (is_starting_) return kStartGain;
   switch (round_ % kProbePeriodRounds) {
     case 0:

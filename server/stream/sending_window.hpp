@@ -25,7 +25,11 @@ class SendingWindow {
   /// The most it may ever be; 0 = the default, which is also the largest that is heeded.
   void set_ceiling(std::size_t bytes);
 
-  bool admits(std::size_t size_bytes) const;
+  enum class Urgency {
+    Answer,  ///< What is seen first.
+    Detail,  ///< What may be outdated before it arrives: after on_overtaken() it gets no more than the product alone.
+  };
+  bool admits(std::size_t size_bytes, Urgency urgency = Urgency::Answer) const;
   /// The same for a frame that goes at once, however little is known of the link: only the ceiling holds it back.
   bool admits_first_picture(std::size_t size_bytes) const;
 
@@ -35,8 +39,8 @@ class SendingWindow {
   /// There is room, but nothing to send: what is measured from here on says nothing about the link.
   void on_idle();
 
-  /// What is on its way is outdated: until it has arrived, a short queue matters more than a faster link, and nothing is
-  /// probed.
+  /// What is on its way is outdated: until it and the next frame have arrived, a short queue matters more than a faster
+  /// link, and nothing is probed.
   void on_overtaken();
 
   /// Everything up to `sequence` has arrived. False, and nothing happens, for a sequence that was never sent or is
@@ -67,6 +71,7 @@ class SendingWindow {
   void take_round_trip_sample(const Sent& sent, double now_s);
   void end_round();
   double shortest_round_trip_s() const;
+  bool is_calm() const;
   double gain() const;
 
   std::deque<Sent> sent_;

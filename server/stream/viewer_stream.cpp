@@ -190,7 +190,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
       if (!slot->has_colours(demand_)) {
         const bool is_first_picture = slot->held_colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
         const std::size_t size_bytes = frame_size(slot->colours);
-        if (!window_.admits(size_bytes) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
+        const auto urgency = slot->is_target ? SendingWindow::Urgency::Detail : SendingWindow::Urgency::Answer;
+        if (!window_.admits(size_bytes, urgency) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
+          if (window_.admits(size_bytes)) window_.on_idle();  // It is we who wait, not the link.
           return std::nullopt;
         }
         auto header = header_of(*slot, protocol::colour_frame_kind(demand_.colour_transform));
