@@ -10,6 +10,7 @@
 
 #include "fake_scene.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "protocol/draco_codec.hpp"
 #include "simulated_link.hpp"
 
 namespace spectra::server {
@@ -178,6 +179,41 @@ TEST(RadioLink, AutomaticQualityAnswersSoonerAndEndsTheSame) {
   const Answer patient = answered(scene, quality);
   EXPECT_EQ(patient.first_s, patient.last_s) << "full quality at once where it is in time";
   EXPECT_EQ(patient.colours, manual.colours);
+}
+
+/// The largest remainder of any channel of a tile's colours, rounded to six bits: 0 when they carry no more.
+int beyond_six_bits(const std::vector<std::byte>& payload) {
+  int worst = 0;
+  const auto decoded = protocol::decoded_colours(payload);
+  for (const protocol::ColourBytes& colour : decoded.value()) {
+    for (const std::uint8_t value : colour) worst = std::max(worst, value == 255 ? 0 : value % 4);
+  }
+  return worst;
+}
+
+TEST(RadioLink, WhatIsDrawnForAMomentCarriesFewerBitsOnASlowLinkOnly) {
+  const auto scene = three_level_scene(96);
+  for (const LinkSpeed speed : {LinkSpeed{5e4, 0.1}, LinkSpeed{1e8, 0.002}}) {
+    const bool is_slow = speed.bytes_per_s < 1e6;
+    FrameCache cache(256u << 20);
+    WorkerPool pool(2);
+    SimulatedLink link(scene, cache, pool, speed);
+    link.stream().subscribe(0);
+    link.stream().set_plan(plan_with_alpha(*scene, 0));
+    link.run();
+    link.at(link.now_s() + 1, [&] { link.stream().set_plan(plan_with_alpha(*scene, 0.3)); });
+    link.run();
+    ASSERT_TRUE(link.completed_s.contains(2));
+    for (const auto& tile : scene->tiles()) {
+      const int beyond = beyond_six_bits(link.colours.at(tile->id));
+      if (tile->id.level == 0) {
+        EXPECT_EQ(beyond == 0, is_slow);
+      } else if (tile->id.level == 2) {
+        EXPECT_GT(beyond, 0) << "what is drawn in the end is exact";
+      }
+    }
+    EXPECT_EQ(link.stream().stats().colour_levels, 256);
+  }
 }
 
 TEST(RadioLink, AViewerThatStopsAcknowledgingHoldsBoundedMemory) {
