@@ -1,4 +1,5 @@
 // What the end-to-end tests share: the server program, Chromium, and pixels of screenshots.
+import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -79,6 +80,24 @@ export async function settled(page, timeout = 60_000) {
 export async function drawn(page) {
   await page.waitForFunction(() => globalThis.spectra.viewport.isUpToDate, null, { polling: 'raf' });
   for (let i = 0; i < 3; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+}
+
+/** What the GPU holds, and how many tiles the page has to draw. */
+export function gpuObjects(page) {
+  return page.evaluate(() => {
+    const { geometries, textures, programs } = globalThis.spectra.viewport.gpuObjects;
+    return { geometries, textures, programs, tiles: globalThis.spectra.tiles.size };
+  });
+}
+
+/**
+ * Nothing was left behind between the two. A geometry is on the GPU from the first time that its tile is drawn, and a coarse tile may
+ * be drawn for the first time while a setting changes: so there are at most as many geometries as tiles.
+ */
+export function assertGpuObjects(before, after) {
+  const { geometries, ...others } = after;
+  assert.deepEqual(others, { textures: before.textures, programs: before.programs, tiles: before.tiles });
+  assert.ok(geometries >= before.geometries && geometries <= after.tiles, `${geometries} geometries for ${after.tiles} tiles`);
 }
 
 export async function screenshot(page, name) {

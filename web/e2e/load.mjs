@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
-import { PROGRAM, drawn, openClient, settled, startServer, test } from './harness.mjs';
+import { PROGRAM, assertGpuObjects, drawn, gpuObjects, openClient, settled, startServer, test } from './harness.mjs';
 
 /** Longest task of the page's main thread. */
 const LONGEST_TASK_MS = 50;
@@ -87,8 +87,7 @@ export function addLoadTests(browser, scratch) {
       await drawn(page);
       const bytes = { page: await heap((method) => session.send(method))() };
       for (const [sessionId, name] of workers) bytes[name] = await heap(ofWorker(sessionId))();
-      const { geometries, textures, programs } = await page.evaluate(() => globalThis.spectra.viewport.gpuObjects);
-      return { bytes, gpu: { geometries, textures, programs } };
+      return { bytes, gpu: await gpuObjects(page) };
     };
     const change = (count) =>
       page.evaluate(async (many) => {
@@ -102,6 +101,8 @@ export function addLoadTests(browser, scratch) {
 
     await page.locator('[data-method="thermal_visible_blend"]').click();
     await settled(page);
+    // The browser compiles what is used, which is no fault of the changes.
+    await change(400);
     await change(50);
     const after50 = await held();
     await change(450);
@@ -111,10 +112,10 @@ export function addLoadTests(browser, scratch) {
       `        after 50: ${mega(after50.bytes)}; after 500: ${mega(after500.bytes)}; GPU ${JSON.stringify(after500.gpu)}`,
     );
     assert.ok(Object.keys(after500.bytes).length >= 3, 'page, decoder and picture');
-    assert.deepEqual(after500.gpu, after50.gpu);
+    assertGpuObjects(after50.gpu, after500.gpu);
     for (const [name, bytes] of Object.entries(after500.bytes)) {
-      // A kilobyte for each change would be 0.45 MB.
-      assert.ok(bytes - after50.bytes[name] < 300_000, `${name} grew from ${after50.bytes[name]} to ${bytes} bytes`);
+      // A quarter of a kilobyte for each change would be 0.11 MB.
+      assert.ok(bytes - after50.bytes[name] < 110_000, `${name} grew from ${after50.bytes[name]} to ${bytes} bytes`);
     }
     assert.deepEqual(problems, []);
     await page.close();

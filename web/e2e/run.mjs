@@ -4,7 +4,18 @@ import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { decodePng, openClient, runTests, screenshot, settled, startBrowser, startServer, test } from './harness.mjs';
+import {
+  assertGpuObjects,
+  decodePng,
+  gpuObjects,
+  openClient,
+  runTests,
+  screenshot,
+  settled,
+  startBrowser,
+  startServer,
+  test,
+} from './harness.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLoadTests } from './load.mjs';
 
@@ -160,12 +171,7 @@ test('A dragged slider answers at once and its last value always arrives', async
   await page.locator('[data-method="thermal_visible_blend"]').click();
   await settled(page);
   const before = await state();
-  const gpuObjects = () =>
-    page.evaluate(() => {
-      const { geometries, textures, programs } = globalThis.spectra.viewport.gpuObjects;
-      return { geometries, textures, programs };
-    });
-  const gpuBefore = await gpuObjects();
+  const gpuBefore = await gpuObjects(page);
   const slider = page.locator('[data-parameter="alpha"] input[type=range]');
   const box = await slider.boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -179,7 +185,7 @@ test('A dragged slider answers at once and its last value always arrives', async
   assert.ok(Math.abs(after.fusion.params.alpha - 0.9) < 0.06, `alpha ${after.fusion.params.alpha}`);
   assert.equal(await number('[data-parameter="alpha"] input[type=number]'), after.fusion.params.alpha);
   assert.ok(after.generation > before.generation);
-  assert.deepEqual(await gpuObjects(), gpuBefore, 'new colours make no new GPU objects');
+  assertGpuObjects(gpuBefore, await gpuObjects(page));
 });
 
 test('A refused value snaps back and says why', async () => {
