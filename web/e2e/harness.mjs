@@ -22,6 +22,8 @@ export async function startServer(args, port = 0) {
   );
   let output = '';
   const exited = new Promise((resolve) => child.once('exit', resolve));
+  // A test that fails leaves its server running.
+  process.once('exit', () => child.kill('SIGKILL'));
   const url = await new Promise((resolve, reject) => {
     const read = (chunk) => {
       output += chunk;

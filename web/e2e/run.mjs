@@ -352,3 +352,5 @@ await runTests();
 await browser.close();
 await server.stop();
 rmSync(scratch, { recursive: true, force: true });
+// What a failed test has left open must not keep this process waiting.
+process.exit();
