@@ -44,10 +44,13 @@ static void describe(auto& fields, Is<ResumeRequest> auto& message) {
 static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
   fields.field("channels", message.channels);
   fields.require("channels", !message.channels.empty(), "a list of at least one channel");
-  fields.optional("in_flight_bytes", message.in_flight_bytes);
-  const std::uint32_t in_flight_bytes = message.in_flight_bytes.value_or(1);
-  fields.require("in_flight_bytes", in_flight_bytes >= 1 && in_flight_bytes <= 2'147'483'647U,
-                 "an integer from 1 to 2147483647");
+  const auto bytes = [&fields](const char* key, auto& value) {
+    fields.optional(key, value);
+    const std::uint32_t given = value.value_or(1);
+    fields.require(key, given >= 1 && given <= 2'147'483'647U, "an integer from 1 to 2147483647");
+  };
+  bytes("in_flight_bytes", message.in_flight_bytes);
+  bytes("cache_bytes", message.cache_bytes);
   fields.optional("colour_transform", message.colour_transform);
   fields.optional("resume", message.resume);
 }

@@ -22,7 +22,8 @@ struct ResumeRequest {
 /// Params of scene.subscribe; at least one channel.
 struct SubscribeRequest {
   std::vector<Channel> channels;
-  std::optional<std::uint32_t> in_flight_bytes;     ///< 1..2^31-1; absent: the server's choice.
+  std::optional<std::uint32_t> in_flight_bytes;  ///< 1..2^31-1; absent: the server's choice.
+  std::optional<std::uint32_t> cache_bytes;  ///< 1..2^31-1, of decoded tiles; absent: no bound to what is asked for.
   std::optional<ColourTransform> colour_transform;  ///< Absent: none.
   std::optional<ResumeRequest> resume;
 };

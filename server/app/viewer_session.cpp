@@ -117,7 +117,7 @@ void ViewerSession::opened() {
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
   hello.role = protocol::Role::Operator;
-  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green", "resume"};
+  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green", "resume", "cache_bytes"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -209,9 +209,10 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
   protocol::SubscribeReply reply;
   if (request.resume) reply.resumed_tiles = resume(*request.resume);
   is_subscribed_ = true;
-  in_flight_bytes_ = request.in_flight_bytes.value_or(0);
-  colour_transform_ = request.colour_transform.value_or(protocol::ColourTransform::None);
-  if (stream_) stream_->subscribe(in_flight_bytes_, colour_transform_);
+  subscription_ = {.in_flight_bytes = request.in_flight_bytes.value_or(0),
+                   .cache_bytes = request.cache_bytes.value_or(0),
+                   .colour_transform = request.colour_transform.value_or(protocol::ColourTransform::None)};
+  if (stream_) stream_->subscribe(subscription_);
   peer_.wake();
   return protocol::to_json(reply);
 }
@@ -406,7 +407,7 @@ void ViewerSession::begin_stream() {
   });
   if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
   if (camera_) stream_->set_camera(*camera_);
-  if (is_subscribed_) stream_->subscribe(in_flight_bytes_, colour_transform_);
+  if (is_subscribed_) stream_->subscribe(subscription_);
 }
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {

@@ -94,8 +94,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   std::size_t computing_count_ = 0;
 
   bool is_subscribed_ = false;
-  std::size_t in_flight_bytes_ = 0;
-  protocol::ColourTransform colour_transform_ = protocol::ColourTransform::None;
+  Subscription subscription_;
   std::optional<Camera> camera_;
   StreamQuality quality_;
   std::map<std::string, std::string> statuses_;

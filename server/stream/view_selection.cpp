@@ -5,7 +5,9 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <set>
 #include <tuple>
+#include <utility>
 
 namespace spectra::server {
 namespace {
@@ -61,6 +63,45 @@ void extend(Bounds& bounds, const Bounds& by) {
     bounds.min.*axis = std::min(bounds.min.*axis, by.min.*axis);
     bounds.max.*axis = std::max(bounds.max.*axis, by.max.*axis);
   }
+}
+
+// Of a tile's surface, seen within `bounds`: in pixels, or in metres without a camera.
+double error_of(const ViewTree::Node& node, const Bounds& bounds, const std::optional<Camera>& camera) {
+  const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+  return camera ? screen_error(*camera, bounds, error_m) : error_m;
+}
+
+// In no order. Refines from the top, always the tile with the largest error of those reached so far.
+std::vector<SelectedTile> needed_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error,
+                                       std::uint64_t most_bytes) {
+  const auto& nodes = tree.nodes();
+  std::vector<SelectedTile> needed;
+  std::uint64_t bytes = 0;
+  // Places in `needed`; of equal errors the one reached first.
+  std::set<std::pair<double, std::size_t>> to_refine;
+  const auto add = [&](std::size_t index) {
+    const ViewTree::Node& node = nodes[index];
+    const bool is_in_view = !camera || may_be_in_view(*camera, node.bounds);
+    const double error = error_of(node, node.bounds, camera);
+    if (!node.children.empty() && is_in_view && (!camera || error > pixel_error)) {
+      to_refine.emplace(-error, needed.size());
+    }
+    needed.push_back({.node = index, .is_target = true, .is_in_view = is_in_view});
+    bytes += decoded_bytes(*node.tile);
+  };
+  for (std::size_t index = 0; index < nodes.size(); ++index) {
+    if (!nodes[index].parent) add(index);
+  }
+  while (!to_refine.empty()) {
+    const std::size_t place = to_refine.extract(to_refine.begin()).value().second;
+    const auto& children = nodes[needed[place].node].children;
+    std::uint64_t more_bytes = 0;
+    for (const std::size_t child : children) more_bytes += decoded_bytes(*nodes[child].tile);
+    if (more_bytes > most_bytes - std::min(bytes, most_bytes)) continue;
+    needed[place].is_target = false;
+    for (const std::size_t child : children) add(child);
+  }
+  return needed;
 }
 
 }  // namespace
@@ -122,8 +163,12 @@ bool may_be_in_view(const Camera& camera, const Bounds& bounds) {
          reach(forward * tangent_y - up, eye, bounds) >= 0;
 }
 
-std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera,
-                                         double pixel_error) {
+std::uint64_t decoded_bytes(const Tile& tile) {
+  return std::uint64_t{16} * tile.positions.size() + std::uint64_t{12} * tile.triangles.size();
+}
+
+std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error,
+                                         std::uint64_t most_bytes) {
   struct Candidate {
     SelectedTile tile;
     int level;
@@ -131,28 +176,17 @@ std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::option
     double highest_celsius;
     auto key() const { return std::tuple(level, !tile.is_in_view, -error_octave, -highest_celsius, tile.node); }
   };
-  const auto& nodes = tree.nodes();
-  std::vector<char> is_refined(nodes.size(), 0);
   std::vector<Candidate> candidates;
-  for (std::size_t index = 0; index < nodes.size(); ++index) {
-    const ViewTree::Node& node = nodes[index];
-    if (node.parent && is_refined[*node.parent] == 0) continue;
-    const auto error_m = static_cast<double>(node.tile->geometric_error_m);
-    const bool is_in_view = !camera || may_be_in_view(*camera, node.bounds);
-    const double error = camera ? screen_error(*camera, node.bounds, error_m) : error_m;
-    const bool refine = !node.children.empty() && is_in_view && (!camera || error > pixel_error);
-    is_refined[index] = refine ? 1 : 0;
+  for (const SelectedTile& tile : needed_tiles(tree, camera, pixel_error, most_bytes)) {
+    const ViewTree::Node& node = tree.nodes()[tile.node];
     // What is seen while this tile is missing is its parent, with the parent's error.
-    double missing_error = std::numeric_limits<double>::infinity();
-    if (node.parent) {
-      const auto parent_error_m = static_cast<double>(nodes[*node.parent].tile->geometric_error_m);
-      missing_error = camera ? screen_error(*camera, node.bounds, parent_error_m) : parent_error_m;
-    }
+    const double missing_error = node.parent ? error_of(tree.nodes()[*node.parent], node.bounds, camera)
+                                             : std::numeric_limits<double>::infinity();
     const int octave = missing_error > 0 && std::isfinite(missing_error) ? std::ilogb(missing_error)
                        : missing_error > 0                               ? std::numeric_limits<int>::max()
                                                                          : -std::numeric_limits<int>::max();
     const auto celsius = static_cast<double>(node.tile->highest_celsius);
-    candidates.push_back({.tile = {.node = index, .is_target = !refine, .is_in_view = is_in_view},
+    candidates.push_back({.tile = tile,
                           .level = node.tile->id.level,
                           .error_octave = octave,
                           .highest_celsius = std::isnan(celsius) ? -std::numeric_limits<double>::infinity() : celsius});

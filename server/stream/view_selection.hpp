@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -32,6 +33,8 @@ class ViewTree {
   std::vector<Node> nodes_;
 };
 
+inline constexpr std::uint64_t kUnbounded = std::numeric_limits<std::uint64_t>::max();
+
 /// A tile that a viewer needs.
 struct SelectedTile {
   std::size_t node = 0;
@@ -39,14 +42,20 @@ struct SelectedTile {
   bool is_in_view = true;
 };
 
+/// What a tile takes at a viewer who has decoded it: three floats and a colour of four bytes for each vertex, three
+/// indices of four bytes for each triangle.
+std::uint64_t decoded_bytes(const Tile& tile);
+
 /// The tiles that a camera asks for, in sending order: coarse before fine; of one level those in view before others,
 /// then by how much their lack is seen (in octaves of the error on the screen), and among equals the hottest first.
 ///
 /// A tile is refined when it may be in view (the field of view widened by a tenth) and its geometric error, seen from
 /// the nearest point of its bounds, covers more than `pixel_error` pixels. All children of a refined tile are needed,
 /// also those out of view, because a client replaces a tile only by all of its children. Without a camera every tile is
-/// needed.
-std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error);
+/// needed. All selected tiles together take at most `most_bytes`, decoded, unless the tops alone take more: tiles are refined
+/// from the largest error on the screen downwards, and one whose children do not fit any more is left as it is.
+std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error,
+                                         std::uint64_t most_bytes = kUnbounded);
 
 /// Error on the screen, in pixels, of a geometric error within `bounds`; infinite when the eye is inside.
 double screen_error(const Camera& camera, const Bounds& bounds, double geometric_error_m);

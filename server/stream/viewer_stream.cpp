@@ -60,8 +60,8 @@ TileFrameHeader header_of(const TileSlot& slot, FrameKind kind) {
 class Stream final : public ViewerStream, public CacheWaiter {
  public:
   Stream(std::shared_ptr<const SceneSnapshot> scene, std::shared_ptr<FrameCache::State> cache, WorkerPool& pool,
-         std::function<void()> wake, StreamLimits limits)
-      : cache_(std::move(cache)), pool_(pool), limits_(limits), wake_(std::move(wake)) {
+         std::function<void()> wake)
+      : cache_(std::move(cache)), pool_(pool), wake_(std::move(wake)) {
     adopt(std::move(scene));
   }
 
@@ -81,13 +81,18 @@ class Stream final : public ViewerStream, public CacheWaiter {
     change([&] { adopt(std::move(scene)); });
   }
 
-  void subscribe(std::size_t in_flight_bytes, protocol::ColourTransform transform) override {
+  void subscribe(const Subscription& subscription) override {
     change([&] {
-      window_.set_ceiling(in_flight_bytes);
-      if (transform != demand_.colour_transform) {
-        demand_.colour_transform = transform;
+      window_.set_ceiling(subscription.in_flight_bytes);
+      if (subscription.colour_transform != demand_.colour_transform) {
+        demand_.colour_transform = subscription.colour_transform;
         ++demand_.colour_epoch;
-        colour_cost_ = ColourCost(transform);
+        colour_cost_ = ColourCost(subscription.colour_transform);
+        is_complete_due_ = true;
+      }
+      if (subscription.cache_bytes != cache_bytes_) {
+        cache_bytes_ = subscription.cache_bytes;
+        select();
         is_complete_due_ = true;
       }
       if (subscribed_) return;
@@ -109,7 +114,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     change([&] {
       if (subscribed_) return;
       current_count = tiles_.resume(claims, demand_, *cache_);
-      tiles_.remove_surplus(limits_.held_vertices);
+      remove_surplus();
     });
     return current_count;
   }
@@ -297,7 +302,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   // Something has changed: the first answer may be coarser than the last; see StreamQuality.
   void answer_first() {
     const auto target_vertices = [this](double pixel_error) {
-      return target_vertex_count(tiles_.tree(), selected_tiles(tiles_.tree(), camera_, pixel_error));
+      return target_vertex_count(tiles_.tree(), selected(pixel_error));
     };
     point_ = first_answer(quality_, window_.rate_bytes_per_s(), window_.round_trip_s(), colour_cost_, target_vertices);
     apply();
@@ -331,17 +336,23 @@ class Stream final : public ViewerStream, public CacheWaiter {
     if (head() != nullptr) is_complete_due_ = true;
   }
 
+  std::vector<SelectedTile> selected(double pixel_error) const {
+    return selected_tiles(tiles_.tree(), camera_, pixel_error, cache_bytes_ > 0 ? cache_bytes_ : kUnbounded);
+  }
+
+  void remove_surplus() { tiles_.remove_surplus(cache_bytes_ > 0 ? cache_bytes_ : Subscription::kCacheBytes); }
+
   void select() {
-    const auto selected = selected_tiles(tiles_.tree(), camera_, quality_.pixel_error * point_.pixel_error_factor);
-    const auto vertices = static_cast<double>(target_vertex_count(tiles_.tree(), selected));
+    const auto chosen = selected(quality_.pixel_error * point_.pixel_error_factor);
+    const auto vertices = static_cast<double>(target_vertex_count(tiles_.tree(), chosen));
     const double rate = window_.rate_bytes_per_s();
     const double bytes = vertices * colour_cost_.bytes_per_vertex(demand_.colour_bits);
     // No previews of what arrives at once anyway.
     const bool is_quick = rate > 0 && bytes / rate * 1e3 <= quality_.latency_target_ms;
     const bool is_slow = rate > 0 && !is_quick;
     demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
-    order_.choose(tiles_, selected, is_quick ? 0 : kPreviewShare * vertices);
-    tiles_.remove_surplus(limits_.held_vertices);
+    order_.choose(tiles_, chosen, is_quick ? 0 : kPreviewShare * vertices);
+    remove_surplus();
   }
 
   void drop_superseded() {
@@ -461,7 +472,6 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   const std::shared_ptr<FrameCache::State> cache_;
   WorkerPool& pool_;
-  const StreamLimits limits_;
 
   std::mutex wake_mutex_;
   std::function<void()> wake_;
@@ -475,6 +485,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   StreamQuality quality_;
   float wanted_step_m_ = 0;
   std::optional<Camera> camera_;
+  std::uint64_t cache_bytes_ = 0;
   QualityPoint point_;
   ColourCost colour_cost_;
   Demand demand_;
@@ -493,8 +504,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
 }  // namespace
 
 std::shared_ptr<ViewerStream> ViewerStream::create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                                   WorkerPool& pool, std::function<void()> wake, StreamLimits limits) {
-  return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake), limits);
+                                                   WorkerPool& pool, std::function<void()> wake) {
+  return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake));
 }
 
 }  // namespace spectra::server

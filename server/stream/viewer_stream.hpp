@@ -69,11 +69,16 @@ struct StreamStats {
   double pixel_error = 0;          ///< the largest distance in pixels within the view; 0 before the first camera.
 };
 
-/// Bounds of what a stream takes for granted at the other end.
-struct StreamLimits {
-  /// Vertices that a viewer is left with although its camera has left them, together with those it looks at (about 45
-  /// bytes each on the viewer's side). Beyond, tiles not looked at for longest are removed; what the camera asks for never is.
-  std::uint64_t held_vertices = 6'000'000;
+/// What a viewer says of itself in scene.subscribe.
+struct Subscription {
+  std::size_t in_flight_bytes = 0;  ///< Bounds the sending window; 0 = our choice (which is also the largest).
+  /// Most bytes of decoded tiles, see decoded_bytes(). Tiles not looked at for longest are removed, and what the camera
+  /// asks for is refined no further than fits, where its lack is seen most first; the tops of the tree are always sent.
+  /// 0 = kCacheBytes for what is left over from earlier cameras, and no bound to what the present one asks for.
+  std::uint64_t cache_bytes = 0;
+  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
+
+  static constexpr std::uint64_t kCacheBytes = 256u << 20;
 };
 
 /// A tile that a viewer still has from an earlier connection, geometry and colours.
@@ -107,7 +112,7 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// `wake` is called from any thread whenever next_frame() or take_complete() may have something new; it must only
   /// post to the session's strand. It is not called after close().
   static std::shared_ptr<ViewerStream> create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                              WorkerPool& pool, std::function<void()> wake, StreamLimits limits = {});
+                                              WorkerPool& pool, std::function<void()> wake);
   virtual ~ViewerStream() = default;
 
   virtual void close() = 0;
@@ -115,10 +120,8 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
   virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
 
-  /// Starts sending; `in_flight_bytes` bounds the window, 0 = our choice (which is also the largest). A later call
-  /// replaces both; colours that were sent with another transform are sent anew.
-  virtual void subscribe(std::size_t in_flight_bytes,
-                         protocol::ColourTransform transform = protocol::ColourTransform::None) = 0;
+  /// Starts sending. A later call replaces the subscription; colours that were sent with another transform are sent anew.
+  virtual void subscribe(const Subscription& subscription) = 0;
   virtual void unsubscribe() = 0;
 
   /// Called before subscribe(): tiles that the viewer says it holds from an earlier stream on the same cache. What is

@@ -14,6 +14,7 @@ void TileSlot::forget_held() {
   held_revision = 0;
   held_name = 0;
   held_vertex_count = 0;
+  held_bytes = 0;
   held_geometry_epoch = 0;
   held_colour_epoch = 0;
   held_colour_bits = 0;
@@ -33,6 +34,7 @@ void ViewerTiles::adopt(const SceneSnapshot& scene) {
       } else {
         slot->held_revision = known->second->held_revision;
         slot->held_name = known->second->held_name;
+        slot->held_bytes = known->second->held_bytes;
         abandon(*known->second);
       }
       known_slots.erase(known);
@@ -75,6 +77,7 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   prepared_bytes_ -= slot.geometry->payload->size();
   slot.held_name = name;
   slot.held_revision = slot.geometry->revision;
+  slot.held_bytes = decoded_bytes(*slot.tile);
   slot.held_geometry_epoch = geometry_epoch;
   slot.held_colour_epoch = 0;
 }
@@ -131,6 +134,7 @@ bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Dem
   if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
   slot.held_revision = revision;
   slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+  slot.held_bytes = decoded_bytes(*slot.tile);
   slot.held_geometry_epoch = demand.geometry_epoch;
   slot.held_colour_epoch = Demand::kEarlierColourEpoch;
   slot.held_colour_bits = demand.colour_bits;
@@ -163,19 +167,19 @@ void ViewerTiles::remove_from_viewer(TileSlot& slot) {
   slot.forget_held();
 }
 
-void ViewerTiles::remove_surplus(std::uint64_t most_vertices) {
-  std::uint64_t held_vertices = 0;
+void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {
+  std::uint64_t bytes = 0;
   std::vector<TileSlot*> unused;
   for (const auto& slot : slots_) {
-    held_vertices += slot->is_wanted ? slot->tile->positions.size() : slot->held_vertex_count;
-    if (!slot->is_wanted && slot->held_vertex_count > 0) unused.push_back(slot.get());
+    bytes += slot->is_wanted ? decoded_bytes(*slot->tile) : slot->held_bytes;
+    if (!slot->is_wanted && slot->held_name != 0) unused.push_back(slot.get());
   }
-  if (held_vertices <= most_vertices) return;
+  if (bytes <= most_bytes) return;
   std::sort(unused.begin(), unused.end(),
             [](const TileSlot* a, const TileSlot* b) { return a->last_wanted < b->last_wanted; });
   for (TileSlot* slot : unused) {
-    if (held_vertices <= most_vertices) break;
-    held_vertices -= slot->held_vertex_count;
+    if (bytes <= most_bytes) break;
+    bytes -= slot->held_bytes;
     remove_from_viewer(*slot);
   }
 }

@@ -41,6 +41,7 @@ struct TileSlot {
   std::uint32_t held_revision = 0;
   std::uint32_t held_name = 0;
   std::uint32_t held_vertex_count = 0;
+  std::uint64_t held_bytes = 0;  ///< Decoded.
   std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
   int held_colour_bits = 0;
@@ -92,8 +93,9 @@ class ViewerTiles {
   void forget_all_held();
 
   void remove_from_viewer(TileSlot& slot);
-  /// Removes tiles that are not wanted, the longest unwanted first, until the viewer holds at most so many vertices.
-  void remove_surplus(std::uint64_t most_vertices);
+  /// Removes tiles that are not wanted, the longest unwanted first, until what is wanted and what is held beside it
+  /// takes at most so many bytes, decoded.
+  void remove_surplus(std::uint64_t most_bytes);
   /// A viewer draws the children of a tile in its place when it has them all, whatever colours they have. Beneath a tile
   /// that now shows newer colours than they do, and that is fine enough, they would stay in front of it for good.
   void remove_outdated_beneath(const TileSlot& slot, const Demand& demand);

@@ -27,20 +27,30 @@ async function trace(page) {
   };
 }
 
+/** A scene of a million vertices. */
+function million(scratch) {
+  const real = join(process.env.SPECTRA_TEST_DATA ?? '/nowhere', 'arco_castle_1m.ply');
+  if (existsSync(real)) return real;
+  const generated = join(scratch, 'million.ply');
+  if (!existsSync(generated)) execFileSync(PROGRAM, ['demo-scene', generated, '--vertices', '1000000']);
+  return generated;
+}
+
+/** Asks for every vertex in view, also those that no pixel needs. */
+async function askForAll(page) {
+  await page.waitForFunction(() => globalThis.spectra?.store.quality);
+  await page.evaluate(() => globalThis.spectra.setQuality({ pixel_error: 0.001 }));
+  await page.waitForFunction(() => globalThis.spectra.store.quality.pixel_error === 0.001);
+}
+
 export function addLoadTests(browser, scratch) {
   test('No task of the page is long while a million vertices stream in', async () => {
-    const real = join(process.env.SPECTRA_TEST_DATA ?? '/nowhere', 'arco_castle_1m.ply');
-    const scene = existsSync(real) ? real : join(scratch, 'million.ply');
-    if (scene !== real) execFileSync(PROGRAM, ['demo-scene', scene, '--vertices', '1000000']);
-    const server = await startServer([scene]);
+    const server = await startServer([million(scratch)]);
     // The same process as the page that follows, and past its own beginnings.
     const { page } = await openClient(browser, `${server.url}icon.svg`);
     const finish = await trace(page);
     await page.goto(server.url);
-    // Every vertex in view, also those that no pixel needs.
-    await page.waitForFunction(() => globalThis.spectra?.store.quality);
-    await page.evaluate(() => globalThis.spectra.setQuality({ pixel_error: 0.001 }));
-    await page.waitForFunction(() => globalThis.spectra.store.quality.pixel_error === 0.001);
+    await askForAll(page);
     await settled(page, 180_000);
     const vertices = await page.evaluate(() => globalThis.spectra.store.shown.vertices);
     const events = await finish();
@@ -58,6 +68,57 @@ export function addLoadTests(browser, scratch) {
     // On a machine with other work the clock tells more about that than about the page. What the page itself does: compute, and wait.
     assert.ok(cpu[0] < LONGEST_TASK_MS, `a task of ${cpu[0]} ms`);
     assert.equal(waits.length, 0, 'the page waited for the GPU');
+    await page.close();
+    await server.stop();
+  });
+
+  test('A machine with little memory holds no more than a part of it, wherever the camera goes', async () => {
+    const server = await startServer([million(scratch)]);
+    const page = await browser.newPage({ viewport: { width: 1000, height: 700 } });
+    await page.addInitScript(() => Object.defineProperty(navigator, 'deviceMemory', { value: 0.25 }));
+    await page.goto(server.url);
+    await askForAll(page);
+    await settled(page);
+    const held = () =>
+      page.evaluate(() => {
+        const { tiles, store } = globalThis.spectra;
+        const geometries = [...tiles.shownGeometries()];
+        const bytes = geometries.reduce((sum, { geometry: g }) => sum + 16 * g.vertex_count + 12 * g.triangle_count, 0);
+        return { bytes, vertices: store.shown.vertices };
+      });
+    const seen = [await held()];
+    for (const [approach, turn] of [
+      [0.8, 0],
+      [0.5, 0.6],
+      [0, 1.2],
+      [0, 1.2],
+      [-6, 1],
+    ]) {
+      await page.evaluate(
+        ([nearer, angle]) => {
+          globalThis.spectra.viewport.approach(nearer);
+          globalThis.spectra.viewport.turn(angle, 0);
+        },
+        [approach, turn],
+      );
+      for (let i = 0; i < 8; i += 1) {
+        await page.waitForTimeout(100);
+        seen.push(await held());
+      }
+      await settled(page);
+      seen.push(await held());
+    }
+    const most = Math.max(...seen.map(({ bytes }) => bytes));
+    console.log(
+      `        at most ${(most / 2 ** 20).toFixed(1)} of 16 MiB, at least ${Math.min(...seen.map(({ vertices }) => vertices))} ` +
+        `vertices drawn`,
+    );
+    assert.ok(most <= 16 * 2 ** 20, `${most} bytes`);
+    assert.ok(most > 8 * 2 ** 20, `${most} bytes: the memory that is there is not used`);
+    assert.ok(
+      seen.every(({ vertices }) => vertices > 0),
+      'nothing was drawn',
+    );
     await page.close();
     await server.stop();
   });

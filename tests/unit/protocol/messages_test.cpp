@@ -68,6 +68,9 @@ TEST(SubscribeRequest, KnowsItsChannels) {
   EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":0})"), "in_flight_bytes");
   EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"in_flight_bytes":2147483648})"),
             "in_flight_bytes");
+  EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"cache_bytes":1})"), "accepted");
+  for (const std::string bytes : {"0", "2147483648", "-1", "1.5", "null"})
+    EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"cache_bytes":)" + bytes + "}"), "cache_bytes");
   EXPECT_EQ(refused_field<SubscribeRequest>(R"({"channels":["fused"],"colour_transform":"subtract_green"})"),
             "accepted");
   for (const std::string transform : {"\"ycocg\"", "\"\"", "6", "null"})

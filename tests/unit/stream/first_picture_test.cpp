@@ -23,7 +23,7 @@ TEST(FirstPicture, TheRootIsThereBeforeTheFirstViewer) {
 
   WorkerPool pool(1);
   TestViewer viewer(scene, cache, pool);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   viewer.stream().set_plan(plan_with_alpha(*scene, 0.5));
   viewer.complete();
   EXPECT_EQ(cache.miss_count(), 1U + 4U + 5U) << "four leaves, and the colours of five tiles";

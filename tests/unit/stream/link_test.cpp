@@ -39,7 +39,7 @@ Drag dragged(const std::shared_ptr<const SceneSnapshot>& scene, LinkSpeed speed,
   WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, speed);
   link.stream().set_quality(quality);
-  link.stream().subscribe(0);
+  link.stream().subscribe({});
   link.stream().set_plan(plan_with_alpha(*scene, 0));
   link.run();
   EXPECT_TRUE(link.completed_s.contains(1));
@@ -141,7 +141,7 @@ Answer answered(const std::shared_ptr<const SceneSnapshot>& scene, StreamQuality
   WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, kRadio);
   link.stream().set_quality(quality);
-  link.stream().subscribe(0);
+  link.stream().subscribe({});
   link.stream().set_plan(plan_with_alpha(*scene, 0));
   link.run();
   link.arrivals.clear();
@@ -198,7 +198,7 @@ TEST(RadioLink, WhatIsDrawnForAMomentCarriesFewerBitsOnASlowLinkOnly) {
     FrameCache cache(256u << 20);
     WorkerPool pool(2);
     SimulatedLink link(scene, cache, pool, speed);
-    link.stream().subscribe(0);
+    link.stream().subscribe({});
     link.stream().set_plan(plan_with_alpha(*scene, 0));
     link.run();
     link.at(link.now_s() + 1, [&] { link.stream().set_plan(plan_with_alpha(*scene, 0.3)); });
@@ -221,7 +221,7 @@ TEST(RadioLink, AViewerThatStopsAcknowledgingHoldsBoundedMemory) {
   FrameCache cache(256u << 20);
   WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, {.bytes_per_s = 1e9, .round_trip_s = 0.001});
-  link.stream().subscribe(0);
+  link.stream().subscribe({});
   link.stream().set_plan(plan_with_alpha(*scene, 0));
   link.run();
   link.stop_acknowledging();

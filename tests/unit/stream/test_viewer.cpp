@@ -14,16 +14,12 @@ constexpr std::chrono::seconds kStall{20};
 
 }  // namespace
 
-TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool,
-                       StreamLimits limits)
-    : stream_(ViewerStream::create(
-          std::move(scene), cache, pool,
-          [this] {
-            const std::lock_guard lock(mutex_);
-            ++wake_count_;
-            woken_.notify_all();
-          },
-          limits)) {}
+TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool)
+    : stream_(ViewerStream::create(std::move(scene), cache, pool, [this] {
+        const std::lock_guard lock(mutex_);
+        ++wake_count_;
+        woken_.notify_all();
+      })) {}
 
 TestViewer::~TestViewer() {
   stream_->close();

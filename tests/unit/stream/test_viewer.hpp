@@ -26,7 +26,7 @@ struct HeldTile {
 /// (rising sequence, colours only for the revision held, no revision twice, generations never falling).
 class TestViewer {
  public:
-  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool, StreamLimits limits = {});
+  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool);
   ~TestViewer();
   TestViewer(const TestViewer&) = delete;
   TestViewer& operator=(const TestViewer&) = delete;

@@ -116,6 +116,36 @@ TEST(SelectedTiles, ReplaceableTilesHaveAllTheirChildren) {
   }
 }
 
+TEST(SelectedTiles, KeepToTheBytesWhereTheErrorIsSeenMost) {
+  const ViewTree tree(*scene_of(quadtree_tiles(4, 3)));
+  const Camera camera = camera_over(0.5F, 0.5F, 1.5F);
+  const auto all = selected_tiles(tree, camera, 0.01);
+  const std::uint64_t tile_bytes = decoded_bytes(*tree.nodes()[0].tile);
+  EXPECT_EQ(tile_bytes, 16U * 9 + 12 * 8);
+  std::size_t last = 0;
+  for (std::uint64_t most = 0; most <= all.size(); ++most) {
+    const auto selected = selected_tiles(tree, camera, 0.01, most * tile_bytes);
+    EXPECT_LE(selected.size(), std::max<std::uint64_t>(most, 1));
+    EXPECT_GT(selected.size() + 4, std::min<std::uint64_t>(most, all.size())) << "four more would have fitted";
+    EXPECT_GE(selected.size(), last);
+    last = selected.size();
+    // Nothing that was left coarse is seen with a larger error than what was refined.
+    double least_refined = std::numeric_limits<double>::infinity();
+    double most_left = 0;
+    for (const SelectedTile& tile : selected) {
+      const auto& node = tree.nodes()[tile.node];
+      const double error = screen_error(camera, node.bounds, static_cast<double>(node.tile->geometric_error_m));
+      if (!tile.is_target) {
+        least_refined = std::min(least_refined, error);
+      } else if (tile.is_in_view) {
+        most_left = std::max(most_left, error);
+      }
+    }
+    EXPECT_LE(most_left, least_refined);
+  }
+  EXPECT_EQ(last, all.size());
+}
+
 TEST(SelectedTiles, HotOnesComeFirstAmongEquals) {
   auto tiles = quadtree_tiles(2, 4);
   auto hot = std::make_shared<Tile>(*tiles[3]);

@@ -83,7 +83,7 @@ class ViewerStreamTest : public ::testing::Test {
 
 TEST_F(ViewerStreamTest, SendsTheWholeSceneAndThenCompletesOnce) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   const auto complete = viewer.complete();
   EXPECT_EQ(complete.generation, 1U);
@@ -105,7 +105,7 @@ TEST_F(ViewerStreamTest, SendsNothingBeforeItIsSubscribedAndHasSettings) {
   EXPECT_FALSE(viewer.stream().take_complete().has_value());
 
   TestViewer without_settings(scene_, cache_, pool_);
-  without_settings.stream().subscribe(0);
+  without_settings.stream().subscribe({});
   wait_until_idle(pool_);
   EXPECT_EQ(without_settings.take(), 0U);
   EXPECT_FALSE(without_settings.stream().take_complete().has_value());
@@ -113,7 +113,7 @@ TEST_F(ViewerStreamTest, SendsNothingBeforeItIsSubscribedAndHasSettings) {
 
 TEST_F(ViewerStreamTest, OrdersCoarseBeforeFineAndGeometryBeforeColours) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   ASSERT_EQ(viewer.frames.size(), 14U);
@@ -132,7 +132,7 @@ TEST_F(ViewerStreamTest, OrdersCoarseBeforeFineAndGeometryBeforeColours) {
 
 TEST_F(ViewerStreamTest, AChangeOfSettingsSendsColoursOnly) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   show(viewer, 0.8);
@@ -144,7 +144,7 @@ TEST_F(ViewerStreamTest, AChangeOfSettingsSendsColoursOnly) {
 
 TEST_F(ViewerStreamTest, TheNewestSettingsOvertake) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0);
   viewer.complete();
   const auto misses_before = cache_.miss_count();
@@ -162,7 +162,7 @@ TEST_F(ViewerStreamTest, TheNewestSettingsOvertake) {
 
 TEST_F(ViewerStreamTest, PreparedColoursOfOldSettingsAreDropped) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0);
   viewer.complete();
   show(viewer, 0.5);
@@ -176,7 +176,7 @@ TEST_F(ViewerStreamTest, PreparedColoursOfOldSettingsAreDropped) {
 
 TEST_F(ViewerStreamTest, ManyChangesWhileFramesFlowEndInTheNewest) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   for (int i = 1; i <= 100; ++i) {
     show(viewer, i / 200.0);
     viewer.take();
@@ -194,7 +194,7 @@ TEST_F(ViewerStreamTest, KeepsToTheWindow) {
   scene_ = scene_of(tiles_of_tree(40, 30));
   TestViewer viewer(scene_, cache_, pool_);
   viewer.acknowledges = false;
-  viewer.stream().subscribe(kWindow);
+  viewer.stream().subscribe({.in_flight_bytes = kWindow});
   show(viewer, 0.3);
   wait_until_idle(pool_);
   std::size_t stops = 0;
@@ -218,7 +218,7 @@ TEST_F(ViewerStreamTest, AFrameLargerThanTheWindowGoesAlone) {
   scene_ = scene_of(tiles_of_tree(2, 150));
   TestViewer viewer(scene_, cache_, pool_);
   viewer.acknowledges = false;
-  viewer.stream().subscribe(1);
+  viewer.stream().subscribe({.in_flight_bytes = 1});
   show(viewer, 0.3);
   for (std::size_t i = 1; i <= 6; ++i) {
     wait_until_idle(pool_);
@@ -234,7 +234,7 @@ TEST_F(ViewerStreamTest, TheFirstPictureGoesInOnePiece) {
   scene_ = scene_of(tiles_of_tree(8, 200));
   TestViewer viewer(scene_, cache_, pool_);
   viewer.acknowledges = false;
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   wait_until_idle(pool_);
   viewer.take();
@@ -249,7 +249,7 @@ TEST_F(ViewerStreamTest, IgnoresAcknowledgementsThatMakeNoSense) {
   scene_ = scene_of(tiles_of_tree(2, 150));
   TestViewer viewer(scene_, cache_, pool_);
   viewer.acknowledges = false;
-  viewer.stream().subscribe(1);
+  viewer.stream().subscribe({.in_flight_bytes = 1});
   show(viewer, 0.3);
   wait_until_idle(pool_);
   ASSERT_EQ(viewer.take(), 1U);
@@ -267,7 +267,7 @@ TEST_F(ViewerStreamTest, IgnoresAcknowledgementsThatMakeNoSense) {
 TEST_F(ViewerStreamTest, AViewerThatDoesNotReadHoldsLittle) {
   scene_ = scene_of(tiles_of_tree(30, 100));
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   wait_until_idle(pool_);
   const auto held_at_rest = viewer.stream().stats().queued_bytes;
@@ -286,7 +286,7 @@ TEST_F(ViewerStreamTest, ViewersWithTheSameSettingsCostOneEncoding) {
     const HeldWorkers held(pool_);
     for (int i = 0; i < 16; ++i) {
       viewers.push_back(std::make_unique<TestViewer>(scene_, cache_, pool_));
-      viewers.back()->stream().subscribe(0);
+      viewers.back()->stream().subscribe({});
       show(*viewers.back(), 0.3);
     }
   }
@@ -301,8 +301,8 @@ TEST_F(ViewerStreamTest, ViewersWithTheSameSettingsCostOneEncoding) {
 TEST_F(ViewerStreamTest, ViewersWithDifferentSettingsShareGeometry) {
   TestViewer one(scene_, cache_, pool_);
   TestViewer two(scene_, cache_, pool_);
-  one.stream().subscribe(0);
-  two.stream().subscribe(0);
+  one.stream().subscribe({});
+  two.stream().subscribe({});
   show(one, 0.3);
   show(two, 0.6);
   one.complete();
@@ -318,7 +318,7 @@ TEST_F(ViewerStreamTest, ViewersWithDifferentSettingsTakeTurns) {
   std::vector<std::unique_ptr<TestViewer>> viewers;
   for (std::size_t i = 0; i < kViewers; ++i) {
     viewers.push_back(std::make_unique<TestViewer>(scene_, cache_, pool_));
-    viewers.back()->stream().subscribe(0);
+    viewers.back()->stream().subscribe({});
   }
   {
     const HeldWorkers held(pool_);
@@ -340,7 +340,7 @@ TEST_F(ViewerStreamTest, WorksWithACacheThatKeepsNothing) {
   TestViewer one(scene_, tiny, pool_);
   TestViewer two(scene_, tiny, pool_);
   for (TestViewer* viewer : {&one, &two}) {
-    viewer->stream().subscribe(0);
+    viewer->stream().subscribe({});
     show(*viewer, 0.3);
   }
   one.complete();
@@ -355,7 +355,7 @@ TEST_F(ViewerStreamTest, WorksWithACacheThatKeepsNothing) {
 
 TEST_F(ViewerStreamTest, FewerColourBitsSendColoursOnly) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   StreamQuality quality = viewer.stream().quality();
@@ -375,7 +375,7 @@ TEST_F(ViewerStreamTest, SubtractGreenShowsTheSameColours) {
     StreamQuality quality = viewer->stream().quality();
     quality.colour_bits = 6;
     viewer->stream().set_quality(quality);
-    viewer->stream().subscribe(0, viewer->colour_transform);
+    viewer->stream().subscribe({.colour_transform = viewer->colour_transform});
     show(*viewer, 0.3);
     viewer->complete();
     expect_picture(*viewer, *scene_, 0.3, 6);
@@ -387,13 +387,13 @@ TEST_F(ViewerStreamTest, SubtractGreenShowsTheSameColours) {
 
 TEST_F(ViewerStreamTest, AnotherTransformWhileFramesFlowSendsColoursAnew) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   show(viewer, 0.6);
   wait_until_idle(pool_);  // Prepared, not taken: written the old way.
   viewer.colour_transform = protocol::ColourTransform::SubtractGreen;
-  viewer.stream().subscribe(0, viewer.colour_transform);
+  viewer.stream().subscribe({.colour_transform = viewer.colour_transform});
   viewer.complete();
   EXPECT_EQ(viewer.count(FrameKind::Geometry), scene_->tiles().size());
   expect_picture(viewer, *scene_, 0.6);
@@ -401,7 +401,7 @@ TEST_F(ViewerStreamTest, AnotherTransformWhileFramesFlowSendsColoursAnew) {
 
 TEST_F(ViewerStreamTest, AnotherPositionStepSendsGeometryUnderANewRevision) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   StreamQuality quality = viewer.stream().quality();
@@ -417,7 +417,7 @@ TEST_F(ViewerStreamTest, AnotherPositionStepSendsGeometryUnderANewRevision) {
 
 TEST_F(ViewerStreamTest, QualityThatIsTheSameSendsNothing) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   viewer.stream().set_quality(viewer.stream().quality());
@@ -427,7 +427,7 @@ TEST_F(ViewerStreamTest, QualityThatIsTheSameSendsNothing) {
 
 TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
 
@@ -455,7 +455,7 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
 TEST_F(ViewerStreamTest, AnEmptySceneIsComplete) {
   const auto empty = scene_of({});
   TestViewer viewer(empty, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   viewer.stream().set_plan(plan_with_alpha(*empty, 0.3));
   EXPECT_EQ(viewer.complete().tile_count, 0U);
 }
@@ -465,7 +465,7 @@ TEST_F(ViewerStreamTest, ATileWithoutTemperatureShowsItsVisibleColour) {
   tile->temperature_celsius.clear();
   scene_ = scene_of({tile});
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 1);
   viewer.complete();
   tile->temperature_celsius.assign(tile->positions.size(), std::numeric_limits<float>::quiet_NaN());
@@ -479,7 +479,7 @@ TEST_F(ViewerStreamTest, ATileThatCannotBeEncodedIsLeftOutAndCounted) {
   tiles[3] = broken;
   scene_ = scene_of(tiles);
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   EXPECT_EQ(viewer.complete().tile_count, 6U);
   EXPECT_EQ(viewer.stream().stats().failed_tiles, 1U);
@@ -490,7 +490,7 @@ TEST_F(ViewerStreamTest, ATileThatCannotBeEncodedIsLeftOutAndCounted) {
 
 TEST_F(ViewerStreamTest, AnEncodingThatComesBackHasANewRevisionOnTheWire) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   const auto first = viewer.tiles.at({0, 0, 0, 0}).geometry.revision;
@@ -514,7 +514,7 @@ TEST_F(ViewerStreamTest, AnEncodingThatComesBackHasANewRevisionOnTheWire) {
 
 TEST_F(ViewerStreamTest, UnsubscribeStopsAndSubscribeStartsFromNothing) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   viewer.stream().unsubscribe();
@@ -522,7 +522,7 @@ TEST_F(ViewerStreamTest, UnsubscribeStopsAndSubscribeStartsFromNothing) {
   wait_until_idle(pool_);
   EXPECT_EQ(viewer.take(), 0U);
   const auto frames_before = viewer.frames.size();
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   while (!viewer.stream().take_complete()) {
     const auto frame = viewer.stream().next_frame(0);
     if (!frame) {
@@ -545,7 +545,7 @@ TEST_F(ViewerStreamTest, IsNeverWokenAfterClose) {
   for (int round = 0; round < 50; ++round) {
     FrameCache cache(kRoomyCache);
     TestViewer viewer(scene_, cache, pool_);
-    viewer.stream().subscribe(0);
+    viewer.stream().subscribe({});
     show(viewer, 0.3);
     if (round % 2 == 1) viewer.wait_and_take();
     viewer.stream().close();
@@ -570,7 +570,7 @@ TEST_F(ViewerStreamTest, ViewersOnManyThreadsAllGetTheirPicture) {
   for (int i = 0; i < 6; ++i) {
     threads.emplace_back([this, i] {
       TestViewer viewer(scene_, cache_, pool_);
-      viewer.stream().subscribe(i % 2 == 0 ? 0 : 10'000);
+      viewer.stream().subscribe({.in_flight_bytes = i % 2 == 0 ? std::size_t{0} : 10'000});
       for (int step = 0; step <= 20; ++step) {
         viewer.stream().set_plan(plan_with_alpha(*scene_, step / 40.0 + (i % 3) * 0.1));
         if (step % 5 == 0) viewer.complete();
@@ -593,7 +593,7 @@ TEST_F(ViewerStreamTest, SurvivesViewersThatLeaveInTheMiddle) {
     threads.emplace_back([this, i] {
       for (int round = 0; round < 20; ++round) {
         TestViewer viewer(scene_, cache_, pool_);
-        viewer.stream().subscribe(0);
+        viewer.stream().subscribe({});
         show(viewer, (i * 20 + round) / 100.0);
         for (int frame = 0; frame < round % 5; ++frame) viewer.take();
       }
@@ -601,7 +601,7 @@ TEST_F(ViewerStreamTest, SurvivesViewersThatLeaveInTheMiddle) {
   }
   for (auto& thread : threads) thread.join();
   TestViewer last(scene_, cache_, pool_);
-  last.stream().subscribe(0);
+  last.stream().subscribe({});
   show(last, 0.79);
   last.complete();
   expect_picture(last, *scene_, 0.79);
@@ -662,7 +662,7 @@ TEST_F(ViewerStreamOfATree, WhatIsNotLookedAtIsNeitherSentNorEncoded) {
   TestViewer viewer(scene_, cache_, pool_);
   const Camera corner = camera_over(0.5F, 0.5F, 0.5F);
   viewer.stream().set_camera(corner);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   const auto complete = viewer.complete();
   EXPECT_EQ(viewer.tiles.size(), 9U);
@@ -675,7 +675,7 @@ TEST_F(ViewerStreamOfATree, WhatIsNotLookedAtIsNeitherSentNorEncoded) {
 TEST_F(ViewerStreamOfATree, AMovingCameraRefinesWhatItLooksAt) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().set_camera(camera_over(2, 2, 5000));
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   EXPECT_EQ(viewer.complete().tile_count, 1U);
   const Camera far_corner = camera_over(3.5F, 3.5F, 0.5F);
@@ -696,14 +696,14 @@ TEST_F(ViewerStreamOfATree, ACameraThatMakesNoSenseIsIgnored) {
   Camera nowhere = camera_over(0.5F, 0.5F, 0.5F);
   nowhere.target = nowhere.eye;
   viewer.stream().set_camera(nowhere);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   EXPECT_EQ(viewer.complete().tile_count, 21U);
 }
 
 TEST_F(ViewerStreamOfATree, TilesWhosePlaceIsTakenAreNotColouredAgain) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   const auto frames_before = viewer.frames.size();
@@ -726,7 +726,7 @@ TEST_F(ViewerStreamOfATree, TilesWhosePlaceIsTakenAreNotColouredAgain) {
 
 TEST_F(ViewerStreamOfATree, OutdatedTilesDoNotStayInFrontOfNewerOnes) {
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   show(viewer, 0.3);
   viewer.complete();
   const Camera afar = camera_over(2, 2, 5000);
@@ -745,9 +745,8 @@ TEST_F(ViewerStreamOfATree, OutdatedTilesDoNotStayInFrontOfNewerOnes) {
 }
 
 TEST_F(ViewerStreamOfATree, TilesLeftLongestAreRemovedBeyondTheLimit) {
-  constexpr std::uint64_t kTileVertices = 40 * 40;
-  TestViewer viewer(scene_, cache_, pool_, {.held_vertices = 14 * kTileVertices});
-  viewer.stream().subscribe(0);
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({.cache_bytes = 14 * decoded_bytes(*scene_->tiles().front())});
   viewer.stream().set_camera(camera_over(0.5F, 0.5F, 0.5F));
   show(viewer, 0.3);
   viewer.complete();
@@ -770,17 +769,35 @@ TEST_F(ViewerStreamOfATree, TilesLeftLongestAreRemovedBeyondTheLimit) {
   expect_view(viewer, first_corner, 0.3);
 }
 
+TEST_F(ViewerStreamOfATree, ASmallCacheGetsTheWholeSceneCoarser) {
+  const std::uint64_t tile_bytes = decoded_bytes(*scene_->tiles().front());
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({.cache_bytes = 14 * tile_bytes});
+  viewer.stream().set_camera(camera_over(2, 2, 12));
+  show(viewer, 0.3);
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 1U + 4 + 4 + 4) << "two quarters are refined; a third does not fit";
+  EXPECT_GT(viewer.stream().stats().position_mm, 200) << "as coarse as the quarters that are not refined";
+  // Smaller, then without a bound.
+  viewer.stream().subscribe({.cache_bytes = tile_bytes / 2});
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 1U);
+  viewer.stream().subscribe({});
+  viewer.complete();
+  EXPECT_EQ(viewer.tiles.size(), 21U);
+}
+
 /// A viewer who had everything, and one who comes after it on the same server.
 class ResumedStream : public ViewerStreamOfATree {
  protected:
   ResumedStream() {
-    before_.stream().subscribe(0);
+    before_.stream().subscribe({});
     show(before_, 0.3);
     before_.complete();
   }
 
   void subscribe_and_complete() {
-    after_.stream().subscribe(0);
+    after_.stream().subscribe({});
     show(after_, 0.6);
     after_.complete();
   }
@@ -840,7 +857,7 @@ TEST_F(ResumedStream, DoesNotTakeTilesOfAnotherSceneForItsOwn) {
   const auto next = scene_of(testing::quadtree_tiles(3, 40), 2);
   TestViewer viewer(next, cache_, pool_);
   EXPECT_EQ(viewer.resume(before_, before_.claims()), 0U);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({});
   viewer.stream().set_plan(plan_with_alpha(*next, 0.6));
   viewer.complete();
   expect_picture(viewer, *next, 0.6);
@@ -850,22 +867,21 @@ TEST_F(ResumedStream, IsTakenUpByACacheThatKeptNothing) {
   FrameCache tiny(0);
   TestViewer before(scene_, tiny, pool_);
   TestViewer after(scene_, tiny, pool_);
-  before.stream().subscribe(0);
+  before.stream().subscribe({});
   show(before, 0.3);
   before.complete();
   EXPECT_EQ(after.resume(before, before.claims()), 21U);
-  after.stream().subscribe(0);
+  after.stream().subscribe({});
   show(after, 0.6);
   after.complete();
   EXPECT_EQ(after.count(FrameKind::Geometry), 0U);
 }
 
-TEST_F(ResumedStream, KeepsToTheLimitOfVertices) {
-  constexpr std::uint64_t kTileVertices = 40 * 40;
-  TestViewer viewer(scene_, cache_, pool_, {.held_vertices = 14 * kTileVertices});
+TEST_F(ResumedStream, KeepsToTheBytesOfTheNewViewer) {
+  TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().set_camera(camera_over(0.5F, 0.5F, 0.5F));
   EXPECT_EQ(viewer.resume(before_, before_.claims()), 21U);
-  viewer.stream().subscribe(0);
+  viewer.stream().subscribe({.cache_bytes = 14 * decoded_bytes(*scene_->tiles().front())});
   show(viewer, 0.6);
   viewer.complete();
   EXPECT_LE(viewer.tiles.size(), 14U);
@@ -873,7 +889,7 @@ TEST_F(ResumedStream, KeepsToTheLimitOfVertices) {
 }
 
 TEST_F(ResumedStream, WhileFramesFlowNothingIsTakenUp) {
-  after_.stream().subscribe(0);
+  after_.stream().subscribe({});
   EXPECT_EQ(after_.stream().resume(before_.claims()), 0U);
   show(after_, 0.6);
   after_.complete();
@@ -885,7 +901,7 @@ TEST_F(ViewerStreamOfATree, TellsTheAccuracyOnTheScreen) {
   viewer.acknowledges = false;
   const Camera camera = camera_over(2, 2, 12);
   viewer.stream().set_camera(camera);
-  viewer.stream().subscribe(1);
+  viewer.stream().subscribe({.in_flight_bytes = 1});
   show(viewer, 0.3);
   const double rounding_mm = static_cast<double>(viewer.stream().quality().position_step_m) / 2 * std::sqrt(3.0) * 1e3;
   wait_until_idle(pool_);

@@ -585,6 +585,10 @@ export interface SubscribeRequest {
    */
   in_flight_bytes?: number;
   /**
+   * Most bytes of decoded tiles held by the client (16 a vertex, 12 a triangle); absent: no bound to what it asks for.
+   */
+  cache_bytes?: number;
+  /**
    * How colours are written: none = frames of kind 2 (r, g, b), subtract_green = kind 6 (g and r - g, b - g).
    */
   colour_transform?: "none" | "subtract_green";

@@ -51,8 +51,16 @@ const BUSY_WAIT_MS = 300;
 const TICK_MS = 100;
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
+/** Part of this machine's memory for decoded tiles; a browser that does not tell has as much as a tablet. */
+const CACHE_SHARE = 1 / 16;
+const TABLET_GIB = 4;
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
+
+function cacheBytes(): number {
+  const { deviceMemory = TABLET_GIB } = navigator as Navigator & { deviceMemory?: number };
+  return deviceMemory * 2 ** 30 * CACHE_SHARE;
+}
 
 function createDecodeWorker(): Worker {
   return new Worker(new URL('../decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' });
@@ -354,6 +362,7 @@ export class Session {
     try {
       const answer = await this.#connection.request('scene.subscribe', {
         channels: ['fused'],
+        ...(greeting.capabilities.includes('cache_bytes') ? { cache_bytes: cacheBytes() } : {}),
         ...(greeting.capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
         ...(claims.length > 0 ? { resume: { session_id, tiles: claims } } : {}),
       });
