@@ -1,14 +1,14 @@
 // A parameter change against sending the whole mesh again, both over loopback and both decoded by Node, taken in turns in
 // one run:
 //   node tests/bench/stream/parameter_change.mjs [SCENE.ply] [ROUNDS]     (default: a generated scene of 1,000,000 vertices)
-// Prints the medians and the ratios of time and bytes; then what a change costs with colours as they are and with
+// Prints the medians and the ratios of time and bytes; after how long the first colours of a change, coarse ones, have come; then what a change costs with colours as they are and with
 // subtract_green, at 8 and 6 bits.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import net from "node:net";
 import { tmpdir } from "node:os";
 import path from "node:path";
-import { KIND, SpectraClient } from "../../integration/node/spectra_client.mjs";
+import { isColours, KIND, readFrame, SpectraClient } from "../../integration/node/spectra_client.mjs";
 import { binary, run, serve } from "../../integration/node/spectra_server.mjs";
 
 const folder = mkdtempSync(path.join(tmpdir(), "spectra-bench-"));
@@ -20,7 +20,7 @@ if (!scene) {
 }
 
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
-const alphaOf = (round) => (0.3 + 0.05 * round).toFixed(2);
+const alphaOf = (round) => (0.3 + (0.6 * (round + 1)) / (rounds + 1)).toFixed(3);
 
 /** One exchange with the whole-mesh sender: request to decoded mesh and colours. */
 class WholeMeshClient {
@@ -80,16 +80,24 @@ const blend = (alpha) => ({ method: "thermal_visible_blend", params: { alpha: Nu
 async function tileChange(client, change) {
   const bytesBefore = client.received_bytes;
   const framesBefore = client.frames.length;
+  let first = null;
+  const onMessage = (data, isBinary) => {
+    if (!isBinary || first !== null) return;
+    const frame = readFrame(data);
+    if (isColours(frame)) first = { ms: performance.now() - start, vertex_count: frame.vertexCount };
+  };
+  client.socket.on("message", onMessage);
   const start = performance.now();
   const { generation } = await client.request("fusion.set", change);
   await client.complete(generation);
+  client.socket.off("message", onMessage);
   const ms = performance.now() - start;
   if (client.failures.length) throw client.failures[0];
   if (client.frames.slice(framesBefore).some((frame) => frame.kind === KIND.geometry)) throw new Error("geometry was sent again");
   const drawn = client.drawnTiles();
   if (drawn.some((tile) => tile.generation !== generation)) throw new Error("a drawn tile is behind");
   if (drawn.some((tile) => tile.frame.childMask !== 0)) throw new Error("a drawn tile is not at full accuracy");
-  return { ms, bytes: client.received_bytes - bytesBefore };
+  return { ms, first, bytes: client.received_bytes - bytesBefore };
 }
 
 const tile = [];
@@ -105,6 +113,8 @@ const ratios = tile.map((a, i) => mesh[i].ms / a.ms);
 const { vertex_count, triangle_count } = client.hello.scene;
 console.log(`${path.basename(scene)}: ${vertex_count} vertices, ${triangle_count} triangles, ${client.tiles.size} tiles, step ${(step * 1000).toFixed(3)} mm, ${rounds} rounds`);
 console.log(`colours only     median ${median(tile.map((a) => a.ms)).toFixed(1)} ms, ${median(tile.map((a) => a.bytes))} bytes`);
+const first = tile.map((a) => a.first.ms);
+console.log(`first colours    median ${median(first).toFixed(1)} ms (${Math.min(...first).toFixed(1)} .. ${Math.max(...first).toFixed(1)}), of ${tile[0].first.vertex_count} vertices`);
 console.log(`whole mesh again median ${median(mesh.map((a) => a.ms)).toFixed(1)} ms, ${median(mesh.map((a) => a.bytes))} bytes`);
 console.log(`faster by ${median(ratios).toFixed(2)} (min ${Math.min(...ratios).toFixed(2)}), bytes ratio ${(median(tile.map((a) => a.bytes)) / median(mesh.map((a) => a.bytes))).toFixed(3)}`);
 
