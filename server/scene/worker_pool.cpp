@@ -51,6 +51,9 @@ struct WorkerPool::State {
         spdlog::error("a worker's job failed with something that is no exception object");
       }
       job = nullptr;  // what it holds is released without the lock
+      // Those who wait for what the job has made, often an I/O thread, go before the next job: a scheduler with time slices would
+      // let a busy worker keep the processor for milliseconds.
+      std::this_thread::yield();
       lock.lock();
     }
   }
