@@ -315,17 +315,18 @@ Errors colour_errors(const Samples& samples, const std::vector<SurfacePoint>& ne
 }
 
 fusion::Result<ColourPoint> draco_colours(const Tiles& tiles, const std::vector<EncodedTile>& geometry,
-                                          const fusion::FusionPlan& plan, ColourPoint point) {
-  point.codec = "draco";
+                                          const fusion::FusionPlan& plan, protocol::ColourTransform transform,
+                                          ColourPoint point) {
+  point.codec = transform == protocol::ColourTransform::None ? "draco" : kSubtractGreen;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const auto payload = [&] {
       const Stopwatch watch(point.encode_ms);
-      return encoded_tile_colours(*tiles[i], geometry[i], plan, point.colour_bits, 7);
+      return encoded_tile_colours(*tiles[i], geometry[i], plan, point.colour_bits, 7, transform);
     }();
     if (!payload) return failure(fusion::ErrorCode::BadValue, payload.error().message, "colours");
     point.size_bytes += payload.value()->size();
     const Stopwatch watch(point.decode_ms);
-    if (!protocol::decoded_colours(*payload.value())) {
+    if (!protocol::decoded_colours(*payload.value(), transform)) {
       return failure(fusion::ErrorCode::BadValue, "encoded colours cannot be decoded", "colours");
     }
   }
@@ -457,8 +458,10 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
       const Errors errors = colour_errors(samples, nearest, surface, tiles, plans, reader, bits);
       const ColourPoint base{
           "", level, bits, 0, 0, 0, errors.ciede2000_mean, errors.ciede2000_p95, errors.temperature_p95_celsius};
-      BOOST_OUTCOME_TRY(auto point, draco_colours(tiles, geometry, plans.look, base));
-      result.colours.push_back(std::move(point));
+      for (const auto transform : {protocol::ColourTransform::None, protocol::ColourTransform::SubtractGreen}) {
+        BOOST_OUTCOME_TRY(auto point, draco_colours(tiles, geometry, plans.look, transform, base));
+        result.colours.push_back(std::move(point));
+      }
       if (bits != 8) continue;
       result.colours.push_back(raw_colours(tiles, base));
       result.colours.push_back(zstd_colours(tiles, plans.look, base));
@@ -479,7 +482,7 @@ std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measur
     for (const GeometryPoint& geometry : measurement.geometry) {
       if (geometry.codec != "draco") continue;
       for (const ColourPoint& colours : measurement.colours) {
-        if (colours.codec != "draco" || colours.level != geometry.level) continue;
+        if (colours.codec != kSubtractGreen || colours.level != geometry.level) continue;
         // Encoding, sending and decoding overlap tile by tile: the slowest of the three decides.
         const auto seconds = [bytes_per_s](double bytes, double encode_ms, double decode_ms) {
           return std::max({bytes / bytes_per_s, encode_ms / 1000, decode_ms / 1000});

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fusion/error.hpp"
@@ -19,6 +20,9 @@ struct TradeoffOptions {
   std::vector<int> colour_bits{8, 7, 6, 5, 4};
   std::vector<double> step_factors{0.25, 0.5, 1, 2, 4, 8};  ///< Times the scene's suggested position step.
 };
+
+/// Codec of colours in frames of kind 6: Draco, after subtracting green from red and blue.
+inline constexpr std::string_view kSubtractGreen = "draco subtract_green";
 
 /// Geometry at one level of detail, position step and encoder: cost and position error against the full mesh surface.
 struct GeometryPoint {
@@ -36,7 +40,8 @@ struct GeometryPoint {
 
 /// Colours at one level of detail and number of bits: cost, and error of what the screen shows at the samples.
 struct ColourPoint {
-  std::string codec;
+  std::string
+      codec;  ///< As above; "draco" are the plain colour frames, kSubtractGreen those that the web client asks for.
   int level = 0;
   int colour_bits = 8;
   std::uint64_t size_bytes = 0;
@@ -71,7 +76,7 @@ struct Recommendation {
   double parameter_change_s = 0;  ///< Colours alone.
 };
 
-/// For each rate the most accurate Draco point whose parameter change takes at most `change_target_s` and whose first full
+/// For each rate the most accurate point that the web client can be sent (kSubtractGreen) whose parameter change takes at most `change_target_s` and whose first full
 /// picture at most `picture_target_s`; where none does, the cheapest.
 std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measurement,
                                                const std::vector<double>& rates_mbit_per_s,

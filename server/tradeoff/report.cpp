@@ -104,8 +104,11 @@ struct Mark {
   std::string title;
 };
 
-const std::vector<std::pair<std::string, std::string>> kSeries{
-    {"draco", "#1b6ca8"}, {"meshoptimizer", "#b3541e"}, {"zstd", "#5b7f2b"}, {"raw", "#777777"}};
+const std::vector<std::pair<std::string, std::string>> kSeries{{"draco", "#1b6ca8"},
+                                                               {std::string(kSubtractGreen), "#1e9e8a"},
+                                                               {"meshoptimizer", "#b3541e"},
+                                                               {"zstd", "#5b7f2b"},
+                                                               {"raw", "#777777"}};
 
 /// Points that no other point beats in both size and error, by rising size.
 std::vector<Mark> frontier_of(std::vector<Mark> marks) {
@@ -123,7 +126,7 @@ std::vector<Mark> frontier_of(std::vector<Mark> marks) {
   return frontier;
 }
 
-/// Size against error, both logarithmic; errors below `floor` are drawn at it.
+/// Size against error, both logarithmic; errors below `floor` are drawn at the lower edge.
 std::string plot(const std::string& heading, const std::string& error_name, const std::vector<Mark>& marks,
                  double floor) {
   constexpr double kWidth = 760, kHeight = 380, kLeft = 70, kBottom = 46, kTop = 14, kRight = 36;
@@ -134,12 +137,12 @@ std::string plot(const std::string& heading, const std::string& error_name, cons
     high_error = std::max(high_error, mark.error);
     low_error = std::min(low_error, mark.error);
   }
-  floor = std::max(floor, low_error);
   const double x0 = std::floor(std::log10(low_size)), x1 = std::max(x0 + 1, std::ceil(std::log10(high_size)));
-  const double y0 = std::floor(std::log10(floor)), y1 = std::max(y0 + 1, std::ceil(std::log10(high_error)));
+  const double y0 = std::floor(std::log10(std::max(floor, low_error))),
+               y1 = std::max(y0 + 1, std::ceil(std::log10(high_error)));
   const auto x = [&](double kb) { return kLeft + (kWidth - kLeft - kRight) * (std::log10(kb) - x0) / (x1 - x0); };
   const auto y = [&](double error) {
-    return kHeight - kBottom - (kHeight - kBottom - kTop) * (std::log10(std::max(error, floor)) - y0) / (y1 - y0);
+    return kHeight - kBottom - (kHeight - kBottom - kTop) * std::max(0.0, (std::log10(error) - y0) / (y1 - y0));
   };
   std::string svg = fmt::format("<h3>{}</h3><svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
                                 escaped(heading), kWidth, kHeight, escaped(heading));
@@ -167,11 +170,12 @@ std::string plot(const std::string& heading, const std::string& error_name, cons
     svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"><title>{}</title></circle>",
                        x(mark.size_kb), y(mark.error), series->second, escaped(mark.title));
   }
-  double legend = kLeft + 240;
+  double legend = kLeft + 200;
   for (const auto& [name, colour] : kSeries) {
+    if (std::none_of(marks.begin(), marks.end(), [&](const Mark& mark) { return mark.series == name; })) continue;
     svg += fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{}\"/><text x=\"{}\" y=\"{}\">{}</text>", legend,
                        kHeight - 12, colour, legend + 9, kHeight - 8, name);
-    legend += 120;
+    legend += 34 + 7 * static_cast<double>(name.size());
   }
   return svg + "</svg>";
 }
@@ -237,7 +241,7 @@ std::string grid_csv(const TradeoffMeasurement& measurement) {
   std::vector<Row> rows;
   for (const GeometryPoint& geometry : measurement.geometry) {
     for (const ColourPoint& colours : measurement.colours) {
-      if (geometry.codec != "draco" || colours.codec != "draco" || geometry.level != colours.level) continue;
+      if (geometry.codec != "draco" || !colours.codec.starts_with("draco") || geometry.level != colours.level) continue;
       Row row = row_of(geometry);
       const Row tail = row_of(colours);
       row.insert(row.end(), tail.begin(), tail.end());

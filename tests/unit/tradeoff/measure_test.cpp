@@ -80,6 +80,13 @@ TEST_F(Tradeoff, FewerBitsCostFewerBytesAndMoreError) {
     EXPECT_LT(draco[i].size_bytes, draco[i - 1].size_bytes);
     EXPECT_GT(draco[i].ciede2000_mean, draco[i - 1].ciede2000_mean);
   }
+  for (const ColourPoint& p : measurement_->colours) {
+    if (p.codec != kSubtractGreen || p.level != full_level()) continue;
+    const auto plain =
+        std::find_if(draco.begin(), draco.end(), [&](const auto& d) { return d.colour_bits == p.colour_bits; });
+    EXPECT_EQ(p.ciede2000_mean, plain->ciede2000_mean) << "the same colours, written otherwise";
+    EXPECT_NE(p.size_bytes, plain->size_bytes);
+  }
   EXPECT_LT(draco.front().temperature_p95_celsius, 20 * 0.01) << "read back within one percent of the range";
 }
 
@@ -89,6 +96,7 @@ TEST_F(Tradeoff, RecommendsMoreForFasterLinks) {
   const auto size = [](const Recommendation& r) { return r.geometry.size_bytes + r.colours.size_bytes; };
   EXPECT_LE(size(recommended[0]), size(recommended[1]));
   EXPECT_LE(recommended[1].parameter_change_s, 0.5);
+  for (const auto& r : recommended) EXPECT_EQ(r.colours.codec, kSubtractGreen);
 }
 
 TEST_F(Tradeoff, ReportsEveryPointAndEscapesNames) {
@@ -96,7 +104,7 @@ TEST_F(Tradeoff, ReportsEveryPointAndEscapesNames) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n') - 1,
             std::count_if(measurement_->geometry.begin(), measurement_->geometry.end(), [](const auto& p) {
               return p.codec == "draco";
-            }) * 5);
+            }) * 10);
   const std::string html = report_html(*measurement_, recommended_points(*measurement_, {5}));
   EXPECT_NE(html.find("wavy &lt;square&gt;"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
