@@ -12,6 +12,8 @@
 
 namespace spectra::server {
 
+using Tiles = std::vector<std::shared_ptr<const Tile>>;
+
 /// What `spectra tradeoff` measures and how closely.
 struct TradeoffOptions {
   std::uint32_t sample_count = 20'000;  ///< Vertices of the full scene at which errors are taken.
@@ -76,13 +78,10 @@ struct Recommendation {
   double parameter_change_s = 0;  ///< Colours alone.
 };
 
-/// For each rate the most accurate point that the web client can be sent (kSubtractGreen) whose parameter change takes at most `change_target_s` and whose first full
-/// picture at most `picture_target_s`; where none does, the cheapest.
+/// For each rate the most accurate point, with colours as the web client asks for them, whose parameter change takes at most
+/// `change_target_s` and whose first full picture at most `picture_target_s`; where none does, the cheapest.
 std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measurement,
                                                const std::vector<double>& rates_mbit_per_s,
                                                double change_target_s = 0.5, double picture_target_s = 10);
-
-/// The tiles that are drawn when the tree is refined to `level`: those of that level, and leaves above it.
-std::vector<std::shared_ptr<const Tile>> tiles_at_level(const SceneSnapshot& scene, int level);
 
 }  // namespace spectra::server
