@@ -5,7 +5,7 @@
 namespace spectra::server {
 namespace {
 
-constexpr std::array<QualityPoint, 8> kFrontier{{{1, 8}, {1, 7}, {1, 6}, {2, 6}, {2, 5}, {4, 5}, {8, 5}, {8, 4}}};
+constexpr std::array<QualityPoint, 8> kFrontier{{{1, 8}, {1, 7}, {1, 6}, {2, 6}, {4, 6}, {8, 6}, {16, 6}, {16, 5}}};
 constexpr std::array<double, 9> kPlainCost{0, 0, 0, 0, 0.45, 0.70, 1.14, 1.45, 1.78};
 constexpr std::array<double, 9> kSubtractGreenCost{0, 0, 0, 0, 0.44, 0.62, 0.83, 1.11, 1.43};
 constexpr std::size_t kFewestVerticesToLearnFrom = 1000;  // Below, the frame is mostly its fixed part.

@@ -18,8 +18,9 @@ struct QualityPoint {
   friend bool operator==(const QualityPoint&, const QualityPoint&) = default;
 };
 
-/// From full quality to the least that still helps; each point costs fewer bytes than the one before. Colours lose bits
-/// first: six bits are hard to tell from eight and save a third, while a doubled pixel error is seen at edges.
+/// From full quality to the least that still helps; each point costs fewer bytes than the one before. Colours lose two bits
+/// first: six are hard to tell from eight and save two fifths. Then tiles get coarser: a level less costs fewer bytes and a
+/// smaller colour difference than a fifth or fourth bit (docs/tradeoff.md).
 std::span<const QualityPoint> quality_frontier();
 
 /// Bytes of a colour frame per vertex, for each number of colour bits; learnt from the frames that are sent, starting from

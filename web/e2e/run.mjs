@@ -275,7 +275,33 @@ test('Coarser quality is in force and said in words', async () => {
   assert.match(await page.locator('.words').innerText(), /colours ±2 of 255/);
   await settled(page);
   assert.equal(shown.triangles > 0.9 * scene.triangle_count, true);
+  // Coarser still: what is there stays, the next change is answered with less.
+  await page.locator('#accuracy').fill('0');
+  await settled(page);
+  assert.equal((await state()).shown.triangles, shown.triangles);
+  await page.locator('[data-method="intensity_hue"]').click();
+  await settled(page);
+  const coarse = await state();
+  assert.deepEqual([coarse.quality.colour_bits, coarse.quality.pixel_error], [6, 16]);
+  assert.ok(coarse.shown.triangles < shown.triangles, `${coarse.shown.triangles} of ${shown.triangles} triangles`);
   await page.locator('#accuracy').fill('4');
+  await settled(page);
+  assert.equal((await state()).shown.triangles, shown.triangles);
+});
+
+test('Automatic quality answers a change coarser first, and refines it', async () => {
+  await page.getByText('Details', { exact: true }).click();
+  await page.getByText('Coarser at first').click();
+  await page.waitForFunction(() => globalThis.spectra.store.quality.mode === 'auto');
+  await page.locator('#latency-target').fill('50');
+  await page.locator('#colour-bits').fill('7');
+  await settled(page);
+  const { quality } = await state();
+  assert.deepEqual([quality.mode, quality.latency_target_ms, quality.colour_bits], ['auto', 50, 7]);
+  await page.locator('#colour-bits').fill('8');
+  await page.getByText('Coarser at first').click();
+  await page.waitForFunction(() => globalThis.spectra.store.quality.mode === 'manual');
+  await page.getByText('Details', { exact: true }).click();
   await settled(page);
 });
 

@@ -486,7 +486,7 @@ export class Session {
 
   async #sendQuality(change: QualityChange): Promise<void> {
     try {
-      const wire: Partial<Quality> = { mode: 'manual', ...change };
+      const wire: Partial<Quality> = { mode: this.store.quality?.mode ?? 'manual', ...change };
       this.#markBehind();
       this.store.quality = qualityState(await this.#connection.request('quality.set', wire), 'quality.set').quality;
     } catch (error) {
