@@ -113,7 +113,8 @@ export function addLoadTests(browser, scratch) {
       `        at most ${(most / 2 ** 20).toFixed(1)} of 16 MiB, at least ${Math.min(...seen.map(({ vertices }) => vertices))} ` +
         `vertices drawn`,
     );
-    assert.ok(most <= 16 * 2 ** 20, `${most} bytes`);
+    // Decoding splits some vertices in two, which nobody knows before.
+    assert.ok(most <= 1.03 * 16 * 2 ** 20, `${most} bytes`);
     assert.ok(most > 8 * 2 ** 20, `${most} bytes: the memory that is there is not used`);
     assert.ok(
       seen.every(({ vertices }) => vertices > 0),

@@ -7,6 +7,7 @@ import { join } from 'node:path';
 import {
   assertGpuObjects,
   decodePng,
+  drawn,
   gpuObjects,
   openClient,
   runTests,
@@ -233,6 +234,7 @@ test('The background has exactly the colour that was chosen', async () => {
   await page.evaluate(() => globalThis.spectra.setView({ eye: [0, 1e4, 0], target: [0, 2e4, 1] }));
   for (const colour of ['#6b6d70', '#1c1d1f']) {
     await page.locator(`[aria-label="Background ${colour}"]`).click();
+    await drawn(page);
     const image = await screenshot(page, 'background');
     const expected = [1, 3, 5].map((at) => Number.parseInt(colour.slice(at, at + 2), 16));
     assert.deepEqual(image.at(700, 500), expected);
