@@ -1,6 +1,5 @@
 import { DecodePool, Superseded } from '../decode/pool';
-import type { DecodeJob } from '../decode/messages';
-import { decodeTileFrame, FrameKind, type TileFrame, tileKey } from '../protocol/frame';
+import { decodeTileFrame, FrameKind, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
   extremes,
@@ -23,7 +22,6 @@ import {
   subscribed,
   type Vec3,
 } from '../protocol/messages';
-import { Arrivals } from '../scene/arrivals';
 import {
   fittedView,
   guessUpAxis,
@@ -34,9 +32,9 @@ import {
   type View,
   viewDirection,
 } from '../scene/first_view';
+import { FrameIntake } from '../scene/frame_intake';
 import { TileSet } from '../scene/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
-import { Acknowledger } from '../transport/acknowledger';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { mergedChange, wholeChange } from './fusion_change';
@@ -54,8 +52,6 @@ const MOST_CLAIMED = 1500;
 /** Part of this machine's memory for decoded tiles; a browser that does not tell has as much as a tablet. */
 const CACHE_SHARE = 1 / 16;
 const TABLET_GIB = 4;
-/** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
-const BYTES_PER_PICTURE = 4 * 1024 * 1024;
 
 function cacheBytes(): number {
   const { deviceMemory = TABLET_GIB } = navigator as Navigator & { deviceMemory?: number };
@@ -71,8 +67,6 @@ export class Session {
   readonly viewport: Viewport;
   readonly tiles: TileSet;
   readonly #connection: Connection;
-  readonly #pool = new DecodePool(createDecodeWorker);
-  readonly #acknowledger = new Acknowledger((sequence) => this.#connection.notify('stream.ack', { sequence }));
   readonly #fusionSender: Coalescer<FusionChange>;
   readonly #qualitySender: Coalescer<QualityChange>;
   readonly #cameraSender: Coalescer<CameraPose>;
@@ -80,14 +74,11 @@ export class Session {
   readonly #hoverAsker: Coalescer<{ x: number; y: number }>;
   readonly #ticker: ReturnType<typeof setInterval>;
 
-  readonly #arrivals: Arrivals;
+  readonly #intake: FrameIntake;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
-  #removedAt = new Map<string, number>();
   #connectionNumber = 0;
   /** Session whose server knows what the tile set claims. */
   #claimableSession: string | null = null;
-  #lastSequence = 0;
-  #completeAfter: { sequence: number; message: StreamComplete } | null = null;
   #userMoved = false;
   #isHovering = false;
   #viewedScene: string | null = null;
@@ -117,7 +108,11 @@ export class Session {
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker);
     this.tiles = new TileSet((geometry, rgba) => this.viewport.createTile(geometry, rgba));
-    this.#arrivals = new Arrivals(this.tiles, (error) => this.#say(error));
+    this.#intake = new FrameIntake(this.tiles, new DecodePool(createDecodeWorker), {
+      onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
+      onArrival: () => this.viewport.invalidate(),
+      onProblem: (error) => this.#say(error),
+    });
     this.#connection = new Connection(url, {
       onHello: (message) => this.#greeted(message),
       onNotification: (method, params) => this.#notified(method, params),
@@ -177,7 +172,7 @@ export class Session {
     clearInterval(this.#ticker);
     clearTimeout(this.#nextPicture);
     this.#connection.stop();
-    this.#pool.dispose();
+    this.#intake.dispose();
     this.tiles.clear();
     this.viewport.dispose();
   }
@@ -322,12 +317,6 @@ export class Session {
     const before = returning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
     const qualityBefore = returning && this.#qualityChanged ? store.quality : null;
     this.#connectionNumber += 1;
-    this.#acknowledger.reset();
-    this.#pool.clear();
-    this.#arrivals.clear();
-    this.#removedAt.clear();
-    this.#lastSequence = 0;
-    this.#completeAfter = null;
     this.#fusionSender.reset();
     this.#qualitySender.reset();
     this.#histogramAsker.reset();
@@ -343,7 +332,7 @@ export class Session {
     store.lostAt = null;
     store.statuses = [];
     store.complete = null;
-    this.tiles.beginConnection();
+    this.#intake.beginConnection();
     this.#setScene(message.scene, true);
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
@@ -397,8 +386,7 @@ export class Session {
         break;
       }
       case 'stream.complete':
-        this.#completeAfter = { sequence: this.#lastSequence, message: streamComplete(params, method) };
-        this.viewport.invalidate();
+        this.#intake.completeAfterAll(streamComplete(params, method));
         break;
       case 'stream.stats':
         store.stats = streamStats(params, method);
@@ -519,23 +507,8 @@ export class Session {
       this.#say(error);
       return;
     }
-    this.#lastSequence = frame.sequence;
-    const key = tileKey(frame.tile);
-    if (frame.kind === FrameKind.geometry) {
-      this.#stepIs(frame.position_step_m * 1000);
-      this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
-    } else if (frame.kind === FrameKind.colours || frame.kind === FrameKind.colours_subtract_green) {
-      const transform = frame.kind === FrameKind.colours ? 'none' : 'subtract_green';
-      this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload, transform });
-    } else {
-      if (frame.kind === FrameKind.remove) {
-        this.#removedAt.set(key, frame.sequence);
-        this.#arrivals.drop(frame.tile);
-        this.tiles.remove(frame.tile);
-        this.viewport.invalidate();
-      }
-      this.#acknowledger.finished(frame.sequence);
-    }
+    if (frame.kind === FrameKind.geometry) this.#stepIs(frame.position_step_m * 1000);
+    this.#intake.receive(frame);
   }
 
   /** A server that had no scene when it said hello chooses its step later: the tiles tell which one it is. */
@@ -546,33 +519,10 @@ export class Session {
     store.quality = { ...store.quality, position_step_mm };
   }
 
-  #decode(key: string, frame: TileFrame, job: DecodeJob): void {
-    const connectionNumber = this.#connectionNumber;
-    this.#pool
-      .decode(key, job)
-      .then((result) => {
-        if (connectionNumber !== this.#connectionNumber) return;
-        const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
-        if (frame.sequence > removed) this.#arrivals.add(frame, result, performance.now());
-        this.viewport.invalidate();
-      })
-      .catch((error: unknown) => {
-        if (!(error instanceof Superseded)) this.#say(error);
-      })
-      .finally(() => {
-        if (connectionNumber === this.#connectionNumber) this.#acknowledger.finished(frame.sequence);
-      });
-  }
-
-  /** Brings decoded tiles into the picture, as many as one picture can take. Returns true when the next one has work, too. */
+  /** Brings decoded tiles into the picture. Returns true when the next one has work, too. */
   #bringIn(): boolean {
-    const complete = this.#completeAfter;
-    const isLast = complete !== null && this.#acknowledger.sequence >= complete.sequence;
-    const { bytes, next_ms } = this.#arrivals.bringIn(performance.now(), BYTES_PER_PICTURE, isLast);
-    if (isLast && this.#arrivals.size === 0) {
-      this.#completeAfter = null;
-      this.#completed(complete.message);
-    }
+    const { bytes, next_ms, complete } = this.#intake.bringIn(performance.now());
+    if (complete !== null) this.#completed(complete);
     if (this.tiles.updateSelection() || bytes > 0) this.store.shown = this.tiles.counts();
     clearTimeout(this.#nextPicture);
     if (next_ms !== null && next_ms > 0) this.#nextPicture = setTimeout(() => this.viewport.invalidate(), next_ms);

@@ -1,0 +1,146 @@
+import { beforeEach, describe, expect, it } from 'vitest';
+import type { DecodeResult } from '../decode/messages';
+import { FrameKind, type TileFrame, type TileId } from '../protocol/frame';
+import { FrameIntake } from './frame_intake';
+import { TileSet } from './tile_set';
+
+const root: TileId = { level: 0, x: 0, y: 0, z: 0 };
+const COMPLETE = { generation: 1, scene_revision: 1, tiles: 1, vertices: 1 };
+
+const results: Record<'geometry' | 'colours', DecodeResult> = {
+  geometry: {
+    kind: 'geometry',
+    positions: new Float32Array(3),
+    indices: null,
+    summary: {
+      vertex_count: 1,
+      triangle_count: 0,
+      centre: [0, 0, 0],
+      radius: 1,
+      sample: new Float32Array(3),
+      normal_sum: [0, 0, 0],
+      area_sum: 0,
+    },
+  },
+  colours: { kind: 'colours', rgba: new Uint8Array(4) },
+};
+
+let decodings: { finish: () => Promise<void>; fail: () => Promise<void> }[];
+let acknowledged: number[];
+let problems: unknown[];
+let tiles: TileSet;
+let intake: FrameIntake;
+let sequence: number;
+
+function receive(kind: number): void {
+  sequence += 1;
+  const frame: TileFrame = {
+    kind,
+    child_mask: 0,
+    sequence,
+    generation: 1,
+    tile: root,
+    revision: 1,
+    vertex_count: 1,
+    origin_m: [0, 0, 0],
+    position_step_m: 1,
+    geometric_error_m: 0,
+    lowest_celsius: 0,
+    highest_celsius: 0,
+    payload: new Uint8Array(0),
+  };
+  intake.receive(frame);
+}
+const picture = () => intake.bringIn(performance.now());
+const settle = () => new Promise<void>((resolve) => setTimeout(resolve));
+
+beforeEach(() => {
+  decodings = [];
+  acknowledged = [];
+  problems = [];
+  sequence = 0;
+  tiles = new TileSet(() => ({ setColours: () => undefined, setVisible: () => undefined, dispose: () => undefined }));
+  intake = new FrameIntake(
+    tiles,
+    {
+      decode: (_key, { kind }) =>
+        new Promise((resolve, reject) =>
+          decodings.push({
+            finish: () => {
+              resolve(results[kind]);
+              return settle();
+            },
+            fail: () => {
+              reject(new Error('broken'));
+              return settle();
+            },
+          }),
+        ),
+      clear: () => undefined,
+      dispose: () => undefined,
+    },
+    {
+      onDecoded: (last) => acknowledged.push(last),
+      onArrival: () => undefined,
+      onProblem: (error) => problems.push(error),
+    },
+  );
+  intake.beginConnection();
+});
+
+describe('FrameIntake', () => {
+  it('acknowledges what is decoded, whatever the order', async () => {
+    receive(FrameKind.geometry);
+    receive(FrameKind.colours);
+    await decodings[1]?.finish();
+    expect(acknowledged).toEqual([]);
+    await decodings[0]?.finish();
+    expect(acknowledged).toEqual([2]);
+    picture();
+    expect(tiles.size).toBe(1);
+  });
+
+  it('is complete once everything before is in the picture, and once only', async () => {
+    receive(FrameKind.geometry);
+    receive(FrameKind.colours);
+    intake.completeAfterAll(COMPLETE);
+    await decodings[0]?.finish();
+    expect(picture().complete).toBeNull();
+    await decodings[1]?.finish();
+    expect(picture().complete).toEqual(COMPLETE);
+    expect(picture().complete).toBeNull();
+  });
+
+  it('leaves out what was sent of a tile before it was removed', async () => {
+    receive(FrameKind.geometry);
+    receive(FrameKind.colours);
+    receive(FrameKind.remove);
+    await decodings[0]?.finish();
+    await decodings[1]?.finish();
+    picture();
+    expect(tiles.size).toBe(0);
+    expect(acknowledged.at(-1)).toBe(3);
+  });
+
+  it('forgets what an earlier connection has left in the decoder', async () => {
+    receive(FrameKind.geometry);
+    intake.completeAfterAll(COMPLETE);
+    intake.beginConnection();
+    await decodings[0]?.finish();
+    expect(picture()).toEqual({ bytes: 0, next_ms: null, complete: null });
+    expect(acknowledged).toEqual([]);
+    expect(tiles.size).toBe(0);
+  });
+
+  it('tells of a frame that cannot be decoded, and goes on', async () => {
+    receive(FrameKind.geometry);
+    await decodings[0]?.fail();
+    expect(problems).toEqual([new Error('broken')]);
+    expect(acknowledged).toEqual([1]);
+  });
+
+  it('acknowledges kinds that it does not know', () => {
+    receive(200);
+    expect(acknowledged).toEqual([1]);
+  });
+});

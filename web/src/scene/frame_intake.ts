@@ -1,0 +1,111 @@
+import type { DecodeJob } from '../decode/messages';
+import { type DecodePool, Superseded } from '../decode/pool';
+import { FrameKind, type TileFrame, tileKey } from '../protocol/frame';
+import type { StreamComplete } from '../protocol/messages';
+import { Acknowledger } from '../transport/acknowledger';
+import { Arrivals } from './arrivals';
+import type { TileSet } from './tile_set';
+
+/** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
+const BYTES_PER_PICTURE = 4 * 1024 * 1024;
+
+export interface FrameIntakeEvents {
+  /** Every frame up to this one is decoded. */
+  onDecoded: (sequence: number) => void;
+  /** There is something for the next picture. */
+  onArrival: () => void;
+  /** A frame that could not be decoded, or does not fit to the others; it is left out. */
+  onProblem: (error: unknown) => void;
+}
+
+/** The way of tile frames from the connection through the decoder into the tile set. */
+export class FrameIntake {
+  readonly #acknowledger: Acknowledger;
+  readonly #arrivals: Arrivals;
+  /** Sequence of the frame that removed a tile: what was sent of it before may be decoded later. */
+  #removedAt = new Map<string, number>();
+  #connectionNumber = 0;
+  #lastSequence = 0;
+  #completeAfter: { sequence: number; message: StreamComplete } | null = null;
+
+  constructor(
+    private readonly tiles: TileSet,
+    private readonly pool: Pick<DecodePool, 'decode' | 'clear' | 'dispose'>,
+    private readonly events: FrameIntakeEvents,
+  ) {
+    this.#acknowledger = new Acknowledger(events.onDecoded);
+    this.#arrivals = new Arrivals(tiles, events.onProblem);
+  }
+
+  /** Frames count from 1 again, and what is still on its way from the connection before is not wanted any more. */
+  beginConnection(): void {
+    this.#connectionNumber += 1;
+    this.#acknowledger.reset();
+    this.pool.clear();
+    this.#arrivals.clear();
+    this.#removedAt.clear();
+    this.#lastSequence = 0;
+    this.#completeAfter = null;
+    this.tiles.beginConnection();
+  }
+
+  dispose(): void {
+    this.pool.dispose();
+  }
+
+  receive(frame: TileFrame): void {
+    this.#lastSequence = frame.sequence;
+    const key = tileKey(frame.tile);
+    if (frame.kind === FrameKind.geometry) {
+      this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
+    } else if (frame.kind === FrameKind.colours || frame.kind === FrameKind.colours_subtract_green) {
+      const transform = frame.kind === FrameKind.colours ? 'none' : 'subtract_green';
+      this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload, transform });
+    } else {
+      if (frame.kind === FrameKind.remove) {
+        this.#removedAt.set(key, frame.sequence);
+        this.#arrivals.drop(frame.tile);
+        this.tiles.remove(frame.tile);
+        this.events.onArrival();
+      }
+      this.#acknowledger.finished(frame.sequence);
+    }
+  }
+
+  /** The server has sent all that was asked for; bringIn() says when that is in the picture. */
+  completeAfterAll(message: StreamComplete): void {
+    this.#completeAfter = { sequence: this.#lastSequence, message };
+    this.events.onArrival();
+  }
+
+  /**
+   * Brings decoded tiles into the tile set, as many as one picture can take: how many bytes, after how many milliseconds there is more
+   * (see Arrivals.bringIn), and the completion that is reached with them.
+   */
+  bringIn(now: number): { bytes: number; next_ms: number | null; complete: StreamComplete | null } {
+    const last = this.#completeAfter;
+    const isLast = last !== null && this.#acknowledger.sequence >= last.sequence;
+    const { bytes, next_ms } = this.#arrivals.bringIn(now, BYTES_PER_PICTURE, isLast);
+    if (!isLast || this.#arrivals.size > 0) return { bytes, next_ms, complete: null };
+    this.#completeAfter = null;
+    return { bytes, next_ms, complete: last.message };
+  }
+
+  #decode(key: string, frame: TileFrame, job: DecodeJob): void {
+    const connectionNumber = this.#connectionNumber;
+    this.pool
+      .decode(key, job)
+      .then((result) => {
+        if (connectionNumber !== this.#connectionNumber) return;
+        const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
+        if (frame.sequence > removed) this.#arrivals.add(frame, result, performance.now());
+        this.events.onArrival();
+      })
+      .catch((error: unknown) => {
+        if (!(error instanceof Superseded)) this.events.onProblem(error);
+      })
+      .finally(() => {
+        if (connectionNumber === this.#connectionNumber) this.#acknowledger.finished(frame.sequence);
+      });
+  }
+}
