@@ -1,28 +1,14 @@
 import { beforeEach, describe, expect, it } from 'vitest';
-import type { DecodedColours, DecodedGeometry } from '../decode/messages';
+import type { DecodedColours } from '../decode/messages';
 import { childTile, type TileFrame, type TileId } from '../protocol/frame';
 import { Arrivals, LONGEST_WAIT_MS } from './arrivals';
+import { decodedGeometry, ROOT as root, tileFrame } from './test_tiles';
 import { TileSet } from './tile_set';
 
-const root: TileId = { level: 0, x: 0, y: 0, z: 0 };
 const left = childTile(root, 0);
 const right = childTile(root, 1);
 const PLENTY = 1e9;
 
-const geometry: DecodedGeometry = {
-  kind: 'geometry',
-  positions: new Float32Array(3),
-  indices: null,
-  summary: {
-    vertex_count: 1,
-    triangle_count: 0,
-    centre: [0, 0, 0],
-    radius: 1,
-    sample: new Float32Array(3),
-    normal_sum: [0, 0, 0],
-    area_sum: 0,
-  },
-};
 const colours: DecodedColours = { kind: 'colours', rgba: new Uint8Array(4) };
 
 let sequence: number;
@@ -33,21 +19,7 @@ let now: number;
 
 function frame(tile: TileId, generation: number): TileFrame {
   sequence += 1;
-  return {
-    kind: 2,
-    child_mask: tile.level === 0 ? 0b11 : 0,
-    sequence,
-    generation,
-    tile,
-    revision: 1,
-    vertex_count: 1,
-    origin_m: [0, 0, 0],
-    position_step_m: 1,
-    geometric_error_m: 0,
-    lowest_celsius: 0,
-    highest_celsius: 0,
-    payload: new Uint8Array(0),
-  };
+  return tileFrame(tile, { child_mask: tile.level === 0 ? 0b11 : 0, sequence, generation });
 }
 const arrive = (tile: TileId, generation: number) => arrivals.add(frame(tile, generation), colours, now);
 /** One picture: 'coarse' when the root alone is drawn. */
@@ -64,7 +36,7 @@ beforeEach(() => {
   tiles = new TileSet(() => ({ setColours: () => undefined, setVisible: () => undefined, dispose: () => undefined }));
   arrivals = new Arrivals(tiles, (error) => problems.push(error));
   for (const tile of [root, left, right]) {
-    arrivals.add(frame(tile, 1), geometry, now);
+    arrivals.add(frame(tile, 1), decodedGeometry(), now);
     arrive(tile, 1);
   }
   expect(picture()).toEqual({ shows: 'fine', next_ms: null });

@@ -1,27 +1,14 @@
 import { beforeEach, describe, expect, it } from 'vitest';
 import type { DecodeResult } from '../decode/messages';
-import { FrameKind, type TileFrame, type TileId } from '../protocol/frame';
+import { FrameKind } from '../protocol/frame';
 import { FrameIntake } from './frame_intake';
+import { decodedGeometry, ROOT, tileFrame } from './test_tiles';
 import { TileSet } from './tile_set';
 
-const root: TileId = { level: 0, x: 0, y: 0, z: 0 };
 const COMPLETE = { generation: 1, scene_revision: 1, tiles: 1, vertices: 1 };
 
 const results: Record<'geometry' | 'colours', DecodeResult> = {
-  geometry: {
-    kind: 'geometry',
-    positions: new Float32Array(3),
-    indices: null,
-    summary: {
-      vertex_count: 1,
-      triangle_count: 0,
-      centre: [0, 0, 0],
-      radius: 1,
-      sample: new Float32Array(3),
-      normal_sum: [0, 0, 0],
-      area_sum: 0,
-    },
-  },
+  geometry: decodedGeometry(),
   colours: { kind: 'colours', rgba: new Uint8Array(4) },
 };
 
@@ -34,22 +21,7 @@ let sequence: number;
 
 function receive(kind: number): void {
   sequence += 1;
-  const frame: TileFrame = {
-    kind,
-    child_mask: 0,
-    sequence,
-    generation: 1,
-    tile: root,
-    revision: 1,
-    vertex_count: 1,
-    origin_m: [0, 0, 0],
-    position_step_m: 1,
-    geometric_error_m: 0,
-    lowest_celsius: 0,
-    highest_celsius: 0,
-    payload: new Uint8Array(0),
-  };
-  intake.receive(frame);
+  intake.receive(tileFrame(ROOT, { kind, sequence }));
 }
 const picture = () => intake.bringIn(performance.now());
 const settle = () => new Promise<void>((resolve) => setTimeout(resolve));

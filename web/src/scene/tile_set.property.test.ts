@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import type { DecodedGeometry } from '../decode/messages';
 import { childTile, parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
+import { decodedGeometry, tileFrame } from './test_tiles';
 import { type Drawable, TileSet } from './tile_set';
 
 /** mulberry32: the same numbers in every run. */
@@ -72,37 +72,8 @@ class Picture {
   }
 }
 
-const geometry: DecodedGeometry = {
-  kind: 'geometry',
-  positions: new Float32Array(3),
-  indices: null,
-  summary: {
-    vertex_count: 1,
-    triangle_count: 0,
-    centre: [0, 0, 0],
-    radius: 1,
-    sample: new Float32Array(3),
-    normal_sum: [0, 0, 0],
-    area_sum: 0,
-  },
-};
-
 function frameOf(tile: SceneTile, generation: number, revision: number): TileFrame {
-  return {
-    kind: 2,
-    child_mask: tile.mask,
-    sequence: 1,
-    generation,
-    tile: tile.id,
-    revision,
-    vertex_count: 1,
-    origin_m: [0, 0, 0],
-    position_step_m: 1,
-    geometric_error_m: 0,
-    lowest_celsius: 0,
-    highest_celsius: 0,
-    payload: new Uint8Array(0),
-  };
+  return tileFrame(tile.id, { child_mask: tile.mask, generation, revision });
 }
 
 function shuffled<T>(items: readonly T[], random: () => number): T[] {
@@ -182,7 +153,7 @@ describe('TileSet, with random trees and arrivals', () => {
           picture.adding = tile.key;
           const parts = [() => picture.tiles.addColours(frame, new Uint8Array(4))];
           const isNew = geometries.get(tile.key) !== revision;
-          if (isNew) parts.splice(random() < 0.5 ? 0 : 1, 0, () => picture.tiles.addGeometry(frame, geometry));
+          if (isNew) parts.splice(random() < 0.5 ? 0 : 1, 0, () => picture.tiles.addGeometry(frame, decodedGeometry()));
           for (const part of parts) part();
           geometries.set(tile.key, revision);
           const rank = connection * 1000 + shown;
@@ -209,7 +180,7 @@ describe('TileSet, with random trees and arrivals', () => {
       const add = (tile: SceneTile, generation: number) => {
         const frame = frameOf(tile, generation, 1);
         picture.adding = tile.key;
-        if (!held.has(tile.key)) picture.tiles.addGeometry(frame, geometry);
+        if (!held.has(tile.key)) picture.tiles.addGeometry(frame, decodedGeometry());
         picture.tiles.addColours(frame, new Uint8Array(4));
         held.set(tile.key, generation);
       };

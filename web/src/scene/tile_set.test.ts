@@ -1,45 +1,9 @@
 import { beforeEach, describe, expect, it } from 'vitest';
-import type { DecodedGeometry } from '../decode/messages';
 import { childTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
+import { decodedGeometry, ROOT as root, tileFrame as frame } from './test_tiles';
 import { type Drawable, TileSet } from './tile_set';
 
-const root: TileId = { level: 0, x: 0, y: 0, z: 0 };
-
-function geometry(vertices = 3): DecodedGeometry {
-  return {
-    kind: 'geometry',
-    positions: new Float32Array(vertices * 3),
-    indices: Uint16Array.from([0, 1, 2]),
-    summary: {
-      vertex_count: vertices,
-      triangle_count: 1,
-      centre: [0, 0, 0],
-      radius: 1,
-      sample: new Float32Array(3),
-      normal_sum: [0, 0, 1],
-      area_sum: 1,
-    },
-  };
-}
-
-function frame(tile: TileId, part: Partial<TileFrame> = {}): TileFrame {
-  return {
-    kind: 2,
-    child_mask: 0,
-    sequence: 1,
-    generation: 1,
-    tile,
-    revision: 1,
-    vertex_count: 3,
-    origin_m: [0, 0, 0],
-    position_step_m: 1,
-    geometric_error_m: 0,
-    lowest_celsius: 0,
-    highest_celsius: 0,
-    payload: new Uint8Array(0),
-    ...part,
-  };
-}
+const geometry = (vertices = 3) => decodedGeometry(vertices);
 const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fill(shade);
 
 class FakeDrawable implements Drawable {
