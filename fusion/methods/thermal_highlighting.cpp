@@ -23,8 +23,13 @@ void fuse_highlighting(const ThermalTable& thermal, double hot_above, const Ramp
     const DoubleTag d;
     const auto is_hot = hn::Gt(temperature, hn::Set(d, hot_above));
     const auto is_cold = hn::Lt(temperature, hn::Set(d, cold_below));
-    const Doubles u =
-        hn::IfThenElse(is_hot, on_ramp(hot, temperature), hn::IfThenElseZero(is_cold, on_ramp(cold, temperature)));
+    const auto of_side = [&](double hot_value, double cold_value)
+                             HWY_ATTR { return hn::IfThenElse(is_hot, hn::Set(d, hot_value), hn::Set(d, cold_value)); };
+    // Beyond its threshold, where alone it counts, the way is not negative.
+    const Doubles way =
+        hn::Add(hn::Mul(hn::Sub(temperature, of_side(hot.origin, cold.origin)), of_side(hot.slope, cold.slope)),
+                of_side(hot.offset, cold.offset));
+    const Doubles u = hn::IfThenElseZero(hn::Or(is_hot, is_cold), hn::Min(way, hn::Set(d, 1)));
     return hn::Min(hn::Set(d, 1), hn::Mul(hn::Set(d, k), hn::Mul(u, u)));
   };
   const auto fill = [&](const float* temperature, const std::uint8_t*, std::size_t count, float* weight)
