@@ -291,7 +291,7 @@ test('Coarser quality is in force and said in words', async () => {
   assert.equal((await state()).shown.triangles, shown.triangles);
 });
 
-test('Automatic quality answers a change coarser first, and refines it', async () => {
+test('Automatic quality and its latency target are set in the panel', async () => {
   await page.getByText('Details', { exact: true }).click();
   await page.getByText('Coarser at first').click();
   await page.waitForFunction(() => globalThis.spectra.store.quality.mode === 'auto');

@@ -1,7 +1,8 @@
 // A parameter change against sending the whole mesh again, both over loopback and both decoded by Node, taken in turns in
 // one run:
 //   node tests/bench/stream/parameter_change.mjs [SCENE.ply] [ROUNDS]     (default: a generated scene of 1,000,000 vertices)
-// Prints the medians and the ratios of time and bytes; after how long the first colours of a change, coarse ones, have come; then what a change costs with colours as they are and with
+// Prints the medians and the ratios of time and bytes, and after how long the first colours of a change, coarse ones, have
+// come; then what a change costs with colours as they are and with
 // subtract_green, at 8 and 6 bits.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";

@@ -37,6 +37,7 @@ import { TileSet } from '../scene/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
+import { cacheBytes } from './cache_bytes';
 import { mergedChange, wholeChange } from './fusion_change';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
 
@@ -49,14 +50,6 @@ const BUSY_WAIT_MS = 300;
 const TICK_MS = 100;
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
-/** Part of this machine's memory for decoded tiles; a browser that does not tell has as much as a tablet. */
-const CACHE_SHARE = 1 / 16;
-const TABLET_GIB = 4;
-
-function cacheBytes(): number {
-  const { deviceMemory = TABLET_GIB } = navigator as Navigator & { deviceMemory?: number };
-  return deviceMemory * 2 ** 30 * CACHE_SHARE;
-}
 
 function createDecodeWorker(): Worker {
   return new Worker(new URL('../decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' });
@@ -351,7 +344,9 @@ export class Session {
     try {
       const answer = await this.#connection.request('scene.subscribe', {
         channels: ['fused'],
-        ...(greeting.capabilities.includes('cache_bytes') ? { cache_bytes: cacheBytes() } : {}),
+        ...(greeting.capabilities.includes('cache_bytes')
+          ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
+          : {}),
         ...(greeting.capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
         ...(claims.length > 0 ? { resume: { session_id, tiles: claims } } : {}),
       });
