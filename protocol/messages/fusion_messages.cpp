@@ -91,6 +91,7 @@ static void describe(auto& fields, Is<MethodDescription> auto& message) {
   fields.field("summary", message.summary);
   fields.field("needs_temperature", message.needs_temperature);
   fields.field("uses_palette", message.uses_palette);
+  fields.field("wants_fusion_safe_palette", message.wants_fusion_safe_palette);
   fields.field("params", message.params);
 }
 

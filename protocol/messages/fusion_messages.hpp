@@ -41,6 +41,7 @@ struct MethodDescription {
   std::string summary;
   bool needs_temperature = true;
   bool uses_palette = true;
+  bool wants_fusion_safe_palette = false;  ///< A palette that is not fusion_safe loses temperature with this method.
   std::vector<ParameterDescription> params;
 };
 

@@ -10,6 +10,13 @@ std::span<const EnumWord<Role>> words_of() {
   return kWords;
 }
 
+template <>
+std::span<const EnumWord<UpAxis>> words_of() {
+  static constexpr EnumWord<UpAxis> kWords[] = {{UpAxis::X, "x"},       {UpAxis::Y, "y"},       {UpAxis::Z, "z"},
+                                                {UpAxis::MinusX, "-x"}, {UpAxis::MinusY, "-y"}, {UpAxis::MinusZ, "-z"}};
+  return kWords;
+}
+
 static void describe(auto& fields, Is<Bounds> auto& message) {
   fields.field("min", message.min);
   fields.field("max", message.max);
@@ -21,6 +28,14 @@ static void describe(auto& fields, Is<SceneTemperature> auto& message) {
   fields.nullable("mean", message.mean);
   fields.nullable("sigma", message.sigma);
   fields.field("missing_count", message.missing_count);
+  fields.field("over_range_count", message.over_range_count);
+  fields.field("under_range_count", message.under_range_count);
+}
+
+static void describe(auto& fields, Is<SceneNote> auto& message) {
+  fields.field("id", message.id);
+  fields.field("count", message.count);
+  fields.field("message", message.message);
 }
 
 static void describe(auto& fields, Is<SceneDescription> auto& message) {
@@ -34,6 +49,10 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("temperature", message.temperature);
   fields.field("tile_count", message.tile_count);
   fields.field("levels", message.levels);
+  fields.field("position_step_m", message.position_step_m);
+  fields.require("position_step_m", message.position_step_m > 0, "a number above 0");
+  fields.field("up", message.up);
+  fields.field("notes", message.notes);
 }
 
 static void describe(auto& fields, Is<SceneChanged> auto& message) {
@@ -80,6 +99,14 @@ Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view
   return read_message<SceneTemperature>(value, path);
 }
 nlohmann::json to_json(const SceneTemperature& message) {
+  return written_message(message);
+}
+
+template <>
+Result<SceneNote> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<SceneNote>(value, path);
+}
+nlohmann::json to_json(const SceneNote& message) {
   return written_message(message);
 }
 

@@ -28,7 +28,19 @@ struct SceneTemperature {
   std::optional<double> mean;
   std::optional<double> sigma;  ///< Population standard deviation.
   std::uint64_t missing_count = 0;
+  std::uint64_t over_range_count = 0;  ///< Hotter than the sensor could tell; in no other fact.
+  std::uint64_t under_range_count = 0;
 };
+
+/// Something that was repaired, left out or interpreted while the scene was read.
+struct SceneNote {
+  std::string id;  ///< snake_case, stable.
+  std::uint64_t count = 0;
+  std::string message;  ///< One sentence for a person, with the count.
+};
+
+/// The direction that is up in the scene's coordinates.
+enum class UpAxis { X, Y, Z, MinusX, MinusY, MinusZ };
 
 /// SCENE: what is served.
 struct SceneDescription {
@@ -42,6 +54,9 @@ struct SceneDescription {
   SceneTemperature temperature;
   std::uint64_t tile_count = 0;
   std::uint32_t levels = 0;
+  double position_step_m = 0;  ///< Default step of the positions, the largest where tiles differ; above 0.
+  UpAxis up = UpAxis::Z;
+  std::vector<SceneNote> notes;  ///< What loading noticed.
 };
 
 /// Params of scene.changed.
@@ -86,6 +101,9 @@ Result<Bounds> from_json(const nlohmann::json& value, std::string_view path);
 nlohmann::json to_json(const SceneTemperature& message);
 template <>
 Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const SceneNote& message);
+template <>
+Result<SceneNote> from_json(const nlohmann::json& value, std::string_view path);
 nlohmann::json to_json(const SceneDescription& message);
 template <>
 Result<SceneDescription> from_json(const nlohmann::json& value, std::string_view path);

@@ -101,8 +101,13 @@ fusion::Vec3f to_vec3f(const std::array<double, 3>& v) {
 }  // namespace
 
 protocol::MethodDescription to_message(const fusion::Method& method) {
-  protocol::MethodDescription message{
-      method.id, method.label, method.summary, method.needs_temperature, method.uses_palette, {}};
+  protocol::MethodDescription message{method.id,
+                                      method.label,
+                                      method.summary,
+                                      method.needs_temperature,
+                                      method.uses_palette,
+                                      method.wants_fusion_safe_palette,
+                                      {}};
   for (const auto& parameter : method.parameters) message.params.push_back(to_message(parameter));
   return message;
 }
@@ -201,6 +206,7 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   message.temperature = to_message(scene.temperature().summary);
   message.tile_count = scene.tiles().size();
   message.levels = static_cast<std::uint32_t>(scene.level_count());
+  message.position_step_m = double{scene.suggested_position_step_m()};
   return message;
 }
 

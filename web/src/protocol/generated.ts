@@ -35,6 +35,7 @@ export type RangeMode = "auto" | "manual";
  * How vertices without temperature are shown: "visible" or a colour "#rrggbb".
  */
 export type MissingDisplay = string;
+export type UpAxis = "x" | "y" | "z" | "-x" | "-y" | "-z";
 export type ParameterKind = "number" | "integer" | "toggle" | "choice" | "temperature";
 export type QualityMode = "auto" | "manual";
 /**
@@ -86,6 +87,7 @@ export interface ProtocolDefinitions {
   RpcResult: RpcResult;
   SceneChanged: SceneChanged;
   SceneDescription: SceneDescription;
+  SceneNote: SceneNote;
   SceneTemperature: SceneTemperature;
   ServerInfo: ServerInfo;
   Status: Status;
@@ -96,6 +98,7 @@ export interface ProtocolDefinitions {
   StreamStats: StreamStats;
   SubscribeReply: SubscribeReply;
   SubscribeRequest: SubscribeRequest;
+  UpAxis: UpAxis;
   Vector3: Vector3;
 }
 /**
@@ -258,6 +261,15 @@ export interface SceneDescription {
    * Levels of the tile tree.
    */
   levels: number;
+  /**
+   * Default step of the positions, metres; the largest where tiles differ.
+   */
+  position_step_m: number;
+  up: UpAxis;
+  /**
+   * What loading noticed.
+   */
+  notes: SceneNote[];
 }
 /**
  * Facts of all temperatures of the scene, degC; null without thermal data.
@@ -274,6 +286,28 @@ export interface SceneTemperature {
    * Vertices without temperature.
    */
   missing_count: number;
+  /**
+   * Vertices hotter than the sensor could tell; in no other fact.
+   */
+  over_range_count: number;
+  /**
+   * Vertices colder than the sensor could tell.
+   */
+  under_range_count: number;
+}
+/**
+ * Something that was repaired, left out or interpreted while the scene was read.
+ */
+export interface SceneNote {
+  /**
+   * snake_case, stable.
+   */
+  id: string;
+  count: number;
+  /**
+   * One sentence for a person, with the count.
+   */
+  message: string;
 }
 /**
  * METHOD.
@@ -284,6 +318,10 @@ export interface MethodDescription {
   summary: string;
   needs_temperature: boolean;
   uses_palette: boolean;
+  /**
+   * A palette that is not fusion_safe loses temperature with this method.
+   */
+  wants_fusion_safe_palette: boolean;
   params: ParameterDescription[];
 }
 /**

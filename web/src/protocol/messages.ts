@@ -53,6 +53,8 @@ export const temperatureSummary = object({
   mean: nullable(number),
   sigma: nullable(number),
   missing_count: count,
+  over_range_count: count,
+  under_range_count: count,
 });
 
 export const scene: Decoder<Scene> = object({
@@ -66,6 +68,9 @@ export const scene: Decoder<Scene> = object({
   temperature: temperatureSummary,
   tile_count: count,
   levels: count,
+  position_step_m: number,
+  up: oneOf('x', 'y', 'z', '-x', '-y', '-z'),
+  notes: array(object({ id: string, count, message: string })),
 });
 
 const parameterValue: Decoder<ParameterValue> = (value, path) => {
@@ -93,6 +98,7 @@ export const method: Decoder<Method> = object({
   summary: string,
   needs_temperature: boolean,
   uses_palette: boolean,
+  wants_fusion_safe_palette: boolean,
   params: array(parameter),
 });
 
