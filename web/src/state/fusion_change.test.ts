@@ -9,6 +9,7 @@ const methods: Method[] = [
     summary: '',
     needs_temperature: true,
     uses_palette: true,
+    wants_fusion_safe_palette: false,
     params: [{ name: 'k', label: '', help: '', kind: 'number', default: 1 }],
   },
 ];
