@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fusion/error.hpp"
+#include "fusion/mesh/bounds.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
 namespace spectra::fusion {
@@ -21,6 +23,7 @@ struct Note {
 struct LoadedScene {
   MultispectralMesh mesh;
   std::vector<Note> notes;
+  std::optional<Bounds> core_bounds;  ///< Of the vertices that are no strays; absent: nobody has looked for any.
 };
 
 /// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file. Safe on untrusted input: every count is checked

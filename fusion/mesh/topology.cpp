@@ -1,43 +1,12 @@
 #include "fusion/mesh/topology.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <vector>
 
+#include "fusion/mesh/disjoint_sets.hpp"
 #include "fusion/mesh/half_edges.hpp"
 
 namespace spectra::fusion {
-
-namespace {
-
-/// Sets that are united step by step; counts how many are left.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parents_(count), set_count_(count) {
-    std::iota(parents_.begin(), parents_.end(), 0U);
-  }
-
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    parents_[std::max(a, b)] = std::min(a, b);
-    --set_count_;
-  }
-
-  std::size_t set_count() const { return set_count_; }
-
- private:
-  std::uint32_t root(std::uint32_t item) {
-    while (parents_[item] != item) item = parents_[item] = parents_[parents_[item]];
-    return item;
-  }
-
-  std::vector<std::uint32_t> parents_;
-  std::size_t set_count_;
-};
-
-}  // namespace
 
 TopologyFacts topology_facts(const MultispectralMesh& mesh) {
   TopologyFacts facts;

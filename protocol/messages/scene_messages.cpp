@@ -46,6 +46,7 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("point_cloud", message.point_cloud);
   fields.field("origin", message.origin);
   fields.field("bounds", message.bounds);
+  fields.optional("core_bounds", message.core_bounds);
   fields.field("temperature", message.temperature);
   fields.field("tile_count", message.tile_count);
   fields.field("levels", message.levels);

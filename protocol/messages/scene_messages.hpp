@@ -51,6 +51,7 @@ struct SceneDescription {
   bool point_cloud = false;
   Vector3 origin{};  ///< In the coordinates of the input file.
   Bounds bounds;
+  std::optional<Bounds> core_bounds;  ///< Without strays; absent: unknown.
   SceneTemperature temperature;
   std::uint64_t tile_count = 0;
   std::uint32_t levels = 0;

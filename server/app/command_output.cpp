@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <string>
 
+#include "fusion/mesh/scene_survey.hpp"
 #include "server/app/commands.hpp"
 
 namespace spectra::server {
@@ -41,7 +42,9 @@ void print_notes(const std::vector<fusion::Note>& notes) {
 
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
                                                const std::optional<std::filesystem::path>& thermal) {
-  return thermal ? fusion::read_ply_with_thermal(scene, *thermal) : fusion::read_ply(scene);
+  auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal) : fusion::read_ply(scene);
+  if (loaded) fusion::survey(loaded.value());
+  return loaded;
 }
 
 }  // namespace spectra::server

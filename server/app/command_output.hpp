@@ -22,7 +22,7 @@ void warn(std::string_view message);
 /// Writes what was repaired, left out or interpreted to standard error, one line each.
 void print_notes(const std::vector<fusion::Note>& notes);
 
-/// Reads a scene, with the temperatures of a second file where one is given.
+/// Reads a scene, with the temperatures of a second file where one is given, and surveys it.
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
                                                const std::optional<std::filesystem::path>& thermal);
 

@@ -203,6 +203,7 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   message.point_cloud = scene.is_point_cloud();
   message.origin = {scene.origin().x, scene.origin().y, scene.origin().z};
   message.bounds = {to_message(scene.bounds().min), to_message(scene.bounds().max)};
+  message.core_bounds = protocol::Bounds{to_message(scene.core_bounds().min), to_message(scene.core_bounds().max)};
   message.temperature = to_message(scene.temperature().summary);
   message.tile_count = scene.tiles().size();
   message.levels = static_cast<std::uint32_t>(scene.level_count());

@@ -84,7 +84,7 @@ class SceneLoader {
     print_notes(loaded.notes);
     served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
                         " vertices)");
-    const auto scene = served.scenes.replace(std::move(loaded.mesh), served.pool, LevelsOfDetail::All,
+    const auto scene = served.scenes.replace(std::move(loaded), served.pool, LevelsOfDetail::All,
                                              [&served](const auto& next) { encode_first_picture(next, served.cache); });
     served.progress.set(std::nullopt);
     spdlog::info("serving {}: {} vertices, {} triangles, {} tiles", scene->name(), scene->vertex_count(),

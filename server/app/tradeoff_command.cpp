@@ -18,8 +18,7 @@ int run_tradeoff(const TradeoffCommandOptions& options) {
   if (!loaded) return fail(loaded.error());
   print_notes(loaded.value().notes);
   WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
-  const auto scene =
-      SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
+  const auto scene = SceneSnapshot::build(std::move(loaded.value()), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
   const auto progress = [](const std::string& step) { fmt::print(stderr, "{}\n", step); };
   TradeoffOptions measured;
   if (!options.palette.empty()) measured.palette = options.palette;

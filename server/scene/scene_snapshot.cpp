@@ -151,22 +151,23 @@ class FreedMemoryGoesBack {
 
 class TiledSnapshot final : public SceneSnapshot {
  public:
-  TiledSnapshot(fusion::MultispectralMesh mesh, std::uint32_t revision, WorkerPool& pool,
-                std::uint32_t leaf_vertex_count, LevelsOfDetail levels)
-      : name_(mesh.name),
+  TiledSnapshot(fusion::LoadedScene scene, std::uint32_t revision, WorkerPool& pool, std::uint32_t leaf_vertex_count,
+                LevelsOfDetail levels)
+      : name_(scene.mesh.name),
         revision_(revision),
-        vertex_count_(mesh.vertex_count()),
-        triangle_count_(mesh.triangle_count()),
-        is_point_cloud_(mesh.is_point_cloud()),
-        origin_(mesh.origin),
-        has_visible_(mesh.has_visible),
-        has_temperature_(mesh.has_temperature),
-        double_positions_(mesh.double_positions) {
-    std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(mesh), pool, leaf_vertex_count, levels);
+        vertex_count_(scene.mesh.vertex_count()),
+        triangle_count_(scene.mesh.triangle_count()),
+        is_point_cloud_(scene.mesh.is_point_cloud()),
+        origin_(scene.mesh.origin),
+        has_visible_(scene.mesh.has_visible),
+        has_temperature_(scene.mesh.has_temperature),
+        double_positions_(scene.mesh.double_positions) {
+    std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
     std::vector<LeafFacts> facts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
     leaves_.assign(leaves.begin(), leaves.end());
     gather(std::move(facts));
+    core_bounds_ = scene.core_bounds.value_or(bounds_);
     if (levels == LevelsOfDetail::All) {
       const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius()};
       tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool);
@@ -182,6 +183,7 @@ class TiledSnapshot final : public SceneSnapshot {
   bool is_point_cloud() const override { return is_point_cloud_; }
   fusion::Vec3d origin() const override { return origin_; }
   const Bounds& bounds() const override { return bounds_; }
+  const Bounds& core_bounds() const override { return core_bounds_; }
   int level_count() const override { return tiles_.empty() ? 0 : tiles_.back()->id.level + 1; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return temperature_; }
@@ -324,7 +326,7 @@ class TiledSnapshot final : public SceneSnapshot {
   bool is_point_cloud_;
   fusion::Vec3d origin_;
   bool has_visible_, has_temperature_, double_positions_;
-  Bounds bounds_;
+  Bounds bounds_, core_bounds_;
   std::vector<std::shared_ptr<const Tile>> tiles_;
   std::vector<std::shared_ptr<const Tile>> leaves_;
   fusion::SceneTemperature temperature_;
@@ -334,11 +336,11 @@ class TiledSnapshot final : public SceneSnapshot {
 
 }  // namespace
 
-std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::MultispectralMesh mesh, std::uint32_t revision,
+std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::LoadedScene scene, std::uint32_t revision,
                                                           WorkerPool& pool, std::uint32_t leaf_vertex_count,
                                                           LevelsOfDetail levels) {
   const FreedMemoryGoesBack scope;
-  return std::make_shared<TiledSnapshot>(std::move(mesh), revision, pool, leaf_vertex_count, levels);
+  return std::make_shared<TiledSnapshot>(std::move(scene), revision, pool, leaf_vertex_count, levels);
 }
 
 }  // namespace spectra::server

@@ -6,9 +6,12 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "fusion/mesh/bounds.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/mesh/ply_reader.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
 #include "protocol/tile_frame.hpp"
@@ -16,10 +19,7 @@
 
 namespace spectra::server {
 
-/// Smallest and largest coordinates, metres relative to the scene origin.
-struct Bounds {
-  fusion::Vec3f min, max;
-};
+using fusion::Bounds;
 
 /// One node of the tile tree: flat arrays of its vertices. Owned vertices come first: every vertex of the scene is owned
 /// by exactly one leaf, copies on a border follow. Vertices of no triangle are owned too, but not part of the geometry.
@@ -71,10 +71,16 @@ class SceneSnapshot {
   /// Cuts the mesh into octree leaves of about `leaf_vertex_count` vertices (small ones merged with a neighbour).
   /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
   /// for any number of threads. Must not be called from a job of the pool.
+  static std::shared_ptr<const SceneSnapshot> build(fusion::LoadedScene scene, std::uint32_t revision, WorkerPool& pool,
+                                                    std::uint32_t leaf_vertex_count = kLeafVertexCount,
+                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly);
+  /// The same for a mesh of which nothing has to be said.
   static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
                                                     WorkerPool& pool,
                                                     std::uint32_t leaf_vertex_count = kLeafVertexCount,
-                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly);
+                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly) {
+    return build(fusion::LoadedScene{std::move(mesh), {}, {}}, revision, pool, leaf_vertex_count, levels);
+  }
   virtual ~SceneSnapshot() = default;
 
   virtual const std::string& name() const = 0;
@@ -84,6 +90,8 @@ class SceneSnapshot {
   virtual bool is_point_cloud() const = 0;
   virtual fusion::Vec3d origin() const = 0;
   virtual const Bounds& bounds() const = 0;
+  /// Of all that is worth a look: bounds() without the few vertices that lie far from everything else.
+  virtual const Bounds& core_bounds() const = 0;
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;

@@ -9,12 +9,12 @@ std::shared_ptr<const SceneSnapshot> SceneStore::current() const {
   return current_;
 }
 
-std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
+std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene scene, WorkerPool& pool,
                                                          LevelsOfDetail levels, const Listener& before) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   const std::uint32_t revision = previous ? previous->revision() + 1 : 1;
-  const auto snapshot = SceneSnapshot::build(std::move(mesh), revision, pool, kLeafVertexCount, levels);
+  const auto snapshot = SceneSnapshot::build(std::move(scene), revision, pool, kLeafVertexCount, levels);
   if (before) before(snapshot);
   std::vector<std::shared_ptr<Listener>> listeners;
   {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "server/scene/scene_snapshot.hpp"
@@ -33,9 +34,15 @@ class SceneStore {
   /// Builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
   /// from several threads are served one after the other, so that revisions only rise. Must not be called from a job of
   /// the pool or from a listener. `before` is called with the snapshot before it becomes current.
-  std::shared_ptr<const SceneSnapshot> replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
+  std::shared_ptr<const SceneSnapshot> replace(fusion::LoadedScene scene, WorkerPool& pool,
                                                LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
                                                const Listener& before = {});
+  /// The same for a mesh of which nothing has to be said.
+  std::shared_ptr<const SceneSnapshot> replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
+                                               LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
+                                               const Listener& before = {}) {
+    return replace(fusion::LoadedScene{std::move(mesh), {}, {}}, pool, levels, before);
+  }
 
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);

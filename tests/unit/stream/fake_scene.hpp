@@ -25,6 +25,7 @@ class FakeScene : public SceneSnapshot {
   bool is_point_cloud() const override { return false; }
   fusion::Vec3d origin() const override { return {}; }
   const Bounds& bounds() const override { return bounds_; }
+  const Bounds& core_bounds() const override { return bounds_; }
   int level_count() const override { return 3; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return temperature_; }

@@ -242,7 +242,7 @@ export interface Limits {
   max_requests_per_s: number;
 }
 /**
- * SCENE: what is served. origin: metres, double precision, in the coordinates of the input file.
+ * SCENE: what is served. origin: metres, double precision, in the coordinates of the input file. core_bounds: bounds without the few vertices that lie far from everything else.
  */
 export interface SceneDescription {
   name: string;
@@ -255,6 +255,7 @@ export interface SceneDescription {
   point_cloud: boolean;
   origin: Vector3;
   bounds: Bounds;
+  core_bounds?: Bounds;
   temperature: SceneTemperature;
   tile_count: number;
   /**

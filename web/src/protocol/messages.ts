@@ -57,6 +57,8 @@ export const temperatureSummary = object({
   under_range_count: count,
 });
 
+const bounds = object({ min: triple(number), max: triple(number) });
+
 export const scene: Decoder<Scene> = object({
   name: string,
   revision: count,
@@ -64,7 +66,8 @@ export const scene: Decoder<Scene> = object({
   triangle_count: count,
   point_cloud: boolean,
   origin: triple(number),
-  bounds: object({ min: triple(number), max: triple(number) }),
+  bounds,
+  core_bounds: optional(bounds),
   temperature: temperatureSummary,
   tile_count: count,
   levels: count,
