@@ -36,10 +36,6 @@ std::optional<std::uint8_t> colour_byte(double value, PlyScalar type) {
   return static_cast<std::uint8_t>(value);
 }
 
-float temperature_value(double value) {
-  return std::abs(value) <= kFloatMax ? static_cast<float>(value) : std::numeric_limits<float>::quiet_NaN();
-}
-
 bool has_no_list(const PlyElement& element) {
   return std::none_of(element.properties.begin(), element.properties.end(),
                       [](const PlyProperty& property) { return property.is_list; });
@@ -53,7 +49,9 @@ PlyBodyReader::PlyBodyReader(PlyStream& stream, const PlyHandlers& handlers)
       handlers_(handlers),
       is_text_(stream.header_.format == PlyFormat::Ascii),
       is_swapped_((stream.header_.format == PlyFormat::BinaryBigEndian) ==
-                  (std::endian::native == std::endian::little)) {}
+                  (std::endian::native == std::endian::little)),
+      metres_per_unit_(stream.options_.metres_per_unit),
+      temperature_conversion_(stream.options_) {}
 
 Result<PlyBodyFacts> PlyBodyReader::read() {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -172,6 +170,11 @@ Result<void> PlyBodyReader::read_vertices_one_by_one(const PlyElement& element) 
 
 /// Checks and converts the first `count` values of the block's arrays, hands them on, and moves entry_ on.
 Result<void> PlyBodyReader::finish_vertex_block(std::size_t count) {
+  if (metres_per_unit_ != 1) {
+    for (Vec3d& p : std::span(positions_).first(count)) {
+      p = {p.x * metres_per_unit_, p.y * metres_per_unit_, p.z * metres_per_unit_};
+    }
+  }
   bool is_good = true;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3d& p = positions_[i];
@@ -191,12 +194,8 @@ Result<void> PlyBodyReader::finish_vertex_block(std::size_t count) {
   }
   BOOST_OUTCOME_TRY(convert_colours(count));
   if (stream_.has_temperature()) {
-    std::uint64_t missing_count = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      temperatures_[i] = temperature_value(temperature_values_[i]);
-      missing_count += std::isnan(temperatures_[i]) ? 1U : 0U;
-    }
-    facts_.missing_temperature_count += missing_count;
+    temperature_conversion_.convert(std::span<const double>(temperature_values_).first(count),
+                                    std::span(temperatures_).first(count), facts_.temperature);
   }
   const std::uint64_t first_vertex = entry_;
   entry_ += count;

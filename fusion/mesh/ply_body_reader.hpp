@@ -55,6 +55,7 @@ class PlyBodyReader {
   const PlyHandlers& handlers_;
   const bool is_text_;
   const bool is_swapped_;
+  const double metres_per_unit_;
   PlyBodyFacts facts_;
 
   const PlyElement* element_ = nullptr;  ///< Being read, for messages.
@@ -65,6 +66,7 @@ class PlyBodyReader {
   std::vector<Rgb8> colours_;
   std::vector<double> temperature_values_;
   std::vector<float> temperatures_;
+  const TemperatureConversion temperature_conversion_;
 
   std::vector<Triangle> triangles_;
   bool handler_has_failed_ = false;

@@ -86,8 +86,8 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
 }
 
 Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
-                            const FusionSettings& settings, const PaletteTable* palette) {
-  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in));
+                            const FusionSettings& settings, const PaletteTable* palette, const ReadOptions& options) {
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, options));
   BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
   std::optional<Error> histogram_error;
   SceneTemperature scene;
@@ -109,13 +109,13 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
 }  // namespace
 
 Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings) {
-  return fuse_file(in, out, settings, nullptr);
+                           const FusionSettings& settings, const ReadOptions& options) {
+  return fuse_file(in, out, settings, nullptr, options);
 }
 
 Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const PaletteTable& palette) {
-  return fuse_file(in, out, settings, &palette);
+                           const FusionSettings& settings, const PaletteTable& palette, const ReadOptions& options) {
+  return fuse_file(in, out, settings, &palette, options);
 }
 
 }  // namespace spectra::fusion

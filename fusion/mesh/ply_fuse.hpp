@@ -8,6 +8,7 @@
 #include "fusion/error.hpp"
 #include "fusion/fusion_plan.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/mesh/read_options.hpp"
 #include "fusion/settings.hpp"
 
 namespace spectra::fusion {
@@ -26,10 +27,11 @@ struct FusedFile {
 /// is constant but for one bit a vertex. The bytes are those of read_ply(), FusionPlan::fuse() and write_ply(). Errors are
 /// theirs too; safe on untrusted input.
 Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings);
+                           const FusionSettings& settings, const ReadOptions& options = {});
 
 /// The same with a palette table of the caller's.
 Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const PaletteTable& palette);
+                           const FusionSettings& settings, const PaletteTable& palette,
+                           const ReadOptions& options = {});
 
 }  // namespace spectra::fusion

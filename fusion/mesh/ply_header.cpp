@@ -73,7 +73,11 @@ class HeaderParser {
     }
     while (next_line(line)) {
       const std::vector<std::string_view> words = words_of(line);
-      if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+      if (words.empty()) continue;
+      if (words[0] == "comment" || words[0] == "obj_info") {
+        header_.comments.emplace_back(line);
+        continue;
+      }
       if (words[0] == "end_header") return finished();
       BOOST_OUTCOME_TRY(read_line(words));
     }

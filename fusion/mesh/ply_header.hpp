@@ -36,8 +36,9 @@ struct PlyElement {
 /// The header of a PLY file: what its body is said to hold.
 struct PlyHeader {
   PlyFormat format = PlyFormat::Ascii;
-  std::vector<PlyElement> elements;  ///< In the order of the body; names are unique, as are properties in each.
-  std::uint64_t size_bytes = 0;      ///< The body begins here.
+  std::vector<PlyElement> elements;   ///< In the order of the body; names are unique, as are properties in each.
+  std::vector<std::string> comments;  ///< The lines "comment ..." and "obj_info ...", whole, in order.
+  std::uint64_t size_bytes = 0;       ///< The body begins here.
 
   /// The element of that name, or nullptr.
   const PlyElement* find(std::string_view name) const;

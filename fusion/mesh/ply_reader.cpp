@@ -21,8 +21,8 @@ struct ThermalVertices {
   std::vector<Note> notes;
 };
 
-Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path) {
-  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path));
+Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path, const ReadOptions& options) {
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path, options));
   const std::string name = path.filename().string();
   if (!stream.has_temperature()) {
     return failure(ErrorCode::Unsupported, name + ": the thermal file has no temperature property", name);
@@ -40,7 +40,8 @@ Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path)
   BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
   for (Note& note : stream.notes(facts)) {
     // Its faces and colours are not asked for, and the gaps are counted again after the join.
-    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes") continue;
+    const bool is_about_temperature = note.id.ends_with("_temperatures") && note.id != "missing_temperatures";
+    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && !is_about_temperature) continue;
     thermal.notes.push_back({"thermal_" + note.id, note.count, name + ": " + note.message});
   }
   return thermal;
@@ -111,8 +112,8 @@ void join_nearest(const ThermalVertices& thermal, double join_distance_m, Loaded
 
 }  // namespace
 
-Result<LoadedScene> read_ply(const std::filesystem::path& path) {
-  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path));
+Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options) {
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path, options));
   LoadedScene scene;
   MultispectralMesh& mesh = scene.mesh;
   mesh.resize_vertices(static_cast<std::size_t>(stream.vertex_count()));
@@ -122,12 +123,14 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path) {
   mesh.double_positions = stream.has_double_positions();
   mesh.name = path.filename().string();
 
-  // Doubles wait for the origin, which is known when all are read; floats can move there without loss.
-  std::vector<Vec3d> exact_positions(mesh.double_positions ? mesh.vertex_count() : 0);
+  // Doubles wait for the origin, which is known when all are read; floats can move there without loss, unless they are
+  // scaled.
+  const bool is_exact = mesh.double_positions || options.metres_per_unit != 1;
+  std::vector<Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
   PlyHandlers handlers;
   handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
     const auto first = static_cast<std::ptrdiff_t>(block.first_vertex);
-    if (mesh.double_positions) {
+    if (is_exact) {
       std::copy(block.positions.begin(), block.positions.end(), exact_positions.begin() + first);
     } else {
       std::transform(block.positions.begin(), block.positions.end(), mesh.positions().begin() + first,
@@ -145,7 +148,7 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path) {
   BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
 
   mesh.origin = scene_origin(facts.min, facts.max);
-  if (mesh.double_positions) {
+  if (is_exact) {
     std::transform(exact_positions.begin(), exact_positions.end(), mesh.positions().begin(),
                    [&](const Vec3d& position) { return relative_to(mesh.origin, position); });
   } else if (mesh.origin != Vec3d{}) {
@@ -154,18 +157,22 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path) {
     }
   }
   scene.notes = stream.notes(facts);
+  scene.comments = stream.header().comments;
   return scene;
 }
 
 Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
-                                          double join_distance_m) {
+                                          const ReadOptions& options, double join_distance_m) {
   if (!std::isfinite(join_distance_m) || join_distance_m < 0) {
     return failure(ErrorCode::OutOfRange, "join_distance_m is a finite distance of 0 (automatic) or more",
                    "join_distance_m");
   }
-  BOOST_OUTCOME_TRY(ThermalVertices thermal, read_thermal_vertices(thermal_path));
-  BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path));
-  std::erase_if(scene.notes, [](const Note& note) { return note.id == "missing_temperatures"; });
+  BOOST_OUTCOME_TRY(ThermalVertices thermal, read_thermal_vertices(thermal_path, options));
+  ReadOptions visible_options;
+  visible_options.metres_per_unit = options.metres_per_unit;
+  BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, visible_options));
+  // What stands in for them is told of below.
+  std::erase_if(scene.notes, [](const Note& note) { return note.id.ends_with("_temperatures"); });
   if (scene.mesh.has_temperature) {
     scene.notes.push_back({"replaced_temperatures", scene.mesh.vertex_count(),
                            "The file's own temperatures replaced by those of the thermal file"});
@@ -178,7 +185,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
   }
   const auto missing_count = static_cast<std::uint64_t>(
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
-                    [](float celsius) { return !std::isfinite(celsius); }));
+                    [](float celsius) { return std::isnan(celsius); }));
   if (missing_count > 0) {
     scene.notes.push_back(
         {"missing_temperatures", missing_count, std::to_string(missing_count) + " vertices without a temperature"});

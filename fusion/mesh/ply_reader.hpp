@@ -9,6 +9,7 @@
 #include "fusion/error.hpp"
 #include "fusion/mesh/bounds.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/mesh/read_options.hpp"
 
 namespace spectra::fusion {
 
@@ -24,6 +25,7 @@ struct LoadedScene {
   MultispectralMesh mesh;
   std::vector<Note> notes;
   std::optional<Bounds> core_bounds;  ///< Of the vertices that are no strays; absent: nobody has looked for any.
+  std::vector<std::string> comments;  ///< The header's lines "comment ..." and "obj_info ...", whole, in order.
 };
 
 /// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file. Safe on untrusted input: every count is checked
@@ -31,19 +33,22 @@ struct LoadedScene {
 /// - Positions: x, y, z, float or double, finite. The mesh's origin is chosen as scene_origin.hpp says.
 /// - Visible colour: red, green, blue, or diffuse_red ..., or r, g, b, in any case; alpha is left out. uchar as it is, other
 ///   whole-number types when the values are 0..255, float and double from 0..1 scaled (note "converted_colours").
-/// - Temperature in degC: float or double named temperature, temp, thermal, t or scalar_temperature, in any case and in
-///   this order of preference; t beside an s is a texture coordinate. Not finite, or beyond float: missing (NaN).
+/// - Temperature: a scalar named temperature, temp, thermal, t or scalar_temperature, in any case and in this order of
+///   preference, or named by the options; t beside an s is a texture coordinate. Scaled to degC as the options say. NaN, at
+///   or below -273.15 degC, or a value that the options name: missing (NaN). +inf and what is beyond the largest float stays
+///   +inf (over range), -inf stays -inf.
 /// - Faces: the list vertex_indices or vertex_index. Polygons are cut into fans from their first corner; triangles with a
 ///   vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are kept.
 /// Everything else is skipped. What was cut, left out, converted or skipped is in the notes.
-/// Errors: FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;
+/// Errors: those of check_read_options(), FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;
 /// the message begins with the file's name and says what and where.
-Result<LoadedScene> read_ply(const std::filesystem::path& path);
+Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// The same, and takes the temperature of a second file: same vertex count = same order, else the nearest thermal vertex
+/// The same, and takes the temperature of a second file, to which the options about temperature then belong (the scale of
+/// positions belongs to both): same vertex count = same order, else the nearest thermal vertex
 /// within `join_distance_m` (0 = three times the median spacing of the thermal vertices); vertices without one are missing.
 /// The notes tell which of the two was done, how many vertices were joined, and how many were not reached.
 Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
-                                          double join_distance_m = 0);
+                                          const ReadOptions& options = {}, double join_distance_m = 0);
 
 }  // namespace spectra::fusion

@@ -14,16 +14,20 @@ namespace spectra::fusion {
 
 namespace {
 
+/// ASCII only.
 std::string lower_case(std::string_view text) {
   std::string result(text);
   for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return result;
 }
 
-/// The index of the first property of that name, in any case; scalars only.
+/// The index of the property of that name, or else of the first that has it in another case; scalars only.
 std::optional<std::size_t> find_scalar(const PlyElement& element, std::string_view name) {
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
-    if (!element.properties[i].is_list && lower_case(element.properties[i].name) == name) return i;
+    if (!element.properties[i].is_list && element.properties[i].name == name) return i;
+  }
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    if (!element.properties[i].is_list && lower_case(element.properties[i].name) == lower_case(name)) return i;
   }
   return std::nullopt;
 }
@@ -63,10 +67,11 @@ Result<T> located(Result<T> result, const std::string& name) {
 
 }  // namespace
 
-Result<PlyStream> PlyStream::open(const std::filesystem::path& path) {
+Result<PlyStream> PlyStream::open(const std::filesystem::path& path, const ReadOptions& options) {
+  BOOST_OUTCOME_TRY(check_read_options(options));
   const std::string name = path.filename().empty() ? path.string() : path.filename().string();
   BOOST_OUTCOME_TRY(auto file, located(BlockFile::open(path), name));
-  PlyStream stream(std::move(file), name);
+  PlyStream stream(std::move(file), name, options);
   BOOST_OUTCOME_TRY(located(stream.interpret_header(), name));
   BOOST_OUTCOME_TRY(located(stream.check_size(), name));
   return stream;
@@ -172,6 +177,14 @@ Result<void> PlyStream::interpret_vertex_properties(const PlyElement& element) {
 }
 
 Result<void> PlyStream::find_temperature(const PlyElement& element) {
+  if (!options_.temperature_property.empty()) {
+    slot_properties_[kTemperature] = find_scalar(element, options_.temperature_property);
+    if (!has_temperature()) {
+      return failure(ErrorCode::Unsupported,
+                     "the vertices have no scalar property '" + printable(options_.temperature_property) + "'",
+                     "temperature_property");
+    }
+  }
   constexpr std::array<std::string_view, 5> kNames = {"temperature", "temp", "thermal", "t", "scalar_temperature"};
   std::vector<std::string> skipped;
   for (const std::string_view name : kNames) {
@@ -180,11 +193,6 @@ Result<void> PlyStream::find_temperature(const PlyElement& element) {
     const PlyProperty& property = element.properties[*index];
     // Beside an s, t is the second texture coordinate.
     if (name == "t" && (find_scalar(element, "s") || !is_floating(property.type))) continue;
-    if (!is_floating(property.type)) {
-      return failure(ErrorCode::Unsupported, "property '" + printable(property.name) + "' has the type " +
-                                                 std::string(to_string(property.type)) +
-                                                 "; a temperature is a float or double in degrees Celsius");
-    }
     slot_properties_[kTemperature] = index;
   }
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
@@ -257,8 +265,20 @@ std::vector<Note> PlyStream::notes(const PlyBodyFacts& facts) const {
       counted(facts.incomplete_face_count, "face", "faces") + " of fewer than three corners left out");
   add("unreferenced_vertices", facts.unreferenced_vertex_count,
       counted(facts.unreferenced_vertex_count, "vertex", "vertices") + " of no triangle kept");
-  add("missing_temperatures", facts.missing_temperature_count,
-      counted(facts.missing_temperature_count, "vertex", "vertices") + " without a temperature");
+  const TemperatureFacts& temperature = facts.temperature;
+  add("missing_temperatures", temperature.missing_count,
+      counted(temperature.missing_count, "vertex", "vertices") + " without a temperature");
+  add("impossible_temperatures", temperature.impossible_count,
+      counted(temperature.impossible_count, "temperature", "temperatures") +
+          " at or below -273.15 degrees Celsius taken as missing");
+  add("no_data_temperatures", temperature.no_data_count,
+      counted(temperature.no_data_count, "temperature", "temperatures") + " of a no-data value taken as missing");
+  add("over_range_temperatures", temperature.over_range_count,
+      counted(temperature.over_range_count, "temperature", "temperatures") +
+          " above what the sensor can measure (infinite) shown as the hottest");
+  add("under_range_temperatures", temperature.under_range_count,
+      counted(temperature.under_range_count, "temperature", "temperatures") +
+          " below what the sensor can measure (-infinite) shown as the coldest");
   add("trailing_bytes", facts.trailing_byte_count,
       counted(facts.trailing_byte_count, "byte", "bytes") + " after the last element left out");
   return notes;

@@ -13,6 +13,8 @@
 #include "fusion/mesh/block_file.hpp"
 #include "fusion/mesh/ply_header.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/mesh/read_options.hpp"
+#include "fusion/mesh/vertex_temperature.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
@@ -20,9 +22,9 @@ namespace spectra::fusion {
 /// Some vertices in the file's order. The spans are valid during the call only.
 struct PlyVertexBlock {
   std::uint64_t first_vertex = 0;
-  std::span<const Vec3d> positions;            ///< Finite, within the range of float.
+  std::span<const Vec3d> positions;            ///< Metres; finite, within the range of float.
   std::span<const Rgb8> visible;               ///< Empty when the file has no colours.
-  std::span<const float> temperature_celsius;  ///< Empty when the file has none; not finite = missing.
+  std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
 };
 
 /// Who gets the body of a file. A handler that fails ends the reading with its error; an empty one is not called.
@@ -40,8 +42,8 @@ struct PlyBodyFacts {
   std::uint64_t degenerate_triangle_count = 0;  ///< Left out: a vertex twice.
   std::uint64_t incomplete_face_count = 0;      ///< Left out: fewer than three corners.
   std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
-  std::uint64_t missing_temperature_count = 0;  ///< Not finite, or a double beyond the range of float.
-  std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
+  TemperatureFacts temperature;
+  std::uint64_t trailing_byte_count = 0;  ///< After the last element; white space does not count in ascii.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one bit a vertex: the ground of read_ply(), and the way
@@ -50,7 +52,7 @@ struct PlyBodyFacts {
 class PlyStream {
  public:
   /// Opens the file and judges its header against its size.
-  static Result<PlyStream> open(const std::filesystem::path& path);
+  static Result<PlyStream> open(const std::filesystem::path& path, const ReadOptions& options = {});
 
   const PlyHeader& header() const { return header_; }
   std::uint64_t vertex_count() const { return vertex_count_; }
@@ -62,7 +64,7 @@ class PlyStream {
   bool has_temperature() const { return slot_properties_[kTemperature].has_value(); }
   /// The faces stand before the vertices in the file, and are handed on in that order.
   bool has_faces_first() const;
-  /// Some coordinate is a double.
+  /// Some coordinate is a double in the file.
   bool has_double_positions() const { return has_double_positions_; }
 
   /// Reads the whole body from its beginning; may be called again.
@@ -76,7 +78,8 @@ class PlyStream {
   enum Slot : std::size_t { kX, kY, kZ, kRed, kGreen, kBlue, kTemperature, kSlotCount };
   friend class PlyBodyReader;
 
-  PlyStream(BlockFile file, std::string name) : file_(std::move(file)), name_(std::move(name)) {}
+  PlyStream(BlockFile file, std::string name, ReadOptions options)
+      : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)) {}
   Result<void> interpret_header();
   Result<void> interpret_vertex_properties(const PlyElement& element);
   Result<void> find_temperature(const PlyElement& element);
@@ -84,6 +87,7 @@ class PlyStream {
 
   BlockFile file_;
   std::string name_;  ///< Of the file, for messages.
+  ReadOptions options_;
   PlyHeader header_;
   std::uint64_t vertex_count_ = 0;
   std::uint64_t face_count_ = 0;

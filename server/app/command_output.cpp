@@ -41,8 +41,9 @@ void print_notes(const std::vector<fusion::Note>& notes) {
 }
 
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
-                                               const std::optional<std::filesystem::path>& thermal) {
-  auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal) : fusion::read_ply(scene);
+                                               const std::optional<std::filesystem::path>& thermal,
+                                               const fusion::ReadOptions& options) {
+  auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal, options) : fusion::read_ply(scene, options);
   if (loaded) fusion::survey(loaded.value());
   return loaded;
 }

@@ -24,6 +24,7 @@ void print_notes(const std::vector<fusion::Note>& notes);
 
 /// Reads a scene, with the temperatures of a second file where one is given, and surveys it.
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
-                                               const std::optional<std::filesystem::path>& thermal);
+                                               const std::optional<std::filesystem::path>& thermal,
+                                               const fusion::ReadOptions& options);
 
 }  // namespace spectra::server

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fusion/mesh/read_options.hpp"
 #include "server/app/settings_text.hpp"
 
 namespace spectra::server {
@@ -22,6 +23,7 @@ struct ServeOptions {
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
+  fusion::ReadOptions read;
 };
 
 struct FuseOptions {
@@ -29,12 +31,14 @@ struct FuseOptions {
   std::filesystem::path output;
   std::optional<std::filesystem::path> thermal;
   SettingsText settings;
+  fusion::ReadOptions read;
 };
 
 struct InfoOptions {
   std::filesystem::path input;
   std::optional<std::filesystem::path> thermal;
   bool as_json = false;
+  fusion::ReadOptions read;
 };
 
 struct DemoSceneFileOptions {
@@ -48,6 +52,7 @@ struct TradeoffCommandOptions {
   std::filesystem::path folder;  ///< For the tables and the report; made when it does not exist.
   std::optional<std::filesystem::path> thermal;
   std::string palette;  ///< From whose colours the temperature is read back; empty: the default.
+  fusion::ReadOptions read;
 };
 
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.

@@ -18,13 +18,13 @@ struct FusedFacts {
 
 /// PLY to PLY, in constant memory whatever the size of the scene.
 fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fusion::FusionSettings& settings) {
-  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings));
+  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings, options.read));
   return FusedFacts{std::move(fused.notes), fused.temperature.has_temperature()};
 }
 
 fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
                                            SceneFileFormat format) {
-  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal));
+  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, options.read));
   const auto temperature = temperature_of(loaded.mesh);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
   BOOST_OUTCOME_TRYV(write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), format));

@@ -87,7 +87,7 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
 }  // namespace
 
 int run_info(const InfoOptions& options) {
-  const auto loaded = load_scene(options.input, options.thermal);
+  const auto loaded = load_scene(options.input, options.thermal, options.read);
   if (!loaded) return fail(loaded.error());
   const auto& mesh = loaded.value().mesh;
   const auto temperature = temperature_of(mesh).summary;

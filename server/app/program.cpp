@@ -15,6 +15,26 @@ namespace {
 
 using Run = std::function<int()>;
 
+/// The options of every command that reads a scene: what a person knows of the file.
+void add_reading(CLI::App& command, fusion::ReadOptions& options) {
+  command.add_option("--temperature-property", options.temperature_property,
+                     "The property that holds the temperature, whatever its name");
+  const auto set_unit = [&options](const std::string& name) {
+    options.temperature_unit = fusion::temperature_unit(name);
+    if (!options.temperature_unit) {
+      throw CLI::ValidationError("--temperature-unit " + name, "celsius, kelvin, centikelvin or fahrenheit is wanted");
+    }
+  };
+  auto* unit = command.add_option_function<std::string>(
+      "--temperature-unit", set_unit, "Of the file's temperatures: celsius, kelvin, centikelvin or fahrenheit");
+  command.add_option("--temperature-scale", options.temperature_scale, "degC = A value + B: A")->excludes(unit);
+  command.add_option("--temperature-offset", options.temperature_offset, "degC = A value + B: B")->excludes(unit);
+  command.add_option("--no-data", options.no_data, "A temperature of the file that stands for none (may be repeated)")
+      ->allow_extra_args(false);
+  command.add_option("--scale", options.metres_per_unit, "Metres in one unit of the file's positions")
+      ->capture_default_str();
+}
+
 void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   auto* command = app.add_subcommand("serve", "Serve a scene to browsers");
   auto* scene = command->add_option("scene", options.scene, "The scene, a PLY file; without one, the demo scene");
@@ -24,6 +44,7 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
+  add_reading(*command, options.read);
   command->add_option("--web", options.web, "Folder of the built web client");
   command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
       ->check(CLI::Range(0, 1024));
@@ -43,6 +64,7 @@ void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& set
   command->add_option("--missing", options.settings.missing,
                       "Colour of vertices without temperature: visible or #rrggbb");
   command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  add_reading(*command, options.read);
   command->final_callback([&options, &sets, &run] {
     for (const auto& set : sets) {
       const auto equals = set.find('=');
@@ -58,6 +80,7 @@ void add_info(CLI::App& app, InfoOptions& options, Run& run) {
   auto* command = app.add_subcommand("info", "Say what is in a scene");
   command->add_option("input", options.input, "The scene, a PLY file")->required();
   command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  add_reading(*command, options.read);
   command->add_flag("--json", options.as_json, "Write JSON");
   command->final_callback([&options, &run] { run = [&options] { return run_info(options); }; });
 }
@@ -83,6 +106,7 @@ void add_tradeoff(CLI::App& app, TradeoffCommandOptions& options, Run& run) {
   command->add_option("input", options.input, "The scene, a PLY file")->required();
   command->add_option("--out", options.folder, "Folder for the tables and the report")->required();
   command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
+  add_reading(*command, options.read);
   command->add_option("--palette", options.palette, "The palette that the temperature is read back from");
   command->final_callback([&options, &run] { run = [&options] { return run_tradeoff(options); }; });
 }

@@ -75,7 +75,7 @@ class SceneLoader {
     served.progress.set("Reading " + name);
     fusion::LoadedScene loaded;
     if (options.scene) {
-      auto read = load_scene(*options.scene, options.thermal);
+      auto read = load_scene(*options.scene, options.thermal, options.read);
       if (!read) throw std::runtime_error(read.error().message);
       loaded = std::move(read).value();
     } else {

@@ -14,7 +14,7 @@
 namespace spectra::server {
 
 int run_tradeoff(const TradeoffCommandOptions& options) {
-  auto loaded = load_scene(options.input, options.thermal);
+  auto loaded = load_scene(options.input, options.thermal, options.read);
   if (!loaded) return fail(loaded.error());
   print_notes(loaded.value().notes);
   WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));

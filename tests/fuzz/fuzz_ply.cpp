@@ -48,7 +48,8 @@ void check_scene(const LoadedScene& scene) {
   check(mesh.visible().size() == mesh.vertex_count());
   check(mesh.temperature_celsius().size() == mesh.vertex_count());
   for (const Vec3f& p : mesh.positions()) check(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
-  for (const float celsius : mesh.temperature_celsius()) check(!std::isinf(celsius));
+  for (const float celsius : mesh.temperature_celsius())
+    check(std::isnan(celsius) || celsius > -273.15F || celsius < -3e38F);
   for (const auto& [a, b, c] : mesh.triangles()) {
     check(std::max({a, b, c}) < mesh.vertex_count() && a != b && b != c && c != a);
   }

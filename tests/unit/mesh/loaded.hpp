@@ -16,19 +16,19 @@
 namespace spectra::test {
 
 /// Reads a scene from bytes, through a file in memory.
-inline fusion::Result<fusion::LoadedScene> read_bytes(std::string_view bytes) {
+inline fusion::Result<fusion::LoadedScene> read_bytes(std::string_view bytes, const fusion::ReadOptions& options = {}) {
   const int descriptor = ::memfd_create("scene.ply", MFD_CLOEXEC);
   if (descriptor < 0 || ::write(descriptor, bytes.data(), bytes.size()) != static_cast<ssize_t>(bytes.size())) {
     ADD_FAILURE() << "no file in memory";
   }
-  auto scene = fusion::read_ply("/proc/self/fd/" + std::to_string(descriptor));
+  auto scene = fusion::read_ply("/proc/self/fd/" + std::to_string(descriptor), options);
   ::close(descriptor);
   return scene;
 }
 
 /// The same where an error is a failed test.
-inline fusion::LoadedScene loaded(std::string_view bytes) {
-  auto scene = read_bytes(bytes);
+inline fusion::LoadedScene loaded(std::string_view bytes, const fusion::ReadOptions& options = {}) {
+  auto scene = read_bytes(bytes, options);
   if (!scene) {
     ADD_FAILURE() << scene.error().message;
     return {};

@@ -85,8 +85,6 @@ std::vector<HostileFile> hostile_files() {
       {"integer positions",
        head("ascii", "element vertex 1\nproperty int x\nproperty int y\nproperty int z\n") + "0 0 0\n",
        Code::Unsupported, "'x' has the type int"},
-      {"integer temperature", head("ascii", vertices("1") + "property ushort temperature\n") + "0 0 0 3000\n",
-       Code::Unsupported, "'temperature' has the type ushort"},
       {"zero vertices", head("ascii", vertices("0")), Code::BadValue, "empty"},
       {"four billion vertices", binary_head(vertices("4000000000")) + three_vertices(), Code::Truncated, "4000000000"},
       {"2^64 - 1 vertices", binary_head(vertices("18446744073709551615")) + three_vertices(), Code::Truncated,

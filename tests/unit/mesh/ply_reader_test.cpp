@@ -217,10 +217,25 @@ TEST(PlyReader, DoesNotTakeATextureCoordinateForATemperature) {
 
 TEST(PlyReader, CountsTemperaturesThatAreNone) {
   const LoadedScene scene = loaded(ascii_head(6, std::string(kXyz) + "property double temperature\n") +
-                                   "0 0 0 nan\n1 0 0 inf\n2 0 0 -inf\n3 0 0 1e39\n4 0 0 1e999\n5 0 0 3e38\n");
-  EXPECT_EQ(note_count(scene, "missing_temperatures"), 5U);
-  EXPECT_TRUE(std::isnan(scene.mesh.temperature_celsius()[3]));
+                                   "0 0 0 nan\n1 0 0 -273.15\n2 0 0 -9999\n3 0 0 -1e39\n4 0 0 -273.1\n5 0 0 3e38\n");
+  EXPECT_EQ(note_count(scene, "missing_temperatures"), 4U);
+  EXPECT_EQ(note_count(scene, "impossible_temperatures"), 3U);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(std::isnan(scene.mesh.temperature_celsius()[i])) << i;
+  EXPECT_EQ(scene.mesh.temperature_celsius()[4], -273.1F);
   EXPECT_EQ(scene.mesh.temperature_celsius()[5], 3e38F);
+}
+
+TEST(PlyReader, KeepsWhatIsBeyondTheRangeOfTheSensor) {
+  const LoadedScene scene = loaded(ascii_head(4, std::string(kXyz) + "property double temperature\n") +
+                                   "0 0 0 inf\n1 0 0 -inf\n2 0 0 1e39\n3 0 0 1e999\n");
+  const float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(note_count(scene, "missing_temperatures"), 0U);
+  EXPECT_EQ(note_count(scene, "over_range_temperatures"), 3U);
+  EXPECT_EQ(note_count(scene, "under_range_temperatures"), 1U);
+  EXPECT_EQ(scene.mesh.temperature_celsius()[0], infinity);
+  EXPECT_EQ(scene.mesh.temperature_celsius()[1], -infinity);
+  EXPECT_EQ(scene.mesh.temperature_celsius()[2], infinity);
+  EXPECT_EQ(scene.mesh.temperature_celsius()[3], infinity);
 }
 
 TEST(PlyReader, CutsPolygonsIntoFans) {

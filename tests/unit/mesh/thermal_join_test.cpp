@@ -27,7 +27,7 @@ std::string thermal_file(const std::string& lines, int count) {
 
 Result<LoadedScene> joined(const std::string& visible, const std::string& thermal, double distance = 0) {
   const test::TemporaryFolder folder;
-  return read_ply_with_thermal(folder.write("v.ply", visible), folder.write("t.ply", thermal), distance);
+  return read_ply_with_thermal(folder.write("v.ply", visible), folder.write("t.ply", thermal), {}, distance);
 }
 
 TEST(ThermalJoin, TakesTheSameNumberInOrder) {

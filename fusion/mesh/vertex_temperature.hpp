@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fusion/mesh/read_options.hpp"
+
+namespace spectra::fusion {
+
+/// What was found among the temperatures of a file.
+struct TemperatureFacts {
+  std::uint64_t missing_count = 0;      ///< Without a temperature, for whatever reason (also the next two).
+  std::uint64_t impossible_count = 0;   ///< At or below absolute zero.
+  std::uint64_t no_data_count = 0;      ///< One of the values that the options name.
+  std::uint64_t over_range_count = 0;   ///< +inf, or beyond the largest float.
+  std::uint64_t under_range_count = 0;  ///< -inf.
+};
+
+/// Turns the numbers of a file into temperatures in degC: NaN where nothing was measured, +inf and -inf where the sensor
+/// was beyond its range, anything else a float above absolute zero.
+class TemperatureConversion {
+ public:
+  explicit TemperatureConversion(const ReadOptions& options);
+
+  /// `values` and `celsius` have the same length. The facts of all calls add up.
+  void convert(std::span<const double> values, std::span<float> celsius, TemperatureFacts& facts) const;
+
+ private:
+  bool is_no_data(double value) const;
+
+  CelsiusScale scale_;
+  std::vector<double> no_data_;
+};
+
+}  // namespace spectra::fusion
