@@ -6,6 +6,8 @@
 
 #include <atomic>
 #include <cerrno>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +22,19 @@ bool is_below(const std::filesystem::path& path, const std::filesystem::path& fo
     ++part;
   }
   return part != path.end();
+}
+
+/// The temporary files of this process. Whoever makes, renames or removes one holds the mutex, so that at any moment the
+/// names are all there is.
+struct UnfinishedFiles {
+  std::mutex mutex;
+  std::set<std::filesystem::path> names;
+};
+
+/// Never destroyed: a thread may still write while the process ends.
+UnfinishedFiles& unfinished_files() {
+  static auto* const files = new UnfinishedFiles;
+  return *files;
 }
 
 /// fsync that a signal does not cut short.
@@ -52,6 +67,8 @@ Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
   // The process and a count make the name our own; O_EXCL makes sure of it.
   static std::atomic<unsigned> count{0};
   constexpr int kAttempts = 100;
+  UnfinishedFiles& unfinished = unfinished_files();
+  std::unique_lock lock(unfinished.mutex);
   for (int attempt = 0; attempt < kAttempts && file.descriptor_ < 0; ++attempt) {
     file.temporary_ = file.target_.parent_path() /
                       (".spectra-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part");
@@ -63,6 +80,8 @@ Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
     file.temporary_.clear();
     return file.error("cannot be created", error_number);
   }
+  unfinished.names.insert(file.temporary_);
+  lock.unlock();
   if (exists && ::fchmod(file.descriptor_, facts.st_mode & 07777) != 0) {
     return file.error("cannot be given the permissions of the file it replaces", errno);
   }
@@ -96,11 +115,47 @@ Result<void> OutputFile::write(std::span<const std::byte> bytes) {
 }
 
 Result<void> OutputFile::commit() {
+  return commit_all({this, 1});
+}
+
+Result<void> OutputFile::commit_all(std::span<OutputFile> files) {
+  for (OutputFile& file : files) {
+    BOOST_OUTCOME_TRYV(file.write_out());
+  }
+  {
+    const std::lock_guard lock(unfinished_files().mutex);
+    for (OutputFile& file : files) {
+      BOOST_OUTCOME_TRYV(file.put_in_place());
+    }
+  }
+  for (const OutputFile& file : files) {
+    BOOST_OUTCOME_TRYV(file.sync_folder());
+  }
+  return success();
+}
+
+void OutputFile::abandon_all() {
+  UnfinishedFiles& unfinished = unfinished_files();
+  unfinished.mutex.lock();
+  for (const auto& name : unfinished.names) ::unlink(name.c_str());
+}
+
+Result<void> OutputFile::write_out() {
   if (!temporary_.empty() && sync_descriptor(descriptor_) != 0) return error("cannot be written", errno);
   if (::close(std::exchange(descriptor_, -1)) != 0) return error("cannot be written", errno);
+  return success();
+}
+
+Result<void> OutputFile::put_in_place() {
   if (temporary_.empty()) return success();
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) return error("cannot be put in place", errno);
+  unfinished_files().names.erase(temporary_);
   temporary_.clear();
+  return success();
+}
+
+Result<void> OutputFile::sync_folder() const {
+  if (target_.empty()) return success();
   const int folder = ::open(target_.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return error("is in place, but its folder cannot be synced", errno);
   const int result = sync_descriptor(folder);
@@ -120,7 +175,11 @@ Error OutputFile::error(const std::string& what, int error_number) const {
 
 void OutputFile::discard() {
   if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (temporary_.empty()) return;
+  UnfinishedFiles& unfinished = unfinished_files();
+  const std::lock_guard lock(unfinished.mutex);
+  ::unlink(temporary_.c_str());
+  unfinished.names.erase(temporary_);
   temporary_.clear();
 }
 

@@ -23,9 +23,18 @@ class OutputFile {
   Result<void> write(std::span<const std::byte> bytes);
   /// After this the file is there, and stays there through a power cut.
   Result<void> commit();
+  /// The same for files that belong together: all are written out first, then put in place one right after the other.
+  static Result<void> commit_all(std::span<OutputFile> files);
+
+  /// For a process that ends at once: removes every file that was not committed, and holds back all others of this
+  /// process that would begin, commit or discard one, for ever. Not safe in a signal handler.
+  static void abandon_all();
 
  private:
   OutputFile() = default;
+  Result<void> write_out();
+  Result<void> put_in_place();
+  Result<void> sync_folder() const;
   Error error(const std::string& what, int error_number) const;
   void discard();
 

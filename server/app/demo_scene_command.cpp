@@ -3,10 +3,12 @@
 #include "fusion/mesh/ply_writer.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
+#include "server/app/interruption.hpp"
 
 namespace spectra::server {
 
 int run_demo_scene(const DemoSceneFileOptions& options) {
+  const Interruption interruption;
   const auto mesh = fusion::demo_scene({options.vertex_count, options.seed});
   const auto written = fusion::write_ply(options.output, mesh, mesh.visible());
   return written ? kDone : fail(written.error());

@@ -11,6 +11,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
 #include "server/app/fusion_messages.hpp"
+#include "server/app/interruption.hpp"
 
 namespace spectra::server {
 namespace {
@@ -87,6 +88,7 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
 }  // namespace
 
 int run_info(const InfoOptions& options) {
+  const Interruption interruption;
   const auto loaded = load_scene(options.input, options.thermal, options.read);
   if (!loaded) return fail(loaded.error());
   const auto& mesh = loaded.value().mesh;

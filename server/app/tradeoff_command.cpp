@@ -8,12 +8,14 @@
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
+#include "server/app/interruption.hpp"
 #include "server/tradeoff/measure.hpp"
 #include "server/tradeoff/report.hpp"
 
 namespace spectra::server {
 
 int run_tradeoff(const TradeoffCommandOptions& options) {
+  const Interruption interruption;
   auto loaded = load_scene(options.input, options.thermal, options.read);
   if (!loaded) return fail(loaded.error());
   print_notes(loaded.value().notes);

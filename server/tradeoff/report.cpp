@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include "fusion/mesh/output_file.hpp"
 
 namespace spectra::server {
 
@@ -224,6 +228,18 @@ Row row_of(const Recommendation& r) {
           number(r.colours.temperature_p95_celsius, 2)};
 }
 
+/// All of them or none.
+fusion::Result<void> written_files(const std::filesystem::path& folder,
+                                   const std::vector<std::pair<const char*, std::string>>& texts) {
+  std::vector<fusion::OutputFile> files;
+  for (const auto& [name, text] : texts) {
+    BOOST_OUTCOME_TRY(auto file, fusion::OutputFile::create(folder / name));
+    BOOST_OUTCOME_TRYV(file.write(std::as_bytes(std::span(text))));
+    files.push_back(std::move(file));
+  }
+  return fusion::OutputFile::commit_all(files);
+}
+
 }  // namespace
 
 std::string geometry_csv(const TradeoffMeasurement& measurement) {
@@ -299,22 +315,14 @@ std::string recommendation_text(const std::vector<Recommendation>& recommendatio
 
 fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
                                   const std::vector<Recommendation>& recommendations) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  const std::vector<std::pair<const char*, std::string>> files{
-      {"geometry.csv", geometry_csv(measurement)},
-      {"colours.csv", colours_csv(measurement)},
-      {"grid.csv", grid_csv(measurement)},
-      {"report.html", report_html(measurement, recommendations)}};
-  for (const auto& [name, text] : files) {
-    std::ofstream out(folder / name, std::ios::binary);
-    out << text;
-    out.close();
-    if (!out) {
-      return fusion::failure(fusion::ErrorCode::FileUnwritable, (folder / name).string() + " cannot be written", "out");
-    }
-  }
-  return fusion::success();
+  std::error_code ignored;  // what is wrong with the folder, the first file tells
+  const bool is_new = std::filesystem::create_directories(folder, ignored);
+  auto written = written_files(folder, {{"geometry.csv", geometry_csv(measurement)},
+                                        {"colours.csv", colours_csv(measurement)},
+                                        {"grid.csv", grid_csv(measurement)},
+                                        {"report.html", report_html(measurement, recommendations)}});
+  if (!written && is_new) std::filesystem::remove(folder, ignored);
+  return written;
 }
 
 }  // namespace spectra::server

@@ -21,7 +21,8 @@ std::string report_html(const TradeoffMeasurement& measurement, const std::vecto
 /// A few lines for a terminal.
 std::string recommendation_text(const std::vector<Recommendation>& recommendations);
 
-/// Writes geometry.csv, colours.csv, grid.csv and report.html into a folder, made when it does not exist.
+/// Writes geometry.csv, colours.csv, grid.csv and report.html into a folder, made when it does not exist: all of them whole,
+/// or none.
 fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
                                   const std::vector<Recommendation>& recommendations);
 

@@ -225,6 +225,36 @@ TEST(OutputFile, IsNotThereBeforeItIsCommitted) {
   EXPECT_EQ(test::file_bytes(path), "\x07");
 }
 
+TEST(OutputFile, OfSeveralThatBelongTogetherAllArePutInPlace) {
+  const test::TemporaryFolder folder;
+  const std::byte byte{7};
+  std::vector<OutputFile> files;
+  for (const auto* name : {"a", "b"}) {
+    files.push_back(OutputFile::create(folder.path() / name).value());
+    ASSERT_TRUE(files.back().write({&byte, 1}));
+  }
+  ASSERT_TRUE(OutputFile::commit_all(files));
+  EXPECT_EQ(test::file_bytes(folder.path() / "a"), "\x07");
+  EXPECT_EQ(test::file_bytes(folder.path() / "b"), "\x07");
+  EXPECT_EQ(entry_count(folder.path()), 2U);
+}
+
+TEST(OutputFile, AbandonedLeavesWhatWasThereBefore) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.write("out.bin", "old");
+  const std::byte byte{7};
+  const auto abandon_two = [&] {
+    auto file = OutputFile::create(path);
+    auto other = OutputFile::create(folder.path() / "other.bin");
+    if (!file || !other || !file.value().write({&byte, 1}) || entry_count(folder.path()) != 3U) ::_exit(1);
+    OutputFile::abandon_all();
+    ::_exit(0);
+  };
+  EXPECT_EXIT(abandon_two(), testing::ExitedWithCode(0), "");
+  EXPECT_EQ(test::file_bytes(path), "old");
+  EXPECT_EQ(entry_count(folder.path()), 1U);
+}
+
 TEST(PlyEncoder, RefusesOtherNumbersThanItsHeaderHas) {
   PlyLayout layout;
   layout.vertex_count = 2;
