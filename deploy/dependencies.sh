@@ -12,6 +12,7 @@ build_packages=(
 test_packages=(
   libgtest-dev libgmock-dev librapidcheck-dev
   clang-format-14 chromium fonts-dejavu-core python3 git
+  assimp-utils draco
 )
 
 packages=("${build_packages[@]}")

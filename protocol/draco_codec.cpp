@@ -6,13 +6,13 @@
 #include <draco/compression/mesh/mesh_edgebreaker_encoder.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <string>
 #include <utility>
+
+#include "protocol/draco_attributes.hpp"
 
 namespace spectra::protocol {
 namespace {
@@ -61,17 +61,6 @@ CompactTile compact_tile(std::size_t position_count, std::span<const TileTriangl
   return tile;
 }
 
-/// Adds an attribute of one value per point.
-template <class Value>
-int add_attribute(draco::PointCloud& cloud, draco::GeometryAttribute::Type type, draco::DataType component_type,
-                  std::uint8_t component_count, bool normalized, std::span<const Value> values) {
-  draco::GeometryAttribute attribute;
-  attribute.Init(type, nullptr, component_count, component_type, normalized, sizeof(Value), 0);
-  const int id = cloud.AddAttribute(attribute, true, static_cast<std::uint32_t>(values.size()));
-  if (!values.empty()) cloud.attribute(id)->buffer()->Write(0, values.data(), values.size_bytes());
-  return id;
-}
-
 /// Draco codes the values of one attribute with one table of frequencies. Green and the differences from it are spread
 /// differently, so each has an attribute of its own.
 void add_green_and_differences(draco::PointCloud& cloud, std::span<const ColourBytes> colours) {
@@ -88,32 +77,13 @@ void add_green_and_differences(draco::PointCloud& cloud, std::span<const ColourB
                                              differences);
 }
 
-/// A float as text that strtod reads back exactly in every locale: a hexadecimal integer times a power of two.
-std::string exact_text(float value) {
-  int exponent = 0;
-  const auto mantissa = static_cast<std::uint32_t>(std::ldexp(std::frexp(value, &exponent), 24));
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "0x%xp%d", mantissa, exponent - 24);
-  return text.data();
-}
-
-/// Options for an attribute that is quantised onto the tile's own lattice: Draco computes range / (2^bits - 1), which
-/// gives back step_m exactly. The range is handed over as text because Draco's own setter keeps six decimals only.
+/// Options for an attribute that is quantised onto the tile's own lattice.
 draco::EncoderOptions lattice_options(int attribute, std::int32_t largest_coordinate, float step_m, int speed) {
-  const int bits = std::max(1, static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest_coordinate))));
-  draco::Options quantisation;
-  quantisation.SetInt("quantization_bits", bits);
-  quantisation.SetString("quantization_origin", "0 0 0");
-  quantisation.SetString("quantization_range", exact_text(static_cast<float>((1 << bits) - 1) * step_m));
   draco::EncoderOptions options = draco::EncoderOptions::CreateDefaultOptions();
   options.SetSpeed(speed, speed);
-  options.SetAttributeOptions(attribute, quantisation);
+  options.SetAttributeOptions(
+      attribute, quantisation_options(std::array<float, 3>{}, static_cast<std::uint32_t>(largest_coordinate), step_m));
   return options;
-}
-
-std::vector<std::byte> bytes_of(const draco::EncoderBuffer& buffer) {
-  const auto* data = reinterpret_cast<const std::byte*>(buffer.data());
-  return {data, data + buffer.size()};
 }
 
 draco::DecoderBuffer decoder_buffer(std::span<const std::byte> payload) {
@@ -422,41 +392,6 @@ Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payl
                   static_cast<std::uint8_t>(red_and_blue[1] + green)};
   }
   return colours;
-}
-
-Result<std::vector<std::byte>> draco_file(const DracoFileInput& input, int speed) {
-  const std::size_t vertex_count = input.positions_m.size();
-  if (vertex_count == 0) return internal("a file without vertices");
-  if (vertex_count > std::numeric_limits<std::int32_t>::max()) return internal("too many vertices for one stream");
-  if (input.colours.size() != vertex_count) return internal("not one colour per vertex");
-  if (!input.temperature_celsius.empty() && input.temperature_celsius.size() != vertex_count)
-    return internal("not one temperature per vertex");
-  if (speed < 0 || speed > 10) return internal("speed " + std::to_string(speed) + " is not within 0..10");
-
-  draco::Mesh mesh;
-  mesh.set_num_points(static_cast<std::uint32_t>(vertex_count));
-  add_attribute(mesh, draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, false, input.positions_m);
-  add_attribute(mesh, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, input.colours);
-  if (!input.temperature_celsius.empty())
-    add_attribute(mesh, draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 1, false, input.temperature_celsius);
-  mesh.SetNumFaces(input.triangles.size());
-  for (std::uint32_t i = 0; i < input.triangles.size(); ++i) {
-    const TileTriangle& t = input.triangles[i];
-    for (const std::uint32_t vertex : t)
-      if (vertex >= vertex_count) return internal("a triangle names a vertex that the mesh does not have");
-    mesh.SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
-  }
-
-  const bool is_point_cloud = input.triangles.empty();
-  draco::ExpertEncoder encoder =
-      is_point_cloud ? draco::ExpertEncoder(static_cast<const draco::PointCloud&>(mesh)) : draco::ExpertEncoder(mesh);
-  encoder.SetSpeedOptions(speed, speed);
-  encoder.SetEncodingMethod(is_point_cloud ? static_cast<int>(draco::POINT_CLOUD_SEQUENTIAL_ENCODING)
-                                           : static_cast<int>(draco::MESH_SEQUENTIAL_ENCODING));
-  draco::EncoderBuffer buffer;
-  if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
-    return internal("file not encoded: " + status.error_msg_string());
-  return bytes_of(buffer);
 }
 
 }  // namespace spectra::protocol

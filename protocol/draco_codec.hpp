@@ -50,13 +50,4 @@ Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload);
 Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload,
                                                  ColourTransform transform = ColourTransform::None);
 
-/// Files for export: a whole mesh with colours and, where given, temperature (GENERIC float) as one Draco stream.
-struct DracoFileInput {
-  std::span<const std::array<float, 3>> positions_m;
-  std::span<const ColourBytes> colours;
-  std::span<const float> temperature_celsius;  ///< Empty: none.
-  std::span<const TileTriangle> triangles;     ///< Empty: point cloud.
-};
-Result<std::vector<std::byte>> draco_file(const DracoFileInput& input, int speed);
-
 }  // namespace spectra::protocol

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fusion/mesh/read_options.hpp"
+#include "protocol/draco_file.hpp"
 #include "server/app/settings_text.hpp"
 
 namespace spectra::server {
@@ -32,6 +33,7 @@ struct FuseOptions {
   std::optional<std::filesystem::path> thermal;
   SettingsText settings;
   fusion::ReadOptions read;
+  protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< In a Draco file.
 };
 
 struct InfoOptions {

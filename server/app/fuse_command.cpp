@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -7,6 +9,7 @@
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
+#include "server/app/interruption.hpp"
 
 namespace spectra::server {
 namespace {
@@ -22,27 +25,51 @@ fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fus
   return FusedFacts{std::move(fused.notes), fused.temperature.has_temperature()};
 }
 
+/// To a GLB, or with a second file of temperatures.
 fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
-                                           SceneFileFormat format) {
+                                           const SceneFileOptions& file) {
   BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, options.read));
   const auto temperature = temperature_of(loaded.mesh);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
-  BOOST_OUTCOME_TRYV(write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), format));
+  BOOST_OUTCOME_TRYV(write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), file));
   return FusedFacts{std::move(loaded.notes), temperature.summary.has_temperature()};
+}
+
+/// To a Draco file, on the lattice of the scene.
+fusion::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
+                                            SceneFileOptions file) {
+  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, options.read));
+  WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
+  const auto scene = SceneSnapshot::build(std::move(loaded.mesh), 1, pool);
+  file.position_step_m = file_position_step_m(*scene);
+  BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene->temperature()));
+  const auto mesh = scene->whole_mesh();
+  BOOST_OUTCOME_TRY(const auto losses, write_scene_file(options.output, mesh, fused_colours(mesh, plan), file));
+  loaded.notes.insert(loaded.notes.end(), losses.begin(), losses.end());
+  return FusedFacts{std::move(loaded.notes), scene->temperature().summary.has_temperature()};
+}
+
+fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::FusionSettings& settings,
+                                 SceneFileFormat format) {
+  SceneFileOptions file;
+  file.format = format;
+  file.keeping = options.keeping;
+  if (format == SceneFileFormat::Draco) return fused_on_lattice(options, settings, file);
+  if (format == SceneFileFormat::Ply && !options.thermal) return fused_in_blocks(options, settings);
+  return fused_in_memory(options, settings, file);
 }
 
 }  // namespace
 
 int run_fuse(const FuseOptions& options) {
+  const Interruption interruption;
   const auto format = scene_file_format(options.output.string());
   if (!format) {
     return fail(kWrongUsage, options.output.string() + ": the output must end in .ply, .glb or .drc");
   }
   const auto settings = settings_from_text(options.settings);
   if (!settings) return fail(settings.error());
-  const auto facts = *format == SceneFileFormat::Ply && !options.thermal
-                         ? fused_in_blocks(options, settings.value())
-                         : fused_in_memory(options, settings.value(), *format);
+  const auto facts = fused(options, settings.value(), *format);
   if (!facts) return fail(facts.error());
   print_notes(facts.value().notes);
   if (!facts.value().has_temperature && fusion::find_method(settings.value().method)->needs_temperature) {

@@ -1,5 +1,7 @@
 #include "server/app/fused_file.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -8,8 +10,8 @@
 
 #include "fusion/mesh/output_file.hpp"
 #include "fusion/mesh/ply_writer.hpp"
-#include "protocol/draco_codec.hpp"
 #include "server/app/glb_file.hpp"
+#include "server/stream/lattice.hpp"
 
 namespace spectra::server {
 namespace {
@@ -17,7 +19,45 @@ namespace {
 /// As the streams' default: near the smallest size at a fraction of its time.
 constexpr int kDracoFileSpeed = 7;
 
-fusion::Result<std::string> draco_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours) {
+std::string counted(std::uint64_t count, std::string_view one, std::string_view many) {
+  return std::to_string(count) + " " + std::string(count == 1 ? one : many);
+}
+
+/// What a Draco file has lost, for people.
+std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, protocol::DracoKeeping keeping,
+                                    float position_step_m) {
+  std::vector<fusion::Note> losses;
+  if (keeping == protocol::DracoKeeping::Everything) return losses;
+  std::string rounded = fmt::format("positions are rounded to {:.4g} mm", 1000 * static_cast<double>(position_step_m));
+  if (file.temperature_step_celsius > 0) {
+    rounded += fmt::format(" and temperatures to {:g} degC", file.temperature_step_celsius);
+  }
+  losses.push_back({"rounded_values", 0, "In the file " + rounded + "; --lossless keeps every value as it is"});
+  const auto add = [&losses](const char* id, std::uint64_t count, std::string message) {
+    if (count > 0) losses.push_back({id, count, std::move(message)});
+  };
+  add("over_range_written", file.over_range_count,
+      fmt::format("In the file {} over range {} {:g} degC", counted(file.over_range_count, "vertex", "vertices"),
+                  file.over_range_count == 1 ? "has" : "have", file.over_range_celsius));
+  add("under_range_written", file.under_range_count,
+      fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
+                  file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
+  if (keeping == protocol::DracoKeeping::Order) return losses;
+  losses.push_back({"vertex_order", 0,
+                    "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
+  add("left_out_vertices", file.left_out_vertex_count,
+      counted(file.left_out_vertex_count, "vertex", "vertices") + " of no triangle left out; --keep-order keeps them");
+  add("left_out_triangles", file.left_out_triangle_count,
+      counted(file.left_out_triangle_count, "triangle", "triangles") +
+          " with the same vertex twice left out; --keep-order keeps them");
+  add("split_vertices", file.split_vertex_count,
+      counted(file.split_vertex_count, "vertex", "vertices") +
+          " more than in the scene: where surfaces touch in a vertex each has its own; --keep-order keeps the number");
+  return losses;
+}
+
+fusion::Result<SceneFile> draco_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
+                                     const SceneFileOptions& options) {
   static_assert(sizeof(fusion::Vec3f) == sizeof(std::array<float, 3>));
   static_assert(sizeof(fusion::Rgb8) == sizeof(protocol::ColourBytes));
   std::vector<std::array<float, 3>> positions;
@@ -31,12 +71,13 @@ fusion::Result<std::string> draco_file(const fusion::MultispectralMesh& mesh, st
   input.colours = colour_bytes;
   if (mesh.has_temperature) input.temperature_celsius = mesh.temperature_celsius();
   input.triangles = mesh.triangles();
-  auto bytes = protocol::draco_file(input, kDracoFileSpeed);
-  if (!bytes) return fusion::failure(fusion::ErrorCode::Unsupported, bytes.error().message);
-  std::string text;
-  text.reserve(bytes.value().size());
-  for (const std::byte b : bytes.value()) text.push_back(static_cast<char>(b));
-  return text;
+  input.origin_m = {mesh.origin.x, mesh.origin.y, mesh.origin.z};
+  if (options.keeping != protocol::DracoKeeping::Everything) input.position_step_m = options.position_step_m;
+  const auto file = protocol::draco_file(input, options.keeping, kDracoFileSpeed);
+  if (!file) return fusion::failure(fusion::ErrorCode::Unsupported, file.error().message);
+  const auto& bytes = file.value().bytes;
+  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  return SceneFile{std::string(text, bytes.size()), losses_of(file.value(), options.keeping, options.position_step_m)};
 }
 
 }  // namespace
@@ -75,22 +116,35 @@ std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, c
   return fused;
 }
 
-fusion::Result<std::string> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                       SceneFileFormat format) {
-  if (format == SceneFileFormat::Glb) return glb_file(mesh, colours);
-  if (format == SceneFileFormat::Draco) return draco_file(mesh, colours);
+fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
+                                     const SceneFileOptions& options) {
+  if (options.format == SceneFileFormat::Draco) return draco_file(mesh, colours, options);
+  if (options.format == SceneFileFormat::Glb) {
+    BOOST_OUTCOME_TRY(auto bytes, glb_file(mesh, colours, options.up));
+    return SceneFile{std::move(bytes), {}};
+  }
   std::ostringstream out;
   BOOST_OUTCOME_TRYV(fusion::write_ply(out, mesh, colours));
-  return std::move(out).str();
+  return SceneFile{std::move(out).str(), {}};
 }
 
-fusion::Result<void> write_scene_file(const std::filesystem::path& path, const fusion::MultispectralMesh& mesh,
-                                      std::span<const fusion::Rgb8> colours, SceneFileFormat format) {
-  if (format == SceneFileFormat::Ply) return fusion::write_ply(path, mesh, colours);
-  BOOST_OUTCOME_TRY(auto file, fusion::OutputFile::create(path));
-  BOOST_OUTCOME_TRY(const auto bytes, scene_file(mesh, colours, format));
-  BOOST_OUTCOME_TRYV(file.write(std::as_bytes(std::span(bytes))));
-  return file.commit();
+fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
+                                                           const fusion::MultispectralMesh& mesh,
+                                                           std::span<const fusion::Rgb8> colours,
+                                                           const SceneFileOptions& options) {
+  if (options.format == SceneFileFormat::Ply) {
+    BOOST_OUTCOME_TRYV(fusion::write_ply(path, mesh, colours));
+    return std::vector<fusion::Note>{};
+  }
+  BOOST_OUTCOME_TRY(auto output, fusion::OutputFile::create(path));
+  BOOST_OUTCOME_TRY(auto file, scene_file(mesh, colours, options));
+  BOOST_OUTCOME_TRYV(output.write(std::as_bytes(std::span(file.bytes))));
+  BOOST_OUTCOME_TRYV(output.commit());
+  return std::move(file.losses);
+}
+
+float file_position_step_m(const SceneSnapshot& scene) {
+  return position_step_in_force(0, scene.suggested_position_step_m(), scene.bounds());
 }
 
 }  // namespace spectra::server

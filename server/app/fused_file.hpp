@@ -10,8 +10,11 @@
 #include "fusion/error.hpp"
 #include "fusion/fusion_plan.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/mesh/ply_reader.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
+#include "protocol/draco_file.hpp"
+#include "server/scene/scene_snapshot.hpp"
 
 namespace spectra::server {
 
@@ -30,15 +33,34 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh);
 /// The fused colour of every vertex, in the mesh's order.
 std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan);
 
+/// How a fused scene is written.
+struct SceneFileOptions {
+  SceneFileFormat format = SceneFileFormat::Ply;
+  fusion::Vec3f up{0, 0, 1};                                       ///< Of a GLB: which way the scene's up is.
+  protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
+  float position_step_m = 0;                                       ///< Of a Draco file that does not keep everything.
+};
+
+/// A file, and what it does not tell as the scene did.
+struct SceneFile {
+  std::string bytes;
+  std::vector<fusion::Note> losses;
+};
+
 /// The bytes of a file that holds the mesh with these colours (one a vertex): the one way to make exports, so that the
 /// command line and HTTP give the same bytes. In a GLB temperature is the vertex attribute _TEMPERATURE (float, degC;
 /// kGlbMissingCelsius where there is none, because glTF allows no NaN) and the scene's origin the node's translation.
-fusion::Result<std::string> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                       SceneFileFormat format);
+fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
+                                     const SceneFileOptions& options);
 
-/// The same into a file that appears whole or not at all.
-fusion::Result<void> write_scene_file(const std::filesystem::path& path, const fusion::MultispectralMesh& mesh,
-                                      std::span<const fusion::Rgb8> colours, SceneFileFormat format);
+/// The same into a file that appears whole or not at all; returns the losses.
+fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
+                                                           const fusion::MultispectralMesh& mesh,
+                                                           std::span<const fusion::Rgb8> colours,
+                                                           const SceneFileOptions& options);
+
+/// The position step that a Draco file of a scene has: the one that the scene is streamed with.
+float file_position_step_m(const SceneSnapshot& scene);
 
 /// Stands for a missing temperature in a GLB: colder than anything can be.
 inline constexpr float kGlbMissingCelsius = -1000;

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "server/app/fused_file.hpp"
 
@@ -50,6 +52,33 @@ class BufferWriter {
   tinygltf::Model& model_;
 };
 
+/// Turned so that what was `up` is +Y. Only exchanges and negates coordinates.
+template <class Vector>
+Vector turned_upright(const Vector& v, const fusion::Vec3f& up) {
+  using Scalar = decltype(v.x);
+  if (up.x != 0) return {-static_cast<Scalar>(up.x) * v.y, static_cast<Scalar>(up.x) * v.x, v.z};
+  const auto sign = static_cast<Scalar>(up.y != 0 ? up.y : up.z);
+  return up.y != 0 ? Vector{v.x, sign * v.y, sign * v.z} : Vector{v.x, sign * v.z, -sign * v.y};
+}
+
+/// The linear value of every sRGB channel as a normalised unsigned short (IEC 61966-2-1).
+std::array<std::uint16_t, 256> linear_channels() {
+  std::array<std::uint16_t, 256> linear{};
+  for (std::size_t i = 0; i < linear.size(); ++i) {
+    const double encoded = static_cast<double>(i) / 255;
+    const double value = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+    linear[i] = static_cast<std::uint16_t>(std::lround(65535 * value));
+  }
+  return linear;
+}
+
+/// glTF allows neither NaN nor infinity.
+float stored_celsius(float celsius) {
+  if (std::isnan(celsius)) return kGlbMissingCelsius;
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  return std::clamp(celsius, -kLargest, kLargest);
+}
+
 void set_position_bounds(tinygltf::Accessor& accessor, std::span<const fusion::Vec3f> positions) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   std::array<float, 3> low{kInfinity, kInfinity, kInfinity};
@@ -67,10 +96,11 @@ void set_position_bounds(tinygltf::Accessor& accessor, std::span<const fusion::V
 
 }  // namespace
 
-fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours) {
+fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
+                                     fusion::Vec3f up) {
   const std::size_t vertex_count = mesh.vertex_count();
   const std::size_t size_bytes =
-      vertex_count * (12 + 4 + (mesh.has_temperature ? 4U : 0U)) + mesh.triangle_count() * 12;
+      vertex_count * (12 + 8 + (mesh.has_temperature ? 4U : 0U)) + mesh.triangle_count() * 12;
   if (size_bytes > std::numeric_limits<std::uint32_t>::max() - 65'536U) {
     return fusion::failure(fusion::ErrorCode::TooLarge,
                            "the scene needs " + std::to_string(size_bytes) + " bytes and a GLB holds at most 4 GiB");
@@ -80,7 +110,8 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
   model.asset.generator = "Spectra";
   tinygltf::Node node;
   node.name = mesh.name;
-  node.translation = {mesh.origin.x, mesh.origin.y, mesh.origin.z};
+  const fusion::Vec3d origin = turned_upright(mesh.origin, up);
+  node.translation = {origin.x, origin.y, origin.z};
 
   if (vertex_count > 0) {
     BufferWriter writer(model);
@@ -88,27 +119,29 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
     tinygltf::Primitive primitive;
     primitive.mode = mesh.is_point_cloud() ? TINYGLTF_MODE_POINTS : TINYGLTF_MODE_TRIANGLES;
 
-    const auto positions = mesh.positions();
-    std::memcpy(writer.add_view(positions.size_bytes(), TINYGLTF_TARGET_ARRAY_BUFFER), positions.data(),
-                positions.size_bytes());
+    std::vector<fusion::Vec3f> positions(vertex_count);
+    std::transform(mesh.positions().begin(), mesh.positions().end(), positions.begin(),
+                   [up](const fusion::Vec3f& p) { return turned_upright(p, up); });
+    const std::size_t position_bytes = positions.size() * sizeof(fusion::Vec3f);
+    std::memcpy(writer.add_view(position_bytes, TINYGLTF_TARGET_ARRAY_BUFFER), positions.data(), position_bytes);
     const int position = writer.add_accessor(TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3, vertex_count);
     set_position_bounds(model.accessors[static_cast<std::size_t>(position)], positions);
     primitive.attributes["POSITION"] = position;
 
-    unsigned char* rgba = writer.add_view(vertex_count * 4, TINYGLTF_TARGET_ARRAY_BUFFER);
+    static const std::array<std::uint16_t, 256> kLinear = linear_channels();
+    unsigned char* rgba = writer.add_view(vertex_count * 8, TINYGLTF_TARGET_ARRAY_BUFFER);
     for (const auto& colour : colours) {
-      *rgba++ = colour.r;
-      *rgba++ = colour.g;
-      *rgba++ = colour.b;
-      *rgba++ = 255;
+      const std::array<std::uint16_t, 4> linear{kLinear[colour.r], kLinear[colour.g], kLinear[colour.b], 65535};
+      std::memcpy(rgba, linear.data(), sizeof linear);
+      rgba += sizeof linear;
     }
     primitive.attributes["COLOR_0"] =
-        writer.add_accessor(TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, TINYGLTF_TYPE_VEC4, vertex_count, true);
+        writer.add_accessor(TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4, vertex_count, true);
 
     if (mesh.has_temperature) {
       unsigned char* out = writer.add_view(vertex_count * 4, TINYGLTF_TARGET_ARRAY_BUFFER);
       for (const float celsius : mesh.temperature_celsius()) {
-        const float stored = std::isfinite(celsius) ? celsius : kGlbMissingCelsius;
+        const float stored = stored_celsius(celsius);
         std::memcpy(out, &stored, sizeof stored);
         out += sizeof stored;
       }
@@ -117,6 +150,8 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
       tinygltf::Value::Object extras;
       extras["temperature_unit"] = tinygltf::Value(std::string("degC"));
       extras["temperature_missing"] = tinygltf::Value(double{kGlbMissingCelsius});
+      extras["temperature_over_range"] = tinygltf::Value(double{std::numeric_limits<float>::max()});
+      extras["temperature_under_range"] = tinygltf::Value(double{-std::numeric_limits<float>::max()});
       primitive.extras = tinygltf::Value(std::move(extras));
     }
 

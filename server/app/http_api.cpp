@@ -66,11 +66,35 @@ SettingsText settings_text_of(const RequestTarget& target) {
   return text;
 }
 
-fusion::Result<std::string> fused_export(const SceneSnapshot& scene, const fusion::FusionSettings& settings,
-                                         SceneFileFormat format) {
+fusion::Result<bool> flag_from_text(const std::string& name, const std::string& text) {
+  if (text == "true" || text == "false") return text == "true";
+  return fusion::failure(fusion::ErrorCode::WrongType, name + " is \"" + text + "\"; it must be true or false", name);
+}
+
+/// What the query says of the file, and not of the fusion; taken out of the query.
+fusion::Result<SceneFileOptions> file_options_of(RequestTarget& target, SceneFileFormat format) {
+  SceneFileOptions options;
+  options.format = format;
+  bool keep_order = false;
+  bool is_lossless = false;
+  for (const auto& [name, value] : target.query) {
+    if (name != "keep_order" && name != "lossless") continue;
+    BOOST_OUTCOME_TRY(const bool is_wanted, flag_from_text(name, value));
+    (name == "lossless" ? is_lossless : keep_order) = is_wanted;
+  }
+  std::erase_if(target.query,
+                [](const auto& entry) { return entry.first == "keep_order" || entry.first == "lossless"; });
+  if (keep_order) options.keeping = protocol::DracoKeeping::Order;
+  if (is_lossless) options.keeping = protocol::DracoKeeping::Everything;
+  return options;
+}
+
+fusion::Result<SceneFile> fused_export(const SceneSnapshot& scene, const fusion::FusionSettings& settings,
+                                       SceneFileOptions options) {
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene.temperature()));
+  options.position_step_m = file_position_step_m(scene);
   const auto mesh = scene.whole_mesh();
-  return scene_file(mesh, fused_colours(mesh, plan), format);
+  return scene_file(mesh, fused_colours(mesh, plan), options);
 }
 
 }  // namespace
@@ -96,9 +120,11 @@ void HttpApi::handle(const HttpRequest& request, const std::function<void(HttpRe
   reply(text_reply(404, "not found\n"));
 }
 
-void HttpApi::handle_export(const RequestTarget& target, const std::function<void(HttpReply)>& reply) {
+void HttpApi::handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply) {
   const auto format = scene_file_format(target.path);
   if (!format || target.path.size() != kExportPrefix.size() + 3) return reply(text_reply(404, "not found\n"));
+  const auto file_options = file_options_of(target, *format);
+  if (!file_options) return reply(json_error(400, file_options.error().field, file_options.error().message));
   const auto settings = settings_from_text(settings_text_of(target));
   if (!settings) return reply(json_error(400, settings.error().field, settings.error().message));
   const auto scene = served_.scenes.current();
@@ -110,12 +136,15 @@ void HttpApi::handle_export(const RequestTarget& target, const std::function<voi
   }
   const auto slot = std::make_shared<ExportSlot>(exports_under_way_);
   served_.pool.post(
-      [slot, scene, settings = settings.value(), format = *format, reply, path = target.path] {
+      [slot, scene, settings = settings.value(), options = file_options.value(), reply, path = target.path] {
         try {
-          auto bytes = fused_export(*scene, settings, format);
-          if (!bytes) return reply(json_error(400, bytes.error().field, bytes.error().message));
-          const auto body = std::make_shared<ExportBody>(ExportBody{slot, std::move(bytes).value()});
-          HttpReply done{200, std::string(content_type_of(format)), {body, &body->bytes}, {}};
+          auto file = fused_export(*scene, settings, options);
+          if (!file) return reply(json_error(400, file.error().field, file.error().message));
+          const auto body = std::make_shared<ExportBody>(ExportBody{slot, std::move(file.value().bytes)});
+          HttpReply done{200, std::string(content_type_of(options.format)), {body, &body->bytes}, {}};
+          std::string losses;
+          for (const auto& loss : file.value().losses) losses += (losses.empty() ? "" : " | ") + loss.message;
+          if (!losses.empty()) done.headers.emplace_back("Spectra-Note", losses);
           done.headers.emplace_back("Content-Disposition",
                                     "attachment; filename=\"" + path.substr(path.rfind('/') + 1) + '"');
           reply(std::move(done));

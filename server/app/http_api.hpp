@@ -21,7 +21,7 @@ class HttpApi {
   void set_metrics(const NetMetrics& metrics) { net_metrics_ = &metrics; }
 
  private:
-  void handle_export(const RequestTarget& target, const std::function<void(HttpReply)>& reply);
+  void handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply);
 
   ServedScene& served_;
   const NetMetrics* net_metrics_ = nullptr;

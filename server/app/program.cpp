@@ -52,7 +52,13 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->final_callback([&options, &run] { run = [&options] { return run_serve(options); }; });
 }
 
-void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& sets, Run& run) {
+/// What a Draco file is asked to keep.
+struct KeepFlags {
+  bool order = false;
+  bool everything = false;
+};
+
+void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& sets, KeepFlags& keep, Run& run) {
   auto* command = app.add_subcommand("fuse", "Write a fused scene to a file");
   command->add_option("input", options.input, "The scene, a PLY file")->required();
   command->add_option("output", options.output, "The file to write: .ply, .glb or .drc")->required();
@@ -65,7 +71,11 @@ void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& set
                       "Colour of vertices without temperature: visible or #rrggbb");
   command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");
   add_reading(*command, options.read);
-  command->final_callback([&options, &sets, &run] {
+  command->add_flag("--keep-order", keep.order, "In a .drc: the scene's vertices and triangles in order and number");
+  command->add_flag("--lossless", keep.everything, "In a .drc: that, and every position and temperature as it is");
+  command->final_callback([&options, &sets, &keep, &run] {
+    if (keep.order) options.keeping = protocol::DracoKeeping::Order;
+    if (keep.everything) options.keeping = protocol::DracoKeeping::Everything;
     for (const auto& set : sets) {
       const auto equals = set.find('=');
       if (equals == std::string::npos || equals == 0)
@@ -120,6 +130,7 @@ int parse_and_run(int argc, const char* const* argv) {
   ServeOptions serve;
   FuseOptions fuse;
   std::vector<std::string> sets;
+  KeepFlags keep;
   InfoOptions info;
   bool methods_as_json = false;
   DemoSceneFileOptions demo_scene;
@@ -127,7 +138,7 @@ int parse_and_run(int argc, const char* const* argv) {
   Run run;
   bool is_demo = false;  // what is served without a scene anyway
   add_serve(app, serve, is_demo, run);
-  add_fuse(app, fuse, sets, run);
+  add_fuse(app, fuse, sets, keep, run);
   add_info(app, info, run);
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);

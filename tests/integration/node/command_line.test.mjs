@@ -81,6 +81,17 @@ test("the exports of the server are the command line's", async () => {
       assert.equal(answer.status, 200);
       assert.ok(Buffer.from(await answer.arrayBuffer()).equals(readFileSync(output)), format);
     }
+    for (const [option, query] of [["--keep-order", "keep_order=true"], ["--lossless", "lossless=true"]]) {
+      const output = inFolder("kept.drc");
+      run("fuse", demo, output, "--method", "thermal_only", option);
+      const answer = await fetch(`${server.url}/api/v1/scene.drc?method=thermal_only&${query}`);
+      assert.ok(Buffer.from(await answer.arrayBuffer()).equals(readFileSync(output)), query);
+      assert.equal(answer.headers.get("spectra-note") === null, query === "lossless=true", "what was lost is said");
+    }
+    assert.match((await fetch(`${server.url}/api/v1/scene.drc?method=thermal_only`)).headers.get("spectra-note"), /rounded.*mm.*degC.*order/);
+    const unclear = await fetch(`${server.url}/api/v1/scene.drc?method=thermal_only&lossless=1`);
+    assert.equal(unclear.status, 400);
+    assert.match(await unclear.text(), /lossless.*true or false/);
     const bad = await fetch(`${server.url}/api/v1/scene.ply?method=colour_mapped_threshold&alpha=7`);
     assert.equal(bad.status, 400);
     assert.match(await bad.text(), /alpha/);

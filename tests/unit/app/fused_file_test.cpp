@@ -4,6 +4,7 @@
 #include <tiny_gltf.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -65,29 +66,79 @@ TEST(SceneFileFormat, IsChosenByTheEnding) {
 
 TEST(GlbFile, HoldsPositionsColoursTemperaturesAndTriangles) {
   const auto mesh = two_triangles();
-  const auto model = read_glb(scene_file(mesh, kColours, SceneFileFormat::Glb).value());
+  const auto model = read_glb(scene_file(mesh, kColours, {SceneFileFormat::Glb}).value().bytes);
   ASSERT_EQ(model.meshes.size(), 1U);
   const auto& primitive = model.meshes[0].primitives.at(0);
   EXPECT_EQ(primitive.mode, TINYGLTF_MODE_TRIANGLES);
   EXPECT_EQ(values_of<float>(model, primitive.attributes.at("POSITION"), 3),
-            (std::vector<float>{0, 0, 0, 1, 0, -2, 0, 3, 0, 1, 1, 0}));
+            (std::vector<float>{0, 0, 0, 1, -2, 0, 0, 0, -3, 1, 0, -1}));
   const auto& position = model.accessors[static_cast<std::size_t>(primitive.attributes.at("POSITION"))];
-  EXPECT_EQ(position.minValues, (std::vector<double>{0, 0, -2}));
-  EXPECT_EQ(position.maxValues, (std::vector<double>{1, 3, 0}));
-  EXPECT_EQ(values_of<unsigned char>(model, primitive.attributes.at("COLOR_0"), 4),
-            (std::vector<unsigned char>{1, 2, 3, 255, 4, 5, 6, 255, 250, 0, 255, 255, 7, 8, 9, 255}));
+  EXPECT_EQ(position.minValues, (std::vector<double>{0, -2, -3}));
+  EXPECT_EQ(position.maxValues, (std::vector<double>{1, 0, 0}));
+  // IEC 61966-2-1: 1 / 255 / 12.92 of 65535 is 19.9, ((250 / 255 + 0.055) / 1.055)^2.4 of it 62649.6, and so on.
+  EXPECT_EQ(values_of<std::uint16_t>(model, primitive.attributes.at("COLOR_0"), 4),
+            (std::vector<std::uint16_t>{20, 40, 60, 65535, 80, 99, 119, 65535, 62650, 0, 65535, 65535, 139, 159, 179,
+                                        65535}));
   EXPECT_TRUE(model.accessors[static_cast<std::size_t>(primitive.attributes.at("COLOR_0"))].normalized);
   EXPECT_EQ(values_of<float>(model, primitive.attributes.at("_TEMPERATURE"), 1),
             (std::vector<float>{10, 20, kGlbMissingCelsius, 30}));
   EXPECT_EQ(values_of<std::uint32_t>(model, primitive.indices, 1), (std::vector<std::uint32_t>{0, 1, 2, 1, 3, 2}));
-  EXPECT_EQ(model.nodes.at(0).translation, (std::vector<double>{500'000.25, 4'000'000.5, 12}));
+  EXPECT_EQ(model.nodes.at(0).translation, (std::vector<double>{500'000.25, 12, -4'000'000.5}));
+}
+
+TEST(GlbFile, GivesEveryColourBackToAViewerThatEncodesItForTheScreen) {
+  fusion::MultispectralMesh mesh;
+  mesh.resize_vertices(256);
+  std::vector<fusion::Rgb8> colours;
+  for (unsigned i = 0; i < 256; ++i) {
+    const auto value = static_cast<std::uint8_t>(i);
+    colours.push_back({value, value, value});
+  }
+  const auto model = read_glb(scene_file(mesh, colours, {SceneFileFormat::Glb}).value().bytes);
+  const auto& accessor_index = model.meshes.at(0).primitives.at(0).attributes.at("COLOR_0");
+  const auto linear = values_of<std::uint16_t>(model, accessor_index, 4);
+  for (unsigned i = 0; i < 256; ++i) {
+    const double value = linear[4 * i] / 65535.0;
+    const double encoded = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
+    EXPECT_NEAR(255 * encoded, i, 0.04);
+  }
+}
+
+TEST(GlbFile, IsTurnedToHaveYUp) {
+  fusion::MultispectralMesh mesh;
+  mesh.resize_vertices(1);
+  mesh.positions()[0] = {1, 2, 3};
+  const std::vector<fusion::Rgb8> colours(1);
+  const auto turned = [&](fusion::Vec3f up) {
+    const auto model = read_glb(scene_file(mesh, colours, {SceneFileFormat::Glb, up}).value().bytes);
+    return values_of<float>(model, model.meshes.at(0).primitives.at(0).attributes.at("POSITION"), 3);
+  };
+  // Each is a turn, not a mirror image: what was right-handed stays so.
+  EXPECT_EQ(turned({1, 0, 0}), (std::vector<float>{-2, 1, 3}));
+  EXPECT_EQ(turned({-1, 0, 0}), (std::vector<float>{2, -1, 3}));
+  EXPECT_EQ(turned({0, 1, 0}), (std::vector<float>{1, 2, 3}));
+  EXPECT_EQ(turned({0, -1, 0}), (std::vector<float>{1, -2, -3}));
+  EXPECT_EQ(turned({0, 0, 1}), (std::vector<float>{1, 3, -2}));
+  EXPECT_EQ(turned({0, 0, -1}), (std::vector<float>{1, -3, 2}));
+}
+
+TEST(GlbFile, HasNoInfinity) {
+  auto mesh = two_triangles();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  mesh.temperature_celsius()[0] = kInfinity;
+  mesh.temperature_celsius()[1] = -kInfinity;
+  const auto model = read_glb(scene_file(mesh, kColours, {SceneFileFormat::Glb}).value().bytes);
+  const auto& primitive = model.meshes.at(0).primitives.at(0);
+  EXPECT_EQ(values_of<float>(model, primitive.attributes.at("_TEMPERATURE"), 1),
+            (std::vector<float>{kLargest, -kLargest, kGlbMissingCelsius, 30}));
 }
 
 TEST(GlbFile, OfAPointCloudWithoutTemperatureHasPointsOnly) {
   auto mesh = two_triangles();
   mesh.triangles().clear();
   mesh.has_temperature = false;
-  const auto model = read_glb(scene_file(mesh, kColours, SceneFileFormat::Glb).value());
+  const auto model = read_glb(scene_file(mesh, kColours, {SceneFileFormat::Glb}).value().bytes);
   const auto& primitive = model.meshes.at(0).primitives.at(0);
   EXPECT_EQ(primitive.mode, TINYGLTF_MODE_POINTS);
   EXPECT_EQ(primitive.indices, -1);
@@ -96,25 +147,27 @@ TEST(GlbFile, OfAPointCloudWithoutTemperatureHasPointsOnly) {
 
 TEST(GlbFile, OfAnEmptySceneIsAFileAllTheSame) {
   const fusion::MultispectralMesh empty;
-  const auto model = read_glb(scene_file(empty, {}, SceneFileFormat::Glb).value());
+  const auto model = read_glb(scene_file(empty, {}, {SceneFileFormat::Glb}).value().bytes);
   EXPECT_TRUE(model.meshes.empty());
 }
 
 TEST(SceneFile, IsTheSameOnDiskAndInMemory) {
   const auto mesh = two_triangles();
   for (const auto* name : {"a.ply", "a.glb", "a.drc"}) {
-    const auto format = *scene_file_format(name);
+    SceneFileOptions options;
+    options.format = *scene_file_format(name);
+    options.position_step_m = 0.25F;
     const auto path = std::filesystem::temp_directory_path() / ("spectra_fused_" + std::to_string(getpid()) + name);
-    ASSERT_TRUE(write_scene_file(path, mesh, kColours, format)) << name;
+    ASSERT_TRUE(write_scene_file(path, mesh, kColours, options)) << name;
     std::ifstream in(path, std::ios::binary);
     const std::string on_disk(std::istreambuf_iterator<char>(in), {});
-    EXPECT_EQ(on_disk, scene_file(mesh, kColours, format).value()) << name;
+    EXPECT_EQ(on_disk, scene_file(mesh, kColours, options).value().bytes) << name;
     std::filesystem::remove(path);
   }
 }
 
 TEST(SceneFile, SaysWhereItCannotBeWritten) {
-  const auto written = write_scene_file("/no/such/folder/a.glb", two_triangles(), kColours, SceneFileFormat::Glb);
+  const auto written = write_scene_file("/no/such/folder/a.glb", two_triangles(), kColours, {SceneFileFormat::Glb});
   ASSERT_FALSE(written);
   EXPECT_NE(written.error().message.find("/no/such/folder"), std::string::npos);
 }

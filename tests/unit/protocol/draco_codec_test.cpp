@@ -230,38 +230,5 @@ TEST(EncodedColours, RefusesNoColoursAndBitsThatDoNotExist) {
   EXPECT_TRUE(encoded_colours(one, 0, 7).has_error());
 }
 
-TEST(DracoFile, KeepsOrderNumberAndExactValues) {
-  const std::vector<std::array<float, 3>> positions{{0.1F, 2e9F, -3}, {1, 1.0F / 3, 0}, {0, 1, 7}, {5, 5, 5}};
-  const std::vector<ColourBytes> colours{{1, 2, 3}, {255, 0, 128}, {9, 9, 9}, {77, 66, 55}};
-  const std::vector<float> temperature{20.5F, -40, 1e6F, 0.1F};
-  const std::vector<TileTriangle> triangles{{2, 1, 0}, {0, 1, 1}};
-  for (int speed = 0; speed <= 10; ++speed) {
-    for (const bool has_temperature : {true, false}) {
-      DracoFileInput input{positions, colours, {}, triangles};
-      if (has_temperature) input.temperature_celsius = temperature;
-      const auto file = draco_file(input, speed);
-      ASSERT_TRUE(file.has_value()) << file.error().message;
-      const auto decoded = decoded_geometry(file.value());
-      ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-      EXPECT_EQ(decoded.value().positions_m, positions);
-      EXPECT_EQ(decoded.value().triangles, triangles);
-    }
-    const auto cloud = draco_file({positions, colours, temperature, {}}, speed);
-    ASSERT_TRUE(cloud.has_value()) << cloud.error().message;
-    const auto decoded = decoded_geometry(cloud.value());
-    ASSERT_TRUE(decoded.has_value());
-    EXPECT_EQ(decoded.value().positions_m, positions);
-    const auto seen = decoded_colours(cloud.value());
-    ASSERT_TRUE(seen.has_value());
-    EXPECT_EQ(seen.value(), colours);
-  }
-}
-
-TEST(DracoFile, RefusesArraysThatDoNotMatch) {
-  const std::vector<std::array<float, 3>> positions{{0, 0, 0}, {1, 0, 0}};
-  const std::vector<ColourBytes> colours{{1, 2, 3}};
-  EXPECT_TRUE(draco_file({positions, colours, {}, {}}, 7).has_error());
-}
-
 }  // namespace
 }  // namespace spectra::protocol

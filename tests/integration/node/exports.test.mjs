@@ -1,0 +1,228 @@
+// The files that Spectra writes, opened by programs that are not ours: three.js' loaders, the glTF validator of Khronos,
+// Debian's assimp and draco_decoder. They see the positions, colours, temperatures and triangles that went in.
+import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { after, test } from "node:test";
+import validator from "gltf-validator";
+import { MeshIdentity, cornerHash, identityOfPly, nearestLattice } from "./mesh_identity.mjs";
+import { readPly } from "./ply.mjs";
+import { binary, run } from "./spectra_server.mjs";
+import { serveDecoder } from "./three_in_node.mjs";
+import { DRACOLoader } from "three/examples/jsm/loaders/DRACOLoader.js";
+import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
+import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
+
+const folder = mkdtempSync(path.join(tmpdir(), "spectra-exports-"));
+const decoder = await serveDecoder();
+after(() => {
+  decoder.stop();
+  rmSync(folder, { recursive: true });
+});
+const inFolder = (name) => path.join(folder, name);
+const arrayBufferOf = (file) => {
+  const { buffer, byteOffset, byteLength } = readFileSync(file);
+  return buffer.slice(byteOffset, byteOffset + byteLength);
+};
+
+const scene = inFolder("scene.ply");
+run("demo-scene", scene, "--vertices", "20000");
+/** Writes the fused scene as a file of that ending and returns its name and what was said of it. */
+function fused(ending, input = scene, ...options) {
+  const output = inFolder(`fused-${path.basename(input, ".ply")}${options.join("")}.${ending}`);
+  const args = ["fuse", input, output, "--method", "thermal_visible_blend", ...options];
+  const { status, stderr } = spawnSync(binary, args, { encoding: "utf8" });
+  assert.equal(status, 0, stderr);
+  return { output, said: stderr };
+}
+const picture = readPly(fused("ply").output);
+
+/** A small scene as text. */
+function written(name, { header, vertices, triangles = [] }) {
+  const lines = ["ply", "format ascii 1.0", `element vertex ${vertices.length}`, ...header.map((line) => `property ${line}`)];
+  if (triangles.length > 0) lines.push(`element face ${triangles.length}`, "property list uchar int vertex_indices");
+  lines.push("end_header", ...vertices.map((row) => row.join(" ")), ...triangles.map((row) => `3 ${row.join(" ")}`), "");
+  writeFileSync(inFolder(name), lines.join("\n"));
+  return inFolder(name);
+}
+const kFloats = ["float x", "float y", "float z"];
+const kColours = ["uchar red", "uchar green", "uchar blue"];
+const oneColour = written("one_colour.ply", {
+  header: [...kFloats, ...kColours, "float temperature"],
+  vertices: [[0, 0, 0, 60, 100, 80, 20], [1, 0, 0, 60, 100, 80, 21], [0, 1, 0.5, 60, 100, 80, "nan"]],
+  triangles: [[0, 1, 2]],
+});
+
+/** The byte that a screen is given for a linear value. */
+function screenByte(linear) {
+  return Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+}
+const screenColours = (attribute) =>
+  Array.from({ length: attribute.count }, (_, i) => [attribute.getX(i), attribute.getY(i), attribute.getZ(i)].map(screenByte));
+const coloursOf = (ply) => Array.from({ length: ply.vertexCount }, (_, i) => [ply.red[i], ply.green[i], ply.blue[i]]);
+const missingAs = (value) => (celsius) => (Number.isNaN(celsius) ? value : celsius);
+
+function loadedGlb(file) {
+  return new Promise((resolve, reject) => new GLTFLoader().parse(arrayBufferOf(file), "", resolve, reject));
+}
+
+async function loadedDraco(file) {
+  const loader = new DRACOLoader().setDecoderPath(decoder.url).setDecoderConfig({ type: "js" });
+  try {
+    return await new Promise((resolve, reject) => {
+      const ids = { position: 0, color: 1, temperature: 2 };
+      const types = { position: "Float32Array", color: "Float32Array", temperature: "Float32Array" };
+      loader.decodeDracoFile(arrayBufferOf(file), resolve, ids, types, "srgb", reject);
+    });
+  } finally {
+    loader.dispose();
+  }
+}
+
+/** A vertex of the z-up scene with +Y up. */
+const uprightOf = (ply, i) => [ply.x[i], ply.z[i], -ply.y[i]];
+
+test("three.js reads the PLY", () => {
+  const loader = new PLYLoader();
+  loader.setCustomPropertyNameMapping({ temperature: ["temperature"] });
+  const { attributes, index } = loader.parse(arrayBufferOf(fused("ply").output));
+  for (const [axis, get] of [["x", "getX"], ["y", "getY"], ["z", "getZ"]]) {
+    for (let i = 0; i < picture.vertexCount; ++i) assert.equal(attributes.position[get](i), picture[axis][i]);
+  }
+  assert.deepEqual(screenColours(attributes.color), coloursOf(picture));
+  assert.deepEqual(attributes.temperature.array, picture.temperature);
+  assert.deepEqual(Uint32Array.from(index.array), picture.triangles);
+});
+
+test("three.js reads the GLB, upright and in its colours", async () => {
+  const gltf = await loadedGlb(fused("glb", scene).output);
+  let mesh;
+  gltf.scene.traverse((object) => {
+    if (object.isMesh) mesh = object;
+  });
+  const { position, color, _temperature } = mesh.geometry.attributes;
+  assert.equal(position.count, picture.vertexCount);
+  gltf.scene.updateMatrixWorld();
+  for (let i = 0; i < position.count; ++i) {
+    assert.deepEqual([position.getX(i), position.getY(i), position.getZ(i)], uprightOf(picture, i));
+  }
+  assert.deepEqual(screenColours(color), coloursOf(picture));
+  assert.ok(mesh.material.isMeshBasicMaterial && mesh.material.vertexColors, "unlit, in the colours of the vertices");
+  assert.deepEqual(_temperature.array, picture.temperature.map(missingAs(-1000)));
+  assert.deepEqual(Uint32Array.from(mesh.geometry.index.array), picture.triangles);
+});
+
+test("a colour is the same on the screen as PLY, GLB and Draco", async () => {
+  const options = ["--method", "visible_only"];
+  const files = Object.fromEntries(["ply", "glb", "drc"].map((ending) => {
+    const output = inFolder(`colour.${ending}`);
+    run("fuse", oneColour, output, ...options);
+    return [ending, output];
+  }));
+  const gltf = await loadedGlb(files.glb);
+  const attributes = [
+    new PLYLoader().parse(arrayBufferOf(files.ply)).attributes.color,
+    gltf.scene.getObjectByProperty("isMesh", true).geometry.attributes.color,
+    (await loadedDraco(files.drc)).attributes.color,
+  ];
+  for (const attribute of attributes) assert.deepEqual(screenColours(attribute), Array(3).fill([60, 100, 80]));
+});
+
+test("Khronos' validator has nothing to say about a GLB", async () => {
+  const vertices = [[500000.25, 4000000.5, 12.125], [500001.25, 4000000.5, 12.125], [500000.25, 4000001.5, 13]];
+  const inputs = [
+    scene,
+    oneColour,
+    written("cloud.ply", { header: kFloats, vertices: [[0, 0, 0], [1, 2, 3]] }),
+    written("far.ply", { header: ["double x", "double y", "double z"], vertices, triangles: [[0, 1, 2]] }),
+    written("hot.ply", {
+      header: [...kFloats, "float temperature"],
+      vertices: [[0, 0, 0, 20], [1, 0, 0, "inf"], [0, 1, 0, 21]],
+      triangles: [[0, 1, 2]],
+    }),
+  ];
+  for (const input of inputs) {
+    const { output } = fused("glb", input);
+    const { issues } = await validator.validateBytes(new Uint8Array(readFileSync(output)));
+    assert.deepEqual(issues.messages, [], input);
+    assert.equal(issues.truncated, false);
+  }
+});
+
+test("three.js reads the Draco file: on the lattice, every triangle once", async () => {
+  const { output, said } = fused("drc");
+  assert.match(said, /rounded to .* mm and temperatures to .* degC/);
+  assert.match(said, /order of their own.*--keep-order/);
+  // A step has three significant bits, so that the rounded text tells it.
+  const told = Number(/rounded to ([0-9.e-]+) mm/.exec(said)[1]) / 1000;
+  const unit = 2 ** (Math.floor(Math.log2(told * (1 + 1e-3))) - 2);
+  const step = unit * Math.round(told / unit);
+  const { attributes, index } = await loadedDraco(output);
+  const colours = screenColours(attributes.color);
+  const hashes = colours.map((colour, i) =>
+    cornerHash(
+      [attributes.position.getX(i), attributes.position.getY(i), attributes.position.getZ(i)].map((metres) => {
+        const lattice = nearestLattice(metres, step);
+        assert.ok(Math.abs(lattice * step - metres) < 1e-4 * step, `${metres} m is on the lattice of ${step} m`);
+        return lattice;
+      }),
+      colour,
+    ),
+  );
+  const identity = new MeshIdentity();
+  for (let i = 0; i < index.count; i += 3) {
+    identity.addTriangle(...[0, 1, 2].map((corner) => hashes[index.getX(i + corner)]));
+  }
+  assert.equal(`${identity}`, `${identityOfPly(picture, [0, 0, 0], step)}`);
+});
+
+test("three.js reads the Draco files that keep more", async () => {
+  const order = await loadedDraco(fused("drc", scene, "--keep-order").output);
+  const exact = await loadedDraco(fused("drc", scene, "--lossless").output);
+  for (const { attributes, index } of [order, exact]) {
+    assert.deepEqual(screenColours(attributes.color), coloursOf(picture));
+    assert.deepEqual(Uint32Array.from(index.array), picture.triangles);
+  }
+  const exactly = exact.attributes;
+  const nearly = order.attributes;
+  for (let i = 0; i < picture.vertexCount; ++i) {
+    assert.deepEqual([exactly.position.getX(i), exactly.position.getY(i), exactly.position.getZ(i)], [picture.x[i], picture.y[i], picture.z[i]]);
+    const celsius = picture.temperature[i];
+    assert.ok(Object.is(exactly.temperature.getX(i), celsius));
+    const rounded = nearly.temperature.getX(i);
+    assert.ok(Number.isNaN(celsius) ? rounded === -1000 : Math.abs(rounded - celsius) <= 1 / 128);
+  }
+  assert.doesNotMatch(fused("drc", scene, "--lossless").said, /In the file/, "nothing was lost");
+});
+
+test("a Draco file is smaller the less it keeps", () => {
+  const sizes = [[], ["--keep-order"], ["--lossless"]].map((options) => readFileSync(fused("drc", scene, ...options).output).length);
+  const ply = readFileSync(fused("ply").output).length;
+  assert.ok(sizes[0] < 0.35 * ply, `${sizes[0]} of ${ply} bytes`);
+  assert.ok(sizes[0] < sizes[1] && sizes[1] < sizes[2] && sizes[2] < ply, `${sizes}`);
+});
+
+const isInstalled = (program) => spawnSync(program, ["version"]).error === undefined;
+function converted(program, ...args) {
+  const { status, stdout, stderr } = spawnSync(program, args, { encoding: "utf8" });
+  assert.equal(status, 0, `${program}: ${stdout}${stderr}`);
+  return stdout;
+}
+
+test("assimp reads the PLY and the GLB", { skip: !isInstalled("assimp") && "assimp is not installed" }, async () => {
+  for (const ending of ["ply", "glb"]) {
+    const facts = converted("assimp", "info", fused(ending).output, "--raw");
+    assert.match(facts, new RegExp(`Vertices:\\s+${picture.vertexCount}\n`), facts);
+    assert.match(facts, new RegExp(`Faces:\\s+${picture.triangles.length / 3}\n`), facts);
+  }
+});
+
+test("draco_decoder reads the Draco files", { skip: !isInstalled("draco_decoder") && "draco_decoder is not installed" }, () => {
+  const output = inFolder("decoded.ply");
+  converted("draco_decoder", "-i", fused("drc", scene, "--keep-order").output, "-o", output);
+  const seen = readPly(output);
+  assert.deepEqual(coloursOf(seen), coloursOf(picture));
+  assert.deepEqual(seen.triangles, picture.triangles);
+});
