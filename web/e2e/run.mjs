@@ -19,6 +19,7 @@ import {
 } from './harness.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLoadTests } from './load.mjs';
+import { addViewTests } from './view.mjs';
 
 const scratch = mkdtempSync(join(tmpdir(), 'spectra-e2e-'));
 const browser = await startBrowser();
@@ -245,7 +246,7 @@ test('The background has exactly the colour that was chosen', async () => {
 });
 
 test('A click reads the temperature', async () => {
-  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 600)));
+  await drawn(page);
   const place = await page.evaluate(async () => {
     const { viewport } = globalThis.spectra;
     for (let y = 300; y < 700; y += 20) {
@@ -375,6 +376,7 @@ test('Nothing broke the content policy', () => {
 
 addLinkTests(browser);
 addLoadTests(browser, scratch);
+addViewTests(browser, scratch);
 
 await runTests();
 await browser.close();

@@ -1,10 +1,8 @@
 /** Draco payloads to plain arrays. Runs in a worker in the browser, and as it is in tests. */
 
 import type { Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
-import type { ColoursJob, DecodedColours, DecodedGeometry, DecodeJob, DecodeResult, GeometrySummary } from './messages';
-
-/** Most vertices of a geometry in its summary's sample. */
-const SAMPLED_VERTICES = 1000;
+import type { ColoursJob, DecodedColours, DecodedGeometry, DecodeJob, DecodeResult } from './messages';
+import { summaryOf } from './summary';
 
 /** Decodes one job; throws an Error that says what the decoder disliked. */
 export function decodeJob(draco: DecoderModule, job: DecodeJob): DecodeResult {
@@ -130,73 +128,4 @@ function withBytes(
 
 function check(status: { ok(): boolean; error_msg(): string }): void {
   if (!status.ok()) throw new Error(`Draco: ${status.error_msg()}`);
-}
-
-/** The sphere is for culling; sample and normals are for the first view. */
-function summaryOf(positions: Float32Array, indices: Uint16Array | Uint32Array | null): GeometrySummary {
-  const min: [number, number, number] = [Infinity, Infinity, Infinity];
-  const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < positions.length; i += 3) {
-    const x = positions[i]!;
-    const y = positions[i + 1]!;
-    const z = positions[i + 2]!;
-    if (x < min[0]) min[0] = x;
-    if (y < min[1]) min[1] = y;
-    if (z < min[2]) min[2] = z;
-    if (x > max[0]) max[0] = x;
-    if (y > max[1]) max[1] = y;
-    if (z > max[2]) max[2] = z;
-  }
-  const centre: [number, number, number] = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
-  let radiusSquared = 0;
-  for (let i = 0; i < positions.length; i += 3) {
-    const dx = positions[i]! - centre[0];
-    const dy = positions[i + 1]! - centre[1];
-    const dz = positions[i + 2]! - centre[2];
-    const d = dx * dx + dy * dy + dz * dz;
-    if (d > radiusSquared) radiusSquared = d;
-  }
-  const normal: [number, number, number] = [0, 0, 0];
-  let area = 0;
-  if (indices !== null) {
-    for (let i = 0; i < indices.length; i += 3) {
-      const a = indices[i]! * 3;
-      const b = indices[i + 1]! * 3;
-      const c = indices[i + 2]! * 3;
-      const ux = positions[b]! - positions[a]!;
-      const uy = positions[b + 1]! - positions[a + 1]!;
-      const uz = positions[b + 2]! - positions[a + 2]!;
-      const vx = positions[c]! - positions[a]!;
-      const vy = positions[c + 1]! - positions[a + 1]!;
-      const vz = positions[c + 2]! - positions[a + 2]!;
-      const nx = uy * vz - uz * vy;
-      const ny = uz * vx - ux * vz;
-      const nz = ux * vy - uy * vx;
-      normal[0] += nx;
-      normal[1] += ny;
-      normal[2] += nz;
-      area += Math.sqrt(nx * nx + ny * ny + nz * nz);
-    }
-  }
-  return {
-    vertex_count: positions.length / 3,
-    triangle_count: (indices?.length ?? 0) / 3,
-    centre,
-    radius: Math.sqrt(radiusSquared),
-    sample: sampleOf(positions),
-    normal_sum: normal,
-    area_sum: area,
-  };
-}
-
-function sampleOf(positions: Float32Array): Float32Array<ArrayBuffer> {
-  const vertexCount = positions.length / 3;
-  const stride = Math.max(1, Math.ceil(vertexCount / SAMPLED_VERTICES));
-  const sample = new Float32Array(Math.ceil(vertexCount / stride) * 3);
-  for (let to = 0, from = 0; to < sample.length; to += 3, from += 3 * stride) {
-    sample[to] = positions[from]!;
-    sample[to + 1] = positions[from + 1]!;
-    sample[to + 2] = positions[from + 2]!;
-  }
-  return sample;
 }

@@ -20,8 +20,10 @@ export interface GeometrySummary {
   triangle_count: number;
   centre: [number, number, number];
   radius: number;
-  /** Some of the vertices, evenly spread: x, y, z each. */
+  /** Some of the vertices that are drawn, evenly spread: x, y, z each. */
   sample: Float32Array<ArrayBuffer>;
+  /** Distance between neighbouring points of a cloud, metres; 0 where there is surface, and where there is one place only. */
+  point_spacing: number;
   /** Sum of the triangles' normals, each as long as twice the triangle's area, and the sum of those lengths. */
   normal_sum: [number, number, number];
   area_sum: number;

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '../protocol/messages';
-import { fittedView, guessUpAxis, viewDirection } from './first_view';
+import { corners, fittedView, UP, UP_AXES, viewDirection, withoutStrays } from './first_view';
 
 const elevation = ([x, y, z]: Vec3) => (Math.atan2(y, Math.hypot(x, z)) * 180) / Math.PI;
 
@@ -24,21 +24,49 @@ describe('viewDirection', () => {
     expect(Math.hypot(...direction)).toBeCloseTo(1, 9);
   });
 
-  it('knows scenes with z up', () => {
-    expect(viewDirection([0, 0, 1], 'z')[2]).toBeCloseTo(Math.sin((38 * Math.PI) / 180), 9);
+  it.each(UP_AXES)('looks down on ground when %s is up', (up) => {
+    const direction = viewDirection(UP[up], up);
+    const rise = direction.reduce((sum, value, axis) => sum + value * UP[up][axis]!, 0);
+    expect(rise).toBeCloseTo(Math.sin((38 * Math.PI) / 180), 9);
+    expect(Math.hypot(...direction)).toBeCloseTo(1, 9);
   });
 });
 
-describe('guessUpAxis', () => {
-  it('takes flat ground that faces z for a map', () => {
-    expect(guessUpAxis({ min: [0, 0, 0], max: [1000, 900, 40] }, [0, 0, 0.98])).toBe('z');
-    expect(guessUpAxis({ min: [-4500, 0, -4500], max: [4470, 359, 4470] }, [0, 0.99, 0])).toBe('y');
-    expect(guessUpAxis({ min: [-14, -6, -4], max: [4, 6, 12] }, [-0.27, 0.06, 0.55])).toBe('y');
+describe('withoutStrays', () => {
+  const grid = (count: number): Vec3[] => Array.from({ length: count * count }, (_, i) => [i % count, 0, Math.floor(i / count)]);
+
+  it('leaves out a few points beyond a gap that is wider than the scene', () => {
+    const scene = grid(12);
+    expect(withoutStrays([...scene, [3000, 2000, 0], [-900, 0, 1]], null)).toEqual(scene);
+  });
+
+  it('keeps what belongs to the scene: a mast, a long tail, a second group of some size', () => {
+    const mast = Array.from({ length: 40 }, (_, i): Vec3 => [0, i, 0]);
+    const tail = Array.from({ length: 12 }, (_, i): Vec3 => [1.6 ** i, 0, 0]);
+    const other = Array.from({ length: 8 }, (_, i): Vec3 => [500 + i, 0, 0]);
+    for (const part of [mast, tail, other]) expect(withoutStrays([...grid(12), ...part], null)).toHaveLength(144 + part.length);
+  });
+
+  it('follows the server where it says what the scene is', () => {
+    const core = { min: [0, 0, 0] as Vec3, max: [5, 1, 5] as Vec3 };
+    expect(withoutStrays(grid(12), core)).toHaveLength(36);
+    expect(withoutStrays([[70, 70, 70]], core)).toEqual(corners(core));
+  });
+
+  it('has an answer for one point, one place and none', () => {
+    expect(withoutStrays([[1, 2, 3]], null)).toHaveLength(1);
+    expect(
+      withoutStrays(
+        Array.from({ length: 9 }, (): Vec3 => [1, 2, 3]),
+        null,
+      ),
+    ).toHaveLength(9);
+    expect(withoutStrays([], null)).toEqual([]);
   });
 });
 
 describe('fittedView', () => {
-  const corners: Vec3[] = [-1, 1].flatMap((x) => [-2, 2].flatMap((y) => [-3, 3].map((z): Vec3 => [x + 10, y - 5, z + 100])));
+  const box: Vec3[] = [-1, 1].flatMap((x) => [-2, 2].flatMap((y) => [-3, 3].map((z): Vec3 => [x + 10, y - 5, z + 100])));
   const fov = Math.PI / 4;
 
   /** Where a point is on the screen, -1..1. */
@@ -66,8 +94,8 @@ describe('fittedView', () => {
       [0.5, 0, 0.5],
       [0, 0, -0.7],
     ] as Vec3[]) {
-      const { eye, target } = fittedView(corners, viewDirection(facing, 'y'), 'y', fov, aspect, insets);
-      const places = corners.map((corner) => onScreen(corner, eye, target, aspect));
+      const { eye, target } = fittedView(box, viewDirection(facing, 'y'), 'y', fov, aspect, insets);
+      const places = box.map((corner) => onScreen(corner, eye, target, aspect));
       const edge = {
         left: 2 * insets.left - 1,
         right: 1 - 2 * insets.right,
@@ -85,6 +113,17 @@ describe('fittedView', () => {
       const height = Math.max(...places.map(({ y }) => y)) - Math.min(...places.map(({ y }) => y));
       const filled = Math.max(width / (edge.right - edge.left), height / (edge.top - edge.bottom));
       expect(filled).toBeGreaterThan(0.8);
+    }
+  });
+
+  it('shows a scene of one place from a fitting distance', () => {
+    for (const place of [
+      [0, 0, 0],
+      [1e5, -3, 7],
+    ] as Vec3[]) {
+      const { eye, target } = fittedView([place, place], [0, 0, 1], 'y', fov, 1.5);
+      expect(Math.hypot(target[0] - place[0], target[1] - place[1], target[2] - place[2])).toBeLessThan(1e-6);
+      expect(eye[2] - target[2]).toBeCloseTo(0.5 / Math.tan(fov / 2), 6);
     }
   });
 });

@@ -1,20 +1,39 @@
 import type { GeometrySummary } from '../decode/messages';
 import type { Scene, Vec3 } from '../protocol/messages';
 
-export type UpAxis = 'y' | 'z';
+/** Which way is up in a scene, by its axes. */
+export const UP_AXES = ['x', '-x', 'y', '-y', 'z', '-z'] as const;
+export type UpAxis = (typeof UP_AXES)[number];
+export type Bounds = Scene['bounds'];
 
 export interface View {
   eye: Vec3;
   target: Vec3;
 }
 
-export const UP: Record<UpAxis, Vec3> = { y: [0, 1, 0], z: [0, 0, 1] };
+export const UP: Record<UpAxis, Vec3> = {
+  x: [1, 0, 0],
+  '-x': [-1, 0, 0],
+  y: [0, 1, 0],
+  '-y': [0, -1, 0],
+  z: [0, 0, 1],
+  '-z': [0, 0, -1],
+};
+/** The side that is looked at when nothing speaks for another one. */
+export function frontOf(up: UpAxis): Vec3 {
+  return up.endsWith('z') ? [0, -1, 0] : [0, 0, 1];
+}
 
 const LOWEST_ELEVATION = (14 * Math.PI) / 180;
 const HIGHEST_ELEVATION = (38 * Math.PI) / 180;
 const DEFAULT_AZIMUTH = (30 * Math.PI) / 180;
-/** Share of the outermost sample points that may lie outside the picture: stray points must not push the scene away. */
+/** Share of the outermost sample points that may lie outside the picture: a few that stick out must not push the scene away. */
 const TRIMMED = 0.004;
+/** Stray points are few, and farther from the others than those reach, by this factor. */
+const MOST_STRAYS = 0.02;
+const STRAY_GAP = 3;
+/** What is seen of a scene that is one place only, metres. */
+const EXTENT_OF_A_PLACE = 0.5;
 
 const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a: Vec3, b: Vec3): Vec3 => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -33,21 +52,13 @@ export function meanNormal(geometries: readonly GeometrySummary[]): Vec3 {
   return area > 0 ? scaled(normal, 1 / area) : [0, 0, 0];
 }
 
-/** Maps have z up, scans from cameras y: flat ground that faces +z decides for z, else y. */
-export function guessUpAxis(bounds: Scene['bounds'], facing: Vec3): UpAxis {
-  const extent = [0, 1, 2].map((axis) => (bounds.max[axis] ?? 0) - (bounds.min[axis] ?? 0));
-  const [x = 0, y = 0, z = 0] = extent;
-  const flat = z < 0.3 * Math.min(x, y);
-  return flat && (facing[2] > 0.6 || Math.hypot(...facing) < 0.1) ? 'z' : 'y';
-}
-
 /**
  * Where to look from. Scanned surfaces face the sensors that saw them, so the view is from the side the surface faces, between 14 and
  * 38 degrees above the horizon; without a preferred side, three-quarters from the front.
  */
 export function viewDirection(facing: Vec3, up: UpAxis): Vec3 {
   const upward = UP[up];
-  const front: Vec3 = up === 'y' ? [0, 0, 1] : [0, -1, 0];
+  const front = frontOf(up);
   const right = cross(upward, front);
   const rise = dot(facing, upward);
   const level: Vec3 = sum(facing, scaled(upward, -rise));
@@ -63,23 +74,61 @@ export function viewDirection(facing: Vec3, up: UpAxis): Vec3 {
   );
 }
 
-/** Some vertices of every part of the scene; the bounds' corners when there are none. */
-export function samplePoints(geometries: readonly GeometrySummary[], bounds: Scene['bounds'], wanted = 3000): Vec3[] {
+/** Some vertices of every part of the scene. */
+export function samplePoints(geometries: readonly GeometrySummary[], wanted = 3000): Vec3[] {
   const available = geometries.reduce((n, { sample }) => n + sample.length / 3, 0);
   const points: Vec3[] = [];
   const stride = Math.max(1, Math.floor(available / wanted)) * 3;
   for (const { sample } of geometries) {
     for (let i = 0; i + 2 < sample.length; i += stride) points.push([sample[i]!, sample[i + 1]!, sample[i + 2]!]);
   }
-  if (points.length > 0) return points;
-  for (let corner = 0; corner < 8; corner += 1) {
-    points.push([
-      (corner & 1 ? bounds.max : bounds.min)[0],
-      (corner & 2 ? bounds.max : bounds.min)[1],
-      (corner & 4 ? bounds.max : bounds.min)[2],
-    ]);
+  return points;
+}
+
+export function corners({ min, max }: Bounds): Vec3[] {
+  return Array.from({ length: 8 }, (_, corner) => [
+    (corner & 1 ? max : min)[0],
+    (corner & 2 ? max : min)[1],
+    (corner & 4 ? max : min)[2],
+  ]);
+}
+
+function middle(values: number[]): number {
+  return values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
+}
+
+/**
+ * The points without strays: within `core` where the server says where the scene is, and otherwise without a few that lie beyond a gap
+ * wider than all the others reach.
+ */
+export function withoutStrays(points: Vec3[], core: Bounds | null): Vec3[] {
+  if (core !== null) {
+    const margin = 0.01 * Math.hypot(...[0, 1, 2].map((axis) => core.max[axis]! - core.min[axis]!));
+    const inside = points.filter((point) =>
+      point.every((value, axis) => value >= core.min[axis]! - margin && value <= core.max[axis]! + margin),
+    );
+    return inside.length > 0 ? inside : corners(core);
+  }
+  const centre: Vec3 = [middle(points.map(([x]) => x)), middle(points.map(([, y]) => y)), middle(points.map(([, , z]) => z))];
+  const distance = (point: Vec3) => Math.hypot(point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]);
+  const reach = points.map(distance).sort((a, b) => a - b);
+  const first = Math.max(1, Math.floor(points.length * (1 - MOST_STRAYS)));
+  for (let i = first; i < reach.length; i += 1) {
+    const before = reach[i - 1]!;
+    if (before > 0 && reach[i]! > STRAY_GAP * before) return points.filter((point) => distance(point) <= before);
   }
   return points;
+}
+
+function extentAlong(points: readonly Vec3[], axis: Vec3): number {
+  let least = Infinity;
+  let most = -Infinity;
+  for (const point of points) {
+    const at = dot(point, axis);
+    least = Math.min(least, at);
+    most = Math.max(most, at);
+  }
+  return most - least;
 }
 
 /** Screen space that controls cover, as shares of the width and height. */
@@ -130,7 +179,9 @@ export function fittedView(
   const depths = points.map((point) => dot(point, backward)).sort((p, q) => p - q);
   const middle = depths[Math.floor(depths.length / 2)] ?? 0;
   const nearest = depths[Math.max(0, Math.ceil(depths.length * (1 - TRIMMED)) - 1)] ?? 0;
-  const eyeDepth = Math.max(ez, nearest + 1e-6);
+  const spread = Math.max(...[right, upward, backward].map((axis) => extentAlong(points, axis)));
+  const isPlace = spread <= 1e-9 * Math.hypot(...(points[0] ?? [0, 0, 0]));
+  const eyeDepth = Math.max(ez, nearest + (isPlace ? EXTENT_OF_A_PLACE / tanY : 1e-6));
   const eye = sum(sum(scaled(right, ex), scaled(upward, ey)), scaled(backward, eyeDepth));
   const distance = Math.max(eyeDepth - middle, 1e-6);
   return { eye, target: sum(eye, scaled(backward, -distance)) };

@@ -8,6 +8,7 @@ function square(z: number, indexed: boolean): Omit<TileArrays, 'rgba'> {
     indices: indexed ? Uint16Array.from([0, 1, 2, 0, 2, 3]) : null,
     centre: [0, 0, z],
     radius: Math.SQRT2,
+    point_spacing: 1,
   };
 }
 const downwards = (x: number, y: number) => ({

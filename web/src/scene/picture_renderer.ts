@@ -2,20 +2,22 @@ import {
   BufferAttribute,
   BufferGeometry,
   ColorManagement,
-  DoubleSide,
   LinearSRGBColorSpace,
+  Matrix4,
   Mesh,
-  MeshBasicMaterial,
   PerspectiveCamera,
   Points,
-  PointsMaterial,
   Scene,
   Sphere,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from 'three';
+import type { Vec3 } from '../protocol/messages';
+import { depthRange } from './depth_range';
 import { nearestHit } from './picking';
-import type { CameraMatrices, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
+import type { Eye, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
+import { TileMaterials } from './tile_materials';
 
 // Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
 ColorManagement.enabled = false;
@@ -33,9 +35,12 @@ export class PictureRenderer {
   readonly #renderer: WebGLRenderer;
   readonly #scene = new Scene();
   readonly #camera = new PerspectiveCamera();
-  readonly #surface = new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, toneMapped: false, fog: false });
-  readonly #cloud = new PointsMaterial({ vertexColors: true, size: 3, sizeAttenuation: false, toneMapped: false, fog: false });
+  readonly #materials = new TileMaterials();
   readonly #tiles = new Map<number, Tile>();
+  #eye: Eye = { world_from_camera: new Matrix4().toArray(), tangents: [1, 1], distance: 1 };
+  #background = 0;
+  #pixelRatio = 1;
+  #pointDiameter: number | null = null;
   #frame = 0;
   #newest = 0;
 
@@ -49,13 +54,24 @@ export class PictureRenderer {
     this.#scene.matrixAutoUpdate = false;
     this.#camera.matrixAutoUpdate = false;
     this.#drawSpecimens();
-    canvas.addEventListener('webglcontextrestored', () => this.#drawSoon());
+    canvas.addEventListener('webglcontextlost', () => this.reply({ kind: 'context', isLost: true }));
+    // The renderer makes its objects anew from the arrays as they are drawn; what it keeps as state is to be set again.
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.#renderer.setClearColor(this.#background, 1);
+      this.reply({ kind: 'context', isLost: false });
+      this.#drawSoon();
+    });
+  }
+
+  /** For tests, which take it away. */
+  get context(): WebGL2RenderingContext {
+    return this.#renderer.getContext() as WebGL2RenderingContext;
   }
 
   handle(request: Exclude<RenderRequest, { kind: 'start' }>): void {
     switch (request.kind) {
       case 'picture':
-        this.#lookFrom(request.camera);
+        this.#eye = request.eye;
         for (const command of request.commands) this.#apply(command);
         this.#newest = request.number;
         this.#drawSoon();
@@ -73,8 +89,7 @@ export class PictureRenderer {
   dispose(): void {
     if (this.#frame !== 0) cancelAnimationFrame(this.#frame);
     for (const tile of [...this.#tiles.keys()]) this.#apply({ change: 'dispose', tile });
-    this.#surface.dispose();
-    this.#cloud.dispose();
+    this.#materials.dispose();
     this.#renderer.dispose();
   }
 
@@ -104,9 +119,14 @@ export class PictureRenderer {
         break;
       }
       case 'background':
+        this.#background = command.colour;
         this.#renderer.setClearColor(command.colour, 1);
         break;
+      case 'points':
+        this.#pointDiameter = command.diameter;
+        break;
       case 'size':
+        this.#pixelRatio = command.pixel_ratio;
         this.#renderer.setPixelRatio(command.pixel_ratio);
         this.#renderer.setSize(command.width, command.height, false);
         // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
@@ -115,48 +135,45 @@ export class PictureRenderer {
   }
 
   #create(arrays: TileArrays): Tile {
-    const { positions, indices, rgba, centre, radius } = arrays;
+    const { positions, indices, rgba, centre, radius, point_spacing } = arrays;
     const geometry = new BufferGeometry();
     const colours = new BufferAttribute(rgba, 4, true);
     geometry.setAttribute('position', new BufferAttribute(positions, 3));
     geometry.setAttribute('color', colours);
     if (indices !== null) geometry.setIndex(new BufferAttribute(indices, 1));
     geometry.boundingSphere = new Sphere(new Vector3(...centre), radius);
-    const object = indices === null ? new Points(geometry, this.#cloud) : new Mesh(geometry, this.#surface);
+    const object = indices === null ? new Points(geometry, this.#materials.cloud) : new Mesh(geometry, this.#materials.surface);
+    if (indices === null) {
+      object.onBeforeRender = () =>
+        this.#materials.setPoints(this.#pointDiameter ?? point_spacing, positions.length / 3, this.#pixelRatio);
+    }
     object.matrixAutoUpdate = false;
     object.visible = false;
     this.#scene.add(object);
-    return { object, colours, arrays: { positions, indices, centre, radius } };
+    return { object, colours, arrays: { positions, indices, centre, radius, point_spacing } };
   }
 
-  /** Draws an empty tile of each kind, so that the shaders are compiled before the first real one comes. */
+  /** Draws an empty tile of each kind in each way, so that the shaders are compiled before the first real one comes. */
   #drawSpecimens(): void {
     const specimen = {
       rgba: new Uint8Array(12),
       positions: new Float32Array(9),
       centre: [0, 0, 0],
       radius: 1,
+      point_spacing: 1,
     } satisfies Partial<TileArrays>;
-    const specimens = [
-      this.#create({ ...specimen, indices: Uint16Array.from([0, 0, 0]) }),
-      this.#create({ ...specimen, indices: null }),
-    ];
-    for (const { object } of specimens) {
+    for (const indices of [Uint16Array.from([0, 0, 0]), null]) {
+      const { object } = this.#create({ ...specimen, indices });
       object.visible = true;
       object.frustumCulled = false;
-    }
-    this.#draw();
-    for (const { object } of specimens) {
+      for (const material of this.#materials.all) {
+        if ((material.defines['POINTS'] !== undefined) !== (indices === null)) continue;
+        object.material = material;
+        this.#renderer.render(this.#scene, this.#camera);
+      }
       this.#scene.remove(object);
       object.geometry.dispose();
     }
-  }
-
-  #lookFrom({ world_from_camera, clip_from_camera }: CameraMatrices): void {
-    this.#camera.matrix.fromArray(world_from_camera);
-    this.#camera.matrixWorldNeedsUpdate = true;
-    this.#camera.projectionMatrix.fromArray(clip_from_camera);
-    this.#camera.projectionMatrixInverse.copy(this.#camera.projectionMatrix).invert();
   }
 
   #drawSoon(): void {
@@ -170,7 +187,7 @@ export class PictureRenderer {
 
   /** Tells the page that a picture has been drawn once the GPU is through with it, so that a slow one is not given more and more. */
   #whenDone(number: number): void {
-    const gl = this.#renderer.getContext() as WebGL2RenderingContext;
+    const gl = this.context;
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
     const check = () => {
@@ -186,10 +203,37 @@ export class PictureRenderer {
   }
 
   #draw(): void {
+    this.#lookFrom(this.#eye);
     this.#renderer.render(this.#scene, this.#camera);
   }
 
+  /** The planes of near and far follow what is drawn, and with them the way in which depth is kept. */
+  #lookFrom({ world_from_camera, tangents, distance }: Eye): void {
+    const shown = [...this.#tiles.values()].filter(({ object }) => object.visible);
+    const m = world_from_camera;
+    const eye: Vec3 = [m[12]!, m[13]!, m[14]!];
+    const range = depthRange(
+      eye,
+      [-m[8]!, -m[9]!, -m[10]!],
+      distance,
+      shown.map(({ arrays }) => arrays),
+    );
+    const [right, top] = tangents;
+    const { near, far } = range;
+    this.#camera.matrix.fromArray(m);
+    this.#camera.matrixWorldNeedsUpdate = true;
+    this.#camera.projectionMatrix.makePerspective(-right * near, right * near, top * near, -top * near, near, far);
+    this.#camera.projectionMatrixInverse.copy(this.#camera.projectionMatrix).invert();
+    this.#materials.lookFrom(eye, range, this.#renderer.getDrawingBufferSize(new Vector2()).height / (2 * top));
+    const { surface, cloud } = this.#materials;
+    for (const { object, arrays } of shown) object.material = arrays.indices === null ? cloud : surface;
+  }
+
   async #copy(id: number): Promise<void> {
+    if (this.context.isContextLost()) {
+      this.reply({ kind: 'copied', id, picture: null });
+      return;
+    }
     // The canvas holds the picture only until the task that drew it ends.
     this.#draw();
     const picture = await createImageBitmap(this.canvas);

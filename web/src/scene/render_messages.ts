@@ -11,6 +11,8 @@ export interface TileArrays {
   rgba: Uint8Array<ArrayBuffer>;
   centre: Vec3;
   radius: number;
+  /** Distance between neighbouring points of a cloud, metres. */
+  point_spacing: number;
 }
 
 /** A change of what is drawn. Tiles have numbers that the page gives them; a new one is hidden. */
@@ -20,18 +22,24 @@ export type RenderCommand =
   | { change: 'visible'; tile: number; visible: boolean }
   | { change: 'dispose'; tile: number }
   | { change: 'background'; colour: number }
+  /** Diameter of the points of a cloud in metres; null: as far as they are apart. */
+  | { change: 'points'; diameter: number | null }
   | { change: 'size'; width: number; height: number; pixel_ratio: number };
 
-/** Column-major, as three.js has them. */
-export interface CameraMatrices {
+/** Where a picture is taken from. */
+export interface Eye {
+  /** Column-major, as three.js has it. */
   world_from_camera: number[];
-  clip_from_camera: number[];
+  /** Half the picture's width and height at distance 1. */
+  tangents: [number, number];
+  /** To what is looked at, metres. */
+  distance: number;
 }
 
 export type RenderRequest =
   | { kind: 'start'; canvas: OffscreenCanvas }
-  /** Apply the changes, then draw from this camera; of several that come before the screen takes one, the last is drawn. */
-  | { kind: 'picture'; number: number; commands: RenderCommand[]; camera: CameraMatrices }
+  /** Apply the changes, then draw from there; of several that come before the screen takes one, the last is drawn. */
+  | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye }
   | { kind: 'pick'; id: number; ray: Ray; cone: number }
   | { kind: 'copy'; id: number };
 
@@ -49,4 +57,7 @@ export type RenderReply =
   /** Everything up to picture `number` has been drawn. */
   | { kind: 'drawn'; number: number; gpu: GpuObjects }
   | { kind: 'picked'; id: number; distance: number | null }
-  | { kind: 'copied'; id: number; picture: ImageBitmap };
+  /** Null: there is none, for the GPU is away. */
+  | { kind: 'copied'; id: number; picture: ImageBitmap | null }
+  /** The browser has taken the GPU away, or given it back. */
+  | { kind: 'context'; isLost: boolean };

@@ -12,8 +12,11 @@ function reply(message: RenderReply, transfer: Transferable[] = []): void {
 
 self.onmessage = ({ data: request }: MessageEvent<RenderRequest>) => {
   try {
-    if (request.kind === 'start') renderer = new PictureRenderer(request.canvas, reply);
-    else renderer?.handle(request);
+    if (request.kind === 'start') {
+      renderer = new PictureRenderer(request.canvas, reply);
+      // For scripts and tests in this worker's console.
+      Object.assign(self, { spectra: renderer });
+    } else renderer?.handle(request);
   } catch (error) {
     reply({ kind: 'failed', message: error instanceof Error ? error.message : String(error) });
   }

@@ -17,6 +17,7 @@ export function decodedGeometry(vertices = 1): DecodedGeometry {
       centre: [0, 0, 0],
       radius: 1,
       sample: new Float32Array(3),
+      point_spacing: 0,
       normal_sum: [0, 0, hasTriangle ? 1 : 0],
       area_sum: hasTriangle ? 1 : 0,
     },

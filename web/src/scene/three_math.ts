@@ -5,7 +5,6 @@
 export { PerspectiveCamera } from 'three/src/cameras/PerspectiveCamera.js';
 export { Raycaster } from 'three/src/core/Raycaster.js';
 export { Box3 } from 'three/src/math/Box3.js';
-export { Frustum } from 'three/src/math/Frustum.js';
 export { MathUtils } from 'three/src/math/MathUtils.js';
 export { Matrix4 } from 'three/src/math/Matrix4.js';
 export { Quaternion } from 'three/src/math/Quaternion.js';

@@ -1,29 +1,12 @@
-import CameraControls from 'camera-controls';
 import type { DecodedGeometry } from '../decode/messages';
 import type { CameraPose, Vec3 } from '../protocol/messages';
-import { type Insets, UP, type UpAxis, type View } from './first_view';
+import { AimedControls } from './aimed_controls';
+import { UP, type UpAxis, type View } from './first_view';
 import type { Ray } from './picking';
 import type { GpuObjects, RenderCommand, RenderReply } from './render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
-import {
-  Box3,
-  Frustum,
-  MathUtils,
-  Matrix4,
-  PerspectiveCamera,
-  Quaternion,
-  Raycaster,
-  Sphere,
-  Spherical,
-  Vector2,
-  Vector3,
-  Vector4,
-} from './three_math';
+import { PerspectiveCamera, Vector3 } from './three_math';
 import type { Drawable } from './tile_set';
-
-CameraControls.install({
-  THREE: { Box3, MathUtils, Matrix4, Quaternion, Raycaster, Sphere, Spherical, Vector2, Vector3, Vector4 },
-});
 
 export const FIELD_OF_VIEW_DEG = 45;
 /** Pictures that may be on their way to the drawing side: one that it draws and one that waits. */
@@ -38,6 +21,8 @@ export interface ViewportEvents {
   onUserMove: () => void;
   /** Called before each picture, to bring in what has been decoded. Returns true when more waits for the next picture. */
   beforeRender: () => boolean;
+  /** The browser has taken the GPU away, or given it back and the picture is drawn again. */
+  onContext: (isLost: boolean) => void;
   /** The drawing side has failed; `everDrew` false: it could not even start. */
   onFailure: (message: string, everDrew: boolean) => void;
 }
@@ -45,16 +30,16 @@ export interface ViewportEvents {
 /** The 3D picture: camera, controls, and the way to what draws it. Draws only when something has changed. */
 export class Viewport {
   readonly #port: RenderPort;
+  /** The planes of near and far are chosen where it is known what is drawn. */
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
-  readonly #controls: CameraControls;
+  readonly #controls: AimedControls;
   readonly #resize: ResizeObserver;
   readonly #reducedMotion = matchMedia('(prefers-reduced-motion: reduce)');
   #frame = 0;
   #lastFrameAt = 0;
   #size: [number, number] = [1, 1];
   #up: UpAxis = 'y';
-  #sceneCentre = new Vector3();
-  #sceneRadius = 1;
+  #isAiming = false;
 
   /** Changes that the next picture takes along, and the buffers that move with them. */
   #commands: RenderCommand[] = [];
@@ -74,17 +59,20 @@ export class Viewport {
   ) {
     const start = inWorker ? startRenderWorker : startRenderingHere;
     this.#port = start(canvas, (reply) => this.#replied(reply));
-    this.#controls = new CameraControls(this.#camera, canvas);
+    this.#controls = new AimedControls(this.#camera, canvas);
     this.#controls.dollyToCursor = true;
     this.#controls.smoothTime = this.#reducedMotion.matches ? 0 : 0.06;
     this.#controls.draggingSmoothTime = this.#reducedMotion.matches ? 0 : 0.03;
-    this.#controls.mouseButtons.middle = CameraControls.ACTION.TRUCK;
-    this.#controls.touches.two = CameraControls.ACTION.TOUCH_DOLLY_TRUCK;
-    this.#controls.touches.three = CameraControls.ACTION.TOUCH_TRUCK;
+    this.#controls.mouseButtons.middle = AimedControls.ACTION.TRUCK;
+    this.#controls.touches.two = AimedControls.ACTION.TOUCH_DOLLY_TRUCK;
+    this.#controls.touches.three = AimedControls.ACTION.TOUCH_TRUCK;
     this.#controls.addEventListener('control', () => this.events.onUserMove());
     for (const wake of ['control', 'controlstart', 'wake', 'transitionstart'] as const) {
       this.#controls.addEventListener(wake, () => this.invalidate());
     }
+    // Before the controls come nearer to it.
+    canvas.addEventListener('wheel', this.#aimAtPointer, { capture: true, passive: true });
+    canvas.addEventListener('pointerdown', this.#aimAtPointer, { capture: true, passive: true });
     this.#fitToElement();
     this.#resize = new ResizeObserver(() => {
       this.#fitToElement();
@@ -113,9 +101,11 @@ export class Viewport {
   createTile(geometry: DecodedGeometry, rgba: Uint8Array<ArrayBuffer>): Drawable {
     this.#tileNumber += 1;
     const tile = this.#tileNumber;
-    const { positions, indices } = geometry;
-    const { centre, radius } = geometry.summary;
-    this.#change({ change: 'create', tile, arrays: { positions, indices, rgba, centre, radius } }, [
+    const { centre, radius, point_spacing, area_sum } = geometry.summary;
+    const { positions } = geometry;
+    // Triangles without any area would not be seen: their vertices are.
+    const indices = area_sum > 0 ? geometry.indices : null;
+    this.#change({ change: 'create', tile, arrays: { positions, indices, rgba, centre, radius, point_spacing } }, [
       positions.buffer,
       rgba.buffer,
       ...(indices === null ? [] : [indices.buffer]),
@@ -156,14 +146,14 @@ export class Viewport {
   /** Tells of a sphere (metres) whether any of it may be on the screen. */
   visibility(): (centre: Vec3, radius: number) => boolean {
     this.#camera.updateMatrixWorld();
-    const frustum = new Frustum().setFromProjectionMatrix(
-      new Matrix4().multiplyMatrices(this.#camera.projectionMatrix, this.#camera.matrixWorldInverse),
-    );
-    const sphere = new Sphere();
+    const toView = this.#camera.matrixWorldInverse.clone();
+    const [right, top] = this.#tangents;
+    const place = new Vector3();
+    // A plane through the eye and a side of the picture: how far beyond it the sphere's centre is.
+    const beyond = (across: number, tangent: number) => (Math.abs(across) + place.z * tangent) / Math.hypot(1, tangent);
     return (centre, radius) => {
-      sphere.center.set(...centre);
-      sphere.radius = radius;
-      return frustum.intersectsSphere(sphere);
+      place.set(...centre).applyMatrix4(toView);
+      return -place.z > -radius && beyond(place.x, right) < radius && beyond(place.y, top) < radius;
     };
   }
 
@@ -181,13 +171,15 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** What near and far plane and the controls' limits are made from. */
-  setSceneExtent(centre: Vec3, radius: number): void {
-    this.#sceneCentre.set(...centre);
-    this.#sceneRadius = Math.max(radius, 1e-6);
-    this.#controls.minDistance = this.#sceneRadius * 0.002;
-    this.#controls.maxDistance = this.#sceneRadius * 20;
-    this.invalidate();
+  /** Diameter of the points of a cloud in metres; null: as far as they are apart. */
+  setPointDiameter(diameter: number | null): void {
+    this.#change({ change: 'points', diameter });
+  }
+
+  /** How near to and how far from what is looked at the controls go, metres. */
+  setReach(nearest: number, farthest: number): void {
+    this.#controls.minDistance = nearest;
+    this.#controls.maxDistance = farthest;
   }
 
   setView(view: View, animated: boolean): void {
@@ -209,6 +201,11 @@ export class Viewport {
     );
   }
 
+  /** Puts what the camera turns about and comes nearer to at the depth of this point. The picture stays as it is. */
+  aimAt(point: Vec3): void {
+    this.#controls.aimAt(point);
+  }
+
   /** Keyboard control: radians for turning, shares of the distance for moving and nearing. */
   turn(azimuth_rad: number, polar_rad: number): void {
     this.events.onUserMove();
@@ -223,6 +220,7 @@ export class Viewport {
   }
   approach(share: number): void {
     this.events.onUserMove();
+    void this.#aim(this.#size[0] / 2, this.#size[1] / 2);
     void this.#controls.dolly(share * this.#controls.distance, !this.#reducedMotion.matches);
     this.invalidate();
   }
@@ -230,11 +228,12 @@ export class Viewport {
   /** Point of the scene under a place on the canvas (CSS pixels from its corner), or null. */
   async pick(x: number, y: number): Promise<Vec3 | null> {
     const [width, height] = this.#size;
-    this.#camera.updateMatrixWorld();
-    const place = new Vector3((x / width) * 2 - 1, 1 - (y / height) * 2, 0.5).unproject(this.#camera);
+    const [right, top] = this.#tangents;
     const eye = this.#camera.position.clone();
-    const direction = place.sub(eye).normalize();
-    const cone = (4 * Math.tan((this.#camera.fov * Math.PI) / 360) * 2) / height;
+    const direction = new Vector3(((x / width) * 2 - 1) * right, (1 - (y / height) * 2) * top, -1)
+      .normalize()
+      .applyQuaternion(this.#camera.quaternion);
+    const cone = (4 * top * 2) / height;
     const ray = { origin: eye.toArray(), direction: direction.toArray() };
     const reply = await this.#ask((id) => ({ kind: 'pick', id, ray, cone }));
     if (reply.kind !== 'picked' || reply.distance === null) return null;
@@ -244,17 +243,17 @@ export class Viewport {
   /** Where a point of the scene is on the canvas, in CSS pixels; null behind the camera. */
   project(point: Vec3): { x: number; y: number; depth: number } | null {
     this.#camera.updateMatrixWorld();
-    const inView = new Vector3(...point).applyMatrix4(this.#camera.matrixWorldInverse);
-    if (inView.z >= 0) return null;
-    const clip = inView.clone().applyMatrix4(this.#camera.projectionMatrix);
-    return { x: ((clip.x + 1) / 2) * this.#size[0], y: ((1 - clip.y) / 2) * this.#size[1], depth: -inView.z };
+    const { x, y, z } = new Vector3(...point).applyMatrix4(this.#camera.matrixWorldInverse);
+    if (z >= 0) return null;
+    const [right, top] = this.#tangents;
+    return { x: ((1 - x / z / right) / 2) * this.#size[0], y: ((1 + y / z / top) / 2) * this.#size[1], depth: -z };
   }
 
   /** The picture as it is now; the caller closes it. */
   async copy(): Promise<ImageBitmap> {
     this.#send();
     const reply = await this.#ask((id) => ({ kind: 'copy', id }));
-    if (reply.kind !== 'copied') throw new Error('the picture could not be copied');
+    if (reply.kind !== 'copied' || reply.picture === null) throw new Error('There is no picture while the graphics restart.');
     return reply.picture;
   }
 
@@ -265,6 +264,8 @@ export class Viewport {
   dispose(): void {
     cancelAnimationFrame(this.#frame);
     this.#resize.disconnect();
+    this.canvas.removeEventListener('wheel', this.#aimAtPointer, { capture: true });
+    this.canvas.removeEventListener('pointerdown', this.#aimAtPointer, { capture: true });
     this.#controls.dispose();
     this.#port.dispose();
     this.#questions.clear();
@@ -292,23 +293,36 @@ export class Viewport {
   }
 
   #send(): void {
-    const distance = this.#camera.position.distanceTo(this.#sceneCentre);
-    const near = Math.max(distance - this.#sceneRadius * 1.05, this.#sceneRadius * 5e-4, distance * 1e-4);
-    const far = distance + this.#sceneRadius * 1.05;
-    if (near !== this.#camera.near || far !== this.#camera.far) {
-      this.#camera.near = near;
-      this.#camera.far = far;
-      this.#camera.updateProjectionMatrix();
-    }
     this.#camera.updateMatrixWorld();
     this.#sent += 1;
-    const camera = {
+    const eye = {
       world_from_camera: this.#camera.matrixWorld.toArray(),
-      clip_from_camera: this.#camera.projectionMatrix.toArray(),
+      tangents: this.#tangents,
+      distance: this.#controls.distance,
     };
-    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, camera }, this.#transfer);
+    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, eye }, this.#transfer);
     this.#commands = [];
     this.#transfer = [];
+  }
+
+  /** Half the picture's width and height at distance 1. */
+  get #tangents(): [number, number] {
+    const top = Math.tan((this.#camera.fov * Math.PI) / 360);
+    return [top * this.aspect, top];
+  }
+
+  readonly #aimAtPointer = (event: MouseEvent): void => {
+    const { left, top } = this.canvas.getBoundingClientRect();
+    void this.#aim(event.clientX - left, event.clientY - top);
+  };
+
+  /** Aims at what is seen at a place of the canvas; where nothing is, nothing changes. */
+  async #aim(x: number, y: number): Promise<void> {
+    if (this.#isAiming) return;
+    this.#isAiming = true;
+    const point = await this.pick(x, y);
+    this.#isAiming = false;
+    if (point !== null) this.aimAt(point);
   }
 
   #ask(question: (id: number) => { kind: 'pick'; id: number; ray: Ray; cone: number } | { kind: 'copy'; id: number }) {
@@ -330,6 +344,9 @@ export class Viewport {
         this.#isHeldUp = false;
         this.invalidate();
         break;
+      case 'context':
+        this.events.onContext(reply.isLost);
+        break;
       case 'failed':
         this.events.onFailure(reply.message, this.#drawn > 0);
         break;
@@ -348,5 +365,3 @@ export class Viewport {
     this.#change({ change: 'size', width, height, pixel_ratio: Math.min(devicePixelRatio, 2) });
   }
 }
-
-export type { Insets };

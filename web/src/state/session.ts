@@ -20,23 +20,15 @@ import {
   streamComplete,
   streamStats,
   subscribed,
-  type Vec3,
 } from '../protocol/messages';
-import {
-  fittedView,
-  guessUpAxis,
-  type Insets,
-  meanNormal,
-  samplePoints,
-  type UpAxis,
-  type View,
-  viewDirection,
-} from '../scene/first_view';
+import type { Insets, UpAxis, View } from '../scene/first_view';
 import { FrameIntake } from '../scene/frame_intake';
 import { TileSet } from '../scene/tile_set';
-import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
+import { Viewport, type ViewportEvents } from '../scene/viewport';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
+import { FirstLook } from '../view/first_look';
+import { UpChoices } from '../view/up_choices';
 import { cacheBytes } from './cache_bytes';
 import { mergedChange, wholeChange } from './fusion_change';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
@@ -68,19 +60,17 @@ export class Session {
   readonly #ticker: ReturnType<typeof setInterval>;
 
   readonly #intake: FrameIntake;
+  readonly #look: FirstLook;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   #connectionNumber = 0;
   /** Session whose server knows what the tile set claims. */
   #claimableSession: string | null = null;
-  #userMoved = false;
   #isHovering = false;
-  #viewedScene: string | null = null;
   #qualityChanged = false;
   #bytesBefore = 0;
   #rememberedParams = new Map<string, Record<string, ParameterValue>>();
   #lastFusedMethod: string | null = null;
   #rateWindow: { at: number; bytes: number }[] = [];
-  #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
 
   constructor(
     canvas: HTMLCanvasElement,
@@ -90,17 +80,24 @@ export class Session {
   ) {
     const events: ViewportEvents = {
       onCamera: (pose) => this.#cameraMoved(pose),
-      onResize: () => {
-        if (!this.#userMoved && store.scene) this.#firstView(store.scene, false);
-      },
-      onUserMove: () => {
-        this.#userMoved = true;
-      },
+      onResize: () => this.#look.pictureIs(null),
+      onUserMove: () => this.#look.userMoved(),
       beforeRender: () => this.#bringIn(),
+      onContext: (isLost) => {
+        store.graphicsLostAt = isLost ? performance.now() : null;
+      },
       onFailure: drawing.onFailure,
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker);
     this.tiles = new TileSet((geometry, rgba) => this.viewport.createTile(geometry, rgba));
+    this.#look = new FirstLook(
+      this.viewport,
+      new UpChoices(),
+      () => this.tiles.shownGeometries(),
+      (up) => {
+        store.upAxis = up;
+      },
+    );
     this.#intake = new FrameIntake(this.tiles, new DecodePool(createDecodeWorker), {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),
@@ -236,35 +233,29 @@ export class Session {
     this.viewport.setBackground(colour);
   }
 
+  /** Diameter of a cloud's points in metres; anything but a positive number: as far as they are apart. */
+  setPointDiameter(diameter_m: number): void {
+    this.store.pointDiameter_m = diameter_m > 0 ? diameter_m : null;
+    this.viewport.setPointDiameter(this.store.pointDiameter_m);
+  }
+
   setUpAxis(up: UpAxis): void {
-    this.store.upAxis = up;
-    this.viewport.setUpAxis(up);
-    this.fitView('reset');
+    this.#look.chooseUp(up);
   }
 
   setInsets(insets: Insets): void {
-    this.#insets = insets;
-    if (!this.#userMoved && this.store.scene) this.#firstView(this.store.scene, false);
+    this.#look.pictureIs(insets);
   }
 
   /** `fit` keeps the direction of the camera, `reset` goes back to the first view. */
   fitView(mode: 'fit' | 'reset'): void {
-    const scene = this.store.scene;
-    if (!scene) return;
-    if (mode === 'reset') {
-      this.#userMoved = false;
-      this.#firstView(scene, true);
-      return;
-    }
-    this.#userMoved = true;
-    const { eye, target } = this.viewport.pose;
-    const direction: Vec3 = [eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]];
-    this.#fit(scene, direction, true);
+    if (mode === 'fit') this.#look.fit();
+    else this.#look.reset();
   }
 
   /** Looks from a place the caller has chosen, and stays there. */
   setView(view: View): void {
-    this.#userMoved = true;
+    this.#look.userMoved();
     this.viewport.setView(view, false);
   }
 
@@ -402,6 +393,7 @@ export class Session {
     store.scene = next;
     if (next === null) {
       this.tiles.clear();
+      this.#look.sceneIs(null);
       store.histogram = null;
       store.extremes = null;
       this.viewport.invalidate();
@@ -410,15 +402,8 @@ export class Session {
     const same = before?.name === next.name;
     // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
     if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) this.tiles.clear();
-    const { min, max } = next.bounds;
-    const centre: Vec3 = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
-    this.viewport.setSceneExtent(centre, Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2);
-    if (!same) {
-      store.pinned = null;
-      this.#userMoved = false;
-      this.#viewedScene = null;
-      this.#firstView(next, false);
-    }
+    this.#look.sceneIs(next);
+    if (!same) store.pinned = null;
     this.#histogramAsker.push(true);
     this.#connection
       .request('scene.extremes', {})
@@ -502,7 +487,10 @@ export class Session {
       this.#say(error);
       return;
     }
-    if (frame.kind === FrameKind.geometry) this.#stepIs(frame.position_step_m * 1000);
+    if (frame.kind === FrameKind.geometry) {
+      this.#look.stepIs(frame.position_step_m);
+      this.#stepIs(frame.position_step_m * 1000);
+    }
     this.#intake.receive(frame);
   }
 
@@ -518,7 +506,10 @@ export class Session {
   #bringIn(): boolean {
     const { bytes, next_ms, complete } = this.#intake.bringIn(performance.now());
     if (complete !== null) this.#completed(complete);
-    if (this.tiles.updateSelection() || bytes > 0) this.store.shown = this.tiles.counts();
+    if (this.tiles.updateSelection() || bytes > 0) {
+      this.store.shown = this.tiles.counts();
+      this.#look.pictureChanged();
+    }
     clearTimeout(this.#nextPicture);
     if (next_ms !== null && next_ms > 0) this.#nextPicture = setTimeout(() => this.viewport.invalidate(), next_ms);
     return next_ms === 0;
@@ -536,10 +527,6 @@ export class Session {
       store.behindSince = null;
       store.progress = 1;
     }
-    if (store.scene && this.#viewedScene === null) {
-      this.#viewedScene = store.scene.name;
-      if (!this.#userMoved) this.#firstView(store.scene, false);
-    }
   }
 
   // The camera
@@ -554,27 +541,10 @@ export class Session {
     this.#cameraSender.push(pose);
   }
 
-  #firstView(scene: Scene, animated: boolean): void {
-    const geometries = [...this.tiles.shownGeometries()].map(({ geometry }) => geometry);
-    const facing = meanNormal(geometries);
-    if (geometries.length > 0 && this.#viewedScene === scene.name && !animated) {
-      const up = guessUpAxis(scene.bounds, facing);
-      this.store.upAxis = up;
-      this.viewport.setUpAxis(up);
-    }
-    this.#fit(scene, viewDirection(facing, this.store.upAxis), animated);
-  }
-
-  #fit(scene: Scene, direction: Vec3, animated: boolean): void {
-    const geometries = [...this.tiles.shownGeometries()].map(({ geometry }) => geometry);
-    const points = samplePoints(geometries, scene.bounds);
-    const fov = (FIELD_OF_VIEW_DEG * Math.PI) / 180;
-    this.viewport.setView(fittedView(points, direction, this.store.upAxis, fov, this.viewport.aspect, this.#insets), animated);
-  }
-
   async #askHover(place: { x: number; y: number }): Promise<void> {
     try {
       const point = await this.viewport.pick(place.x, place.y);
+      if (point !== null) this.viewport.aimAt(point);
       const answer = point && probe(await this.#connection.request('scene.probe', { position: point }), 'scene.probe');
       this.store.hover = answer === null || !this.#isHovering ? null : { ...place, probe: answer };
     } catch {

@@ -19,6 +19,7 @@ import type { UpAxis } from '../scene/first_view';
 import type { TileCounts } from '../scene/tile_set';
 import type { LinkState } from '../transport/connection';
 import { withChange } from './fusion_change';
+import { type Note, notesOf } from './notes';
 
 /** A reading of the scene at a place. */
 export interface Reading {
@@ -87,6 +88,10 @@ export class Store {
   camera = $state.raw<CameraPose | null>(null);
   axes = $state.raw<{ x: Vec3; y: Vec3; z: Vec3 }>({ x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] });
   upAxis = $state<UpAxis>('y');
+  /** Diameter of a cloud's points, metres; null: as far as they are apart. */
+  pointDiameter_m = $state<number | null>(null);
+  /** When the browser took the GPU away, on performance.now()'s clock; null while the picture is drawn. */
+  graphicsLostAt = $state<number | null>(null);
   background = $state(DEFAULT_BACKGROUND);
   failure = $state<string | null>(null);
 
@@ -95,6 +100,10 @@ export class Store {
   panelsHidden = $state(false);
   panelOpen = $state(true);
   helpOpen = $state(false);
+  /** All notes are shown, closed ones too. */
+  notesOpen = $state(false);
+  /** Keys of the notes that the user has closed. */
+  closedNotes = $state.raw<readonly string[]>([]);
 
   /** The settings as the controls show them: in force, with what is on its way laid over. */
   readonly fusion = $derived(this.fusionInForce === null ? null : withChange(this.fusionInForce, this.wanted, this.methods));
@@ -103,6 +112,13 @@ export class Store {
   readonly hasThermal = $derived(this.scene?.temperature.min != null);
   /** Without thermal data every method shows the visible colours. */
   readonly viewMode = $derived<ViewMode>(this.hasThermal ? viewModeOf(this.fusion?.method ?? '') : 'visible');
+  /** What the palette chooser says beside the palette is no note. */
+  readonly notes = $derived<Note[]>(
+    notesOf(
+      this.scene,
+      this.statuses.filter(({ id }) => !/palette|fusion_safe/.test(id)),
+    ),
+  );
   readonly connected = $derived(this.link.phase === 'open');
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
   /** How exact what is on the screen now is. */
@@ -111,5 +127,6 @@ export class Store {
       ? null
       : { position_mm: this.position_error_mm, colour_levels: this.stats?.accuracy.colour_levels ?? null },
   );
+  readonly graphicsLostFor_s = $derived(this.graphicsLostAt === null ? 0 : Math.max(0, (this.now - this.graphicsLostAt) / 1000));
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
 }

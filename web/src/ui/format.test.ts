@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { accuracyWords, bytes, celsius, count, duration, figures, length } from './format';
+import { accuracyWords, bytes, celsius, count, duration, extent, figures, length } from './format';
 
 const plain = (text: string | null) => text?.replaceAll('\u202f', ' ') ?? null;
 
@@ -44,5 +44,16 @@ describe('Numbers', () => {
     expect(plain(accuracyWords({ position_mm: 2, colour_levels: 256 }))).toBe('within 2 mm, colours exact');
     expect(plain(accuracyWords({ position_mm: null, colour_levels: 64 }))).toBe('colours ±2 of 255');
     expect(accuracyWords(null)).toBeNull();
+  });
+});
+
+describe('The size of a scene', () => {
+  it('is in metres along each axis, so that a file in millimetres is noticed', () => {
+    const bounds = { min: [0, -1000, 10] as [number, number, number], max: [3000, 2000, 50] as [number, number, number] };
+    expect(plain(extent({ bounds }))).toBe('3 000 m × 3 000 m × 40 m');
+    expect(plain(extent({ bounds, core_bounds: { min: [0, 0, 0], max: [3, 2.71828, 0.04567] } }))).toBe(
+      '3 m × 2.72 m × 0.0457 m',
+    );
+    expect(plain(extent({ bounds: { min: [0, 0, 0], max: [1_234_567, 0, 0] } }))).toBe('1 234 567 m × 0 m × 0 m');
   });
 });

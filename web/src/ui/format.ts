@@ -1,5 +1,7 @@
 /** Numbers as the instrument writes them. */
 
+import type { Scene } from '../protocol/messages';
+
 const THIN_SPACE = '\u202f';
 const MINUS = '\u2212';
 
@@ -51,6 +53,19 @@ export function length(value_m: number): string {
   if (size < 0.01) return withUnit(figures(value_m * 1000, 2), 'mm');
   if (size < 1) return withUnit(figures(value_m * 100, 2), 'cm');
   return size < 1000 ? withUnit(figures(value_m, 3), 'm') : withUnit(figures(value_m / 1000, 3), 'km');
+}
+
+/** A length in metres, so that one thousandfold stands out: 3 000 m, 0.2 m. */
+function metres(value_m: number): string {
+  const [whole = '', rest] = figures(value_m, value_m < 1000 ? 3 : 4).split('.');
+  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
+  return withUnit(rest === undefined ? grouped : `${grouped}.${rest}`, 'm');
+}
+
+/** Size of a scene along its axes, without its strays. */
+export function extent({ bounds, core_bounds }: Pick<Scene, 'bounds' | 'core_bounds'>): string {
+  const { min, max } = core_bounds ?? bounds;
+  return [0, 1, 2].map((axis) => metres((max[axis] ?? 0) - (min[axis] ?? 0))).join(' × ');
 }
 
 /** So many significant figures, no exponent, no trailing zeros. */

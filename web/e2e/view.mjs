@@ -1,0 +1,238 @@
+// What the viewport shows of scenes as people have them: near and far, strays, which way is up, notes, and a GPU that is taken away.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+
+/** A PLY file of vertices [x, y, z, red, green, blue] and triangles. */
+function writePly(file, vertices, triangles) {
+  const header =
+    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\nproperty double x\nproperty double y\nproperty double z\n` +
+    `property uchar red\nproperty uchar green\nproperty uchar blue\nelement face ${triangles.length}\n` +
+    'property list uchar int vertex_indices\nend_header\n';
+  writeFileSync(
+    file,
+    `${header}${vertices.map((vertex) => vertex.join(' ')).join('\n')}\n${triangles.map((face) => `3 ${face.join(' ')}`).join('\n')}\n`,
+  );
+}
+
+/** Adds a grid of `cells` by `cells` squares; `at` gives place and colour for two numbers of 0 to 1. */
+function addGrid({ vertices, triangles }, cells, at) {
+  const first = vertices.length;
+  for (let i = 0; i <= cells; i += 1) for (let j = 0; j <= cells; j += 1) vertices.push(at(i / cells, j / cells));
+  for (let i = 0; i < cells; i += 1) {
+    for (let j = 0; j < cells; j += 1) {
+      const corner = first + i * (cells + 1) + j;
+      triangles.push([corner, corner + 1, corner + cells + 1], [corner + 1, corner + cells + 2, corner + cells + 1]);
+    }
+  }
+}
+
+const LABEL_M = 0.05;
+const LABEL_AT = [12.5, -7.25, 1.5];
+/** The label's squares, one black, one white. */
+const isBlack = (u, v) => (Math.floor(u * 5) + Math.floor(v * 5)) % 2 === 0;
+const onLabel = (u, v) => [LABEL_AT[0], LABEL_AT[1] + (u - 0.5) * LABEL_M, LABEL_AT[2] + (v - 0.5) * LABEL_M];
+
+/** A map of 4 km with a label of 5 cm on a board, and behind it, 1.5 km away, a red sheet two metres before a blue one. */
+function writeMap(file) {
+  const mesh = { vertices: [], triangles: [] };
+  addGrid(mesh, 40, (u, v) => [u * 4000 - 2000, v * 4000 - 2000, 0, 110, 120, 100]);
+  for (const [x, ...colour] of [
+    [1500, 200, 30, 30],
+    [1502, 30, 30, 200],
+  ]) {
+    addGrid(mesh, 10, (u, v) => [x, (u - 0.5) * 1200, v * 900, ...colour]);
+  }
+  addGrid(mesh, 20, (u, v) => [LABEL_AT[0] + 0.003, LABEL_AT[1] + (u - 0.5) * 0.06, LABEL_AT[2] + (v - 0.5) * 0.06, 40, 160, 60]);
+  // Of very many small triangles, so that they set the lattice of the scene.
+  addGrid(mesh, 80, (u, v) => [
+    ...onLabel(u, v),
+    ...(isBlack(Math.min(u, 0.999), Math.min(v, 0.999)) ? [15, 15, 15] : [240, 240, 240]),
+  ]);
+  writePly(file, mesh.vertices, mesh.triangles);
+}
+
+const frames = (page, count) =>
+  page.evaluate(async (wanted) => {
+    for (let i = 0; i < wanted; i += 1) await new Promise((resolve) => requestAnimationFrame(resolve));
+  }, count);
+
+/** Turns the wheel over a point of the scene until the camera is as near to it as asked for, or comes no nearer. */
+async function wheelTo(page, point, distance_m) {
+  for (let i = 0; i < 400; i += 1) {
+    const place = await page.evaluate((at) => globalThis.spectra.viewport.project(at), point);
+    assert.ok(place !== null, 'the point has gone behind the camera');
+    if (place.depth < distance_m) return place;
+    await page.mouse.move(place.x, place.y);
+    // The page finds out what is under the pointer before the wheel turns on.
+    if (i % 10 === 0) await page.waitForTimeout(250);
+    await page.mouse.wheel(0, -240);
+    await frames(page, 4);
+  }
+  return null;
+}
+
+export function addViewTests(browser, scratch) {
+  test('A label of 5 cm in a map of 4 km can be gone to with the wheel and read', async () => {
+    const file = join(scratch, 'map.ply');
+    writeMap(file);
+    const server = await startServer([file]);
+    const { page, problems } = await openClient(browser, server.url, { width: 900, height: 640 });
+    await settled(page);
+    await page.evaluate(() => {
+      globalThis.spectra.store.panelsHidden = true;
+      globalThis.spectra.setView({ eye: [-1400, -300, 500], target: [12.5, -7.25, 1.5] });
+    });
+    await drawn(page);
+    // Relative to the scene's origin, as the page has it.
+    const { origin } = await page.evaluate(() => globalThis.spectra.store.scene);
+    const local = (point) => point.map((value, axis) => value - origin[axis]);
+    const centre = local(LABEL_AT);
+    assert.ok(await wheelTo(page, centre, 0.5), 'the wheel does not come near the label');
+    await page.evaluate(([x, y, z]) => globalThis.spectra.setView({ eye: [x - 0.2, y, z], target: [x, y, z] }), centre);
+    await settled(page);
+    const image = await screenshot(page, 'label-in-a-map');
+    const at = async (point) => {
+      const { x, y } = await page.evaluate((wanted) => globalThis.spectra.viewport.project(wanted), local(point));
+      return image.at(x, y);
+    };
+    for (let i = 0; i < 5; i += 1) {
+      for (let j = 0; j < 5; j += 1) {
+        const [u, v] = [(i + 0.5) / 5, (j + 0.5) / 5];
+        const [level] = await at(onLabel(u, v));
+        assert.ok(isBlack(u, v) ? level < 60 : level > 195, `square ${i}, ${j} of the label has level ${level}`);
+      }
+    }
+    const [red, , blue] = await at([1500, 250, 300]);
+    assert.ok(red > 150 && blue < 80, `the sheet two metres before another one, 1.5 km away, is (${red}, ${blue})`);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('Stray points do not push the scene away, and one can go near them', async () => {
+    const file = join(scratch, 'strays.ply');
+    const mesh = { vertices: [], triangles: [] };
+    addGrid(mesh, 40, (u, v) => [u * 3, v * 3, 0.2 * Math.sin(u * 9), 200, 180, 60]);
+    const stray = [2500, 1200, 300];
+    writePly(file, [...mesh.vertices, [...stray, 255, 0, 0]], []);
+    const server = await startServer([file]);
+    const { page, problems } = await openClient(browser, server.url, { width: 900, height: 640 });
+    await settled(page);
+    const width = () =>
+      page.evaluate(() => {
+        const { viewport, store } = globalThis.spectra;
+        const places = [0, 3].flatMap((x) =>
+          [0, 3].map((y) => viewport.project([x - store.scene.origin[0], y - store.scene.origin[1], 0])),
+        );
+        const across = places.map(({ x }) => x);
+        return Math.max(...across) - Math.min(...across);
+      });
+    assert.ok((await width()) > 250, `the scene is ${await width()} px wide at first`);
+    await page.evaluate(() => {
+      globalThis.spectra.store.panelsHidden = true;
+      globalThis.spectra.setView({ eye: [-3000, -3000, 2000], target: [0, 0, 0] });
+    });
+    await page.evaluate(() => globalThis.spectra.fitView('fit'));
+    await frames(page, 30);
+    assert.ok((await width()) > 300, `the scene is ${await width()} px wide after F`);
+    // Far away and looking at the stray: the wheel goes to it.
+    const { origin } = await page.evaluate(() => globalThis.spectra.store.scene);
+    const place = stray.map((value, axis) => value - origin[axis]);
+    await page.evaluate(
+      ([x, y, z]) => globalThis.spectra.setView({ eye: [x - 900, y - 900, z + 400], target: [x + 30, y, z] }),
+      place,
+    );
+    await drawn(page);
+    assert.ok(await wheelTo(page, place, 0.5), 'the wheel does not come near the stray');
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('Which way is up is remembered for a scene, and its size is said', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const up = () => page.evaluate(() => [globalThis.spectra.store.upAxis, globalThis.spectra.viewport.pose.up]);
+    const { scene } = await page.evaluate(() => ({ scene: globalThis.spectra.store.scene }));
+    assert.equal((await up())[0], scene.up);
+    assert.match(await page.locator('[data-status="size"]').innerText(), /^[\d.]+\sm × [\d.]+\sm × [\d.]+\sm$/);
+    await page.getByRole('radio', { name: '−X' }).click();
+    await page.reload();
+    await settled(page);
+    assert.deepEqual(await up(), ['-x', [-1, 0, 0]]);
+    await page.getByRole('radio', { name: scene.up.toUpperCase().replace('-', '−'), exact: true }).click();
+    assert.equal((await up())[0], scene.up);
+    await page.close();
+    await server.stop();
+  });
+
+  test('Notes are shown, closed one by one and read again', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    await page.evaluate(() => {
+      const { store } = globalThis.spectra;
+      const notes = [
+        { id: 'stray_points', count: 2, message: '2 stray vertices lie far from everything else.' },
+        { id: 'kelvin', count: 1, message: 'The temperatures look like kelvin; --temperature-unit kelvin reads them so.' },
+      ];
+      store.scene = { ...store.scene, notes };
+    });
+    const notice = page.locator('[data-notice]');
+    assert.match(await notice.innerText(), /2 stray vertices/);
+    assert.match(await page.locator('[data-status="strays"]').innerText(), /2\s*strays/);
+    await notice.getByRole('button', { name: 'Close this note' }).click();
+    assert.match(await notice.innerText(), /kelvin/);
+    await notice.getByRole('button', { name: 'Close this note' }).click();
+    assert.equal(await notice.count(), 0);
+    await page.getByRole('button', { name: '2 notes' }).click();
+    const all = page.getByRole('region', { name: 'Notes' });
+    assert.match(await all.innerText(), /2 stray vertices[^]*kelvin/);
+    await screenshot(page, 'notes');
+    await all.getByRole('button', { name: 'Close the notes' }).click();
+    assert.equal(await all.count(), 0);
+    await page.close();
+    await server.stop();
+  });
+
+  test('A lost graphics context is said, counted, and restored with everything', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    await page.evaluate(() => globalThis.spectra.setBackground('#6b6d70'));
+    await drawn(page);
+    const before = await screenshot(page, 'context-before');
+    const worker = page.workers().find((one) => one.url().includes('render_worker'));
+    assert.ok(worker, 'the picture is drawn in a worker');
+    await worker.evaluate(() => {
+      self.losing = self.spectra.context.getExtension('WEBGL_lose_context');
+      self.losing.loseContext();
+    });
+    await page.getByText('Graphics restarting', { exact: true }).waitFor();
+    assert.match(await page.locator('footer').innerText(), /graphics restarting, \d+\s*s/);
+    assert.equal(await page.locator('canvas.dead').evaluate((canvas) => getComputedStyle(canvas).visibility), 'hidden');
+    // What comes while there is no picture is in it afterwards.
+    await page.evaluate(() => globalThis.spectra.setViewMode('visible'));
+    await settled(page);
+    await page.evaluate(() => globalThis.spectra.setViewMode('fused'));
+    await settled(page);
+    await screenshot(page, 'context-lost');
+    await page.evaluate(() => {
+      globalThis.spectra.store.graphicsLostAt -= 60_000;
+    });
+    await page.getByText('The graphics do not come back').waitFor();
+    assert.equal(await page.getByRole('button', { name: 'Load the page again' }).count(), 1);
+    await worker.evaluate(() => self.losing.restoreContext());
+    await page.waitForFunction(() => globalThis.spectra.store.graphicsLostAt === null);
+    await drawn(page);
+    const after = await screenshot(page, 'context-restored');
+    for (let x = 200; x < 1100; x += 25) {
+      for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
+    }
+    await page.close();
+    await server.stop();
+  });
+}

@@ -1,0 +1,170 @@
+import { describe, expect, it } from 'vitest';
+import type { GeometrySummary } from '../decode/messages';
+import type { Scene, Vec3 } from '../protocol/messages';
+import type { UpAxis, View } from '../scene/first_view';
+import { decodedGeometry } from '../scene/test_tiles';
+import { FirstLook } from './first_look';
+import { UpChoices } from './up_choices';
+
+function scene(part: Partial<Scene> = {}): Scene {
+  return {
+    name: 'room',
+    bounds: { min: [0, 0, 0], max: [8, 6, 3] },
+    up: 'z',
+    ...part,
+  } as Scene;
+}
+
+/** A tile with these vertices. */
+function tile(points: readonly Vec3[], facing: Vec3 = [0, 0, 1]): GeometrySummary {
+  return { ...decodedGeometry(3).summary, sample: Float32Array.from(points.flat()), normal_sum: facing, area_sum: 1 };
+}
+const grid = (size: number): Vec3[] =>
+  Array.from({ length: 400 }, (_, i) => [((i % 20) / 19) * size, (Math.floor(i / 20) / 19) * size, 0]);
+
+function setUp(choices = new UpChoices(null)) {
+  const tiles: GeometrySummary[] = [];
+  const seen = { view: null as View | null, views: 0, up: null as UpAxis | null, reach: [0, 0] as [number, number], aspect: 1.5 };
+  const look = new FirstLook(
+    {
+      get pose() {
+        const { eye, target } = seen.view ?? { eye: [1, 1, 1], target: [0, 0, 0] };
+        return { eye, target, up: [0, 0, 1] as Vec3, fov_y_deg: 45, viewport: [900, 600] as [number, number] };
+      },
+      get aspect() {
+        return seen.aspect;
+      },
+      setUpAxis: () => undefined,
+      setView: (view) => {
+        seen.view = view;
+        seen.views += 1;
+      },
+      setReach: (nearest, farthest) => {
+        seen.reach = [nearest, farthest];
+      },
+    },
+    choices,
+    () => tiles.map((geometry) => ({ geometry })),
+    (up) => {
+      seen.up = up;
+    },
+  );
+  const distance = () => Math.hypot(...[0, 1, 2].map((axis) => seen.view!.eye[axis]! - seen.view!.target[axis]!));
+  return { look, tiles, seen, distance };
+}
+
+describe('FirstLook', () => {
+  it('is decided by the first tile and then left alone', () => {
+    const { look, tiles, seen } = setUp();
+    look.sceneIs(scene());
+    tiles.push(tile(grid(8)));
+    look.pictureChanged();
+    const { view, views } = seen;
+    tiles.push(tile(grid(3), [0, -1, 0]), tile(grid(5), [1, 0, 0]));
+    look.pictureChanged();
+    expect(seen.view).toEqual(view);
+    expect(seen.views).toBe(views);
+    look.reset();
+    expect(seen.view).toEqual(view);
+  });
+
+  it('follows the size of the picture until the user takes the camera', () => {
+    const { look, tiles, seen, distance } = setUp();
+    look.sceneIs(scene());
+    tiles.push(tile(grid(8)));
+    look.pictureChanged();
+    const before = distance();
+    seen.aspect = 0.5;
+    look.pictureIs(null);
+    expect(distance()).toBeGreaterThan(before * 1.3);
+    look.userMoved();
+    const { views } = seen;
+    look.pictureIs({ left: 0.1, right: 0.3, top: 0, bottom: 0 });
+    expect(seen.views).toBe(views);
+    look.reset();
+    expect(seen.views).toBe(views + 1);
+  });
+
+  it('does not take the camera from a user who was faster than the first tile', () => {
+    const { look, tiles, seen } = setUp();
+    look.sceneIs(scene());
+    look.userMoved();
+    const { views } = seen;
+    tiles.push(tile(grid(8)));
+    look.pictureChanged();
+    expect(seen.views).toBe(views);
+  });
+
+  it.each([
+    ['as the drawn points tell', {}],
+    ['as the server tells', { core_bounds: { min: [0, 0, 0] as Vec3, max: [8, 8, 1] as Vec3 } }],
+  ])('shows the scene without its strays, %s', (_how, part) => {
+    const { look, tiles, distance } = setUp();
+    look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [5000, 5000, 3] }, ...part }));
+    tiles.push(tile([...grid(8), [5000, 5000, 0]]));
+    look.pictureChanged();
+    expect(distance()).toBeLessThan(30);
+    tiles.push(tile([[4999, 5000, 0], ...Array.from({ length: 60 }, (): Vec3 => [5000, 5000, 0])]));
+    look.fit();
+    expect(distance()).toBeLessThan(30);
+  });
+
+  it('has the server say which way is up, and the user know better', () => {
+    let text: string | null = null;
+    const storage = { getItem: () => text, setItem: (_key: string, value: string) => (text = value) };
+    const first = setUp(new UpChoices(storage));
+    first.look.sceneIs(scene());
+    expect(first.seen.up).toBe('z');
+    first.look.chooseUp('-y');
+    expect(first.seen.up).toBe('-y');
+    first.look.sceneIs(scene({ name: 'hall' }));
+    expect(first.seen.up).toBe('z');
+    const later = setUp(new UpChoices(storage));
+    later.look.sceneIs(scene());
+    expect(later.seen.up).toBe('-y');
+    later.look.chooseUp('z');
+    expect(text).toBe('[]');
+  });
+
+  it('starts anew with another scene, and where the same one is elsewhere, but not while it grows', () => {
+    const { look, tiles, seen } = setUp();
+    look.sceneIs(scene());
+    tiles.push(tile(grid(8)));
+    look.pictureChanged();
+    const { views } = seen;
+    look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [9, 6, 3] } }));
+    expect(seen.views).toBe(views);
+    look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [9000, 6000, 3000] } }));
+    expect(seen.views).toBe(views + 1);
+    look.userMoved();
+    look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [9, 6, 3] } }));
+    expect(seen.views).toBe(views + 1);
+    look.sceneIs(scene({ name: 'hall' }));
+    expect(seen.views).toBe(views + 2);
+  });
+
+  it('lets the controls near the finest detail, and go back to see everything', () => {
+    const { look, seen } = setUp();
+    look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [4000, 0, 3000] } }));
+    expect(seen.reach).toEqual([expect.closeTo(5e-4, 9), 50_000]);
+    look.stepIs(0.5);
+    expect(seen.reach[0]).toBe(2);
+    look.stepIs(0.001);
+    look.stepIs(0.5);
+    expect(seen.reach[0]).toBe(0.004);
+    look.sceneIs(scene({ name: 'dot', bounds: { min: [1, 1, 1], max: [1, 1, 1] } }));
+    look.stepIs(7);
+    expect(seen.reach[0]).toBeGreaterThan(0);
+    expect(seen.reach[0]).toBeLessThan(0.01);
+  });
+
+  it('does nothing without a scene', () => {
+    const { look, seen } = setUp();
+    look.fit();
+    look.reset();
+    look.pictureIs(null);
+    look.pictureChanged();
+    look.sceneIs(null);
+    expect(seen.views).toBe(0);
+  });
+});

@@ -1,0 +1,169 @@
+import type { GeometrySummary } from '../decode/messages';
+import type { CameraPose, Scene, Vec3 } from '../protocol/messages';
+import {
+  type Bounds,
+  corners,
+  fittedView,
+  type Insets,
+  meanNormal,
+  samplePoints,
+  type UpAxis,
+  type View,
+  viewDirection,
+  withoutStrays,
+} from '../scene/first_view';
+import type { UpChoices } from './up_choices';
+
+/** The part of the viewport that is needed to look at a scene. */
+export interface Looking {
+  readonly pose: CameraPose;
+  readonly aspect: number;
+  setUpAxis(up: UpAxis): void;
+  setView(view: View, animated: boolean): void;
+  setReach(nearest: number, farthest: number): void;
+}
+
+/** Nearest approach, in steps of the lattice of the finest tile: the picture is then about three of them high. */
+const NEAREST_STEPS = 4;
+/** A step is told in every tile; until one has come, and where it is absurd, a share of the scene's size stands for it. */
+const LEAST_SHARE = 1e-7;
+const FARTHEST_RADII = 20;
+
+/**
+ * Where the scene is looked at from until the user takes the camera: decided when the first tile is there, however coarse, and then
+ * left alone, but for the size of the picture.
+ */
+export class FirstLook {
+  #scene: Scene | null = null;
+  #up: UpAxis = 'y';
+  #userMoved = false;
+  #finestStep = Infinity;
+  /** What the first tile said; null until it has come. */
+  #decided: { points: Vec3[]; facing: Vec3 } | null = null;
+  #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
+
+  constructor(
+    private readonly viewport: Looking,
+    private readonly choices: UpChoices,
+    private readonly tiles: () => Iterable<{ geometry: GeometrySummary }>,
+    private readonly onUp: (up: UpAxis) => void,
+  ) {}
+
+  /** Nothing to look at any more, another scene, or more of the one that is looked at. */
+  sceneIs(scene: Scene | null): void {
+    const before = this.#scene;
+    this.#scene = scene;
+    if (scene === null) return;
+    this.#updateReach();
+    if (before !== null && before.name === scene.name && before.up === scene.up && (this.#userMoved || isLike(before, scene)))
+      return;
+    this.#decided = null;
+    this.#userMoved = false;
+    this.#finestStep = Infinity;
+    this.#setUp(this.choices.get(scene.name, scene.bounds) ?? scene.up);
+    this.#look(false);
+  }
+
+  /** Tiles have come. */
+  pictureChanged(): void {
+    if (this.#scene === null || this.#decided !== null) return;
+    const geometries = this.#geometries();
+    if (geometries.length === 0) return;
+    this.#decided = {
+      points: withoutStrays(samplePoints(geometries), this.#scene.core_bounds ?? null),
+      facing: meanNormal(geometries),
+    };
+    if (!this.#userMoved) this.#look(false);
+  }
+
+  /** A tile of this lattice step has come. */
+  stepIs(position_step_m: number): void {
+    if (!(position_step_m < this.#finestStep)) return;
+    this.#finestStep = position_step_m;
+    this.#updateReach();
+  }
+
+  /** The user moved the camera: from now on it is not moved for them. */
+  userMoved(): void {
+    this.#userMoved = true;
+  }
+
+  /** The picture has another size, or another part of it is free. */
+  pictureIs(insets: Insets | null): void {
+    if (insets !== null) this.#insets = insets;
+    if (!this.#userMoved && this.#scene !== null) this.#look(false);
+  }
+
+  /** The user says which way is up; it is remembered unless it is what the server says. */
+  chooseUp(up: UpAxis): void {
+    this.#setUp(up);
+    const scene = this.#scene;
+    if (scene === null) return;
+    this.choices.set(scene.name, scene.bounds, up === scene.up ? null : up);
+    this.reset();
+  }
+
+  /** Has the scene without its strays in the picture, from where the camera looks. */
+  fit(): void {
+    const scene = this.#scene;
+    if (scene === null) return;
+    this.#userMoved = true;
+    const { eye, target } = this.viewport.pose;
+    const points = withoutStrays(samplePoints(this.#geometries()), scene.core_bounds ?? this.#decidedBox());
+    this.#fit(points, [eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]], true);
+  }
+
+  /** Back to the first view. */
+  reset(): void {
+    this.#userMoved = false;
+    this.#look(true);
+  }
+
+  #setUp(up: UpAxis): void {
+    this.#up = up;
+    this.viewport.setUpAxis(up);
+    this.onUp(up);
+  }
+
+  #look(animated: boolean): void {
+    const scene = this.#scene;
+    if (scene === null) return;
+    const { points, facing } = this.#decided ?? { points: corners(scene.core_bounds ?? scene.bounds), facing: [0, 0, 0] };
+    this.#fit(points, viewDirection(facing as Vec3, this.#up), animated);
+  }
+
+  #fit(points: readonly Vec3[], direction: Vec3, animated: boolean): void {
+    const { fov_y_deg } = this.viewport.pose;
+    const fov = (fov_y_deg * Math.PI) / 180;
+    this.viewport.setView(fittedView(points, direction, this.#up, fov, this.viewport.aspect, this.#insets), animated);
+  }
+
+  #geometries(): GeometrySummary[] {
+    return [...this.tiles()].map(({ geometry }) => geometry);
+  }
+
+  #decidedBox(): Bounds | null {
+    const points = this.#decided?.points ?? [];
+    if (points.length === 0) return null;
+    const ends = (pick: (...values: number[]) => number): Vec3 =>
+      [0, 1, 2].map((axis) => points.reduce((end, point) => pick(end, point[axis]!), points[0]![axis]!)) as Vec3;
+    return { min: ends(Math.min), max: ends(Math.max) };
+  }
+
+  /** Far enough away to see everything, strays too; near enough to see the finest detail that there is. */
+  #updateReach(): void {
+    if (this.#scene === null) return;
+    const { min, max } = this.#scene.bounds;
+    const diagonal = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+    const size = diagonal > 0 ? diagonal : 1;
+    const step = Number.isFinite(this.#finestStep) && this.#finestStep < size ? this.#finestStep : 0;
+    this.viewport.setReach(Math.max(step * NEAREST_STEPS, size * LEAST_SHARE), (size / 2) * FARTHEST_RADII);
+  }
+}
+
+/** A scene that grows bit by bit stays where it is looked at. */
+function isLike({ bounds: a }: Scene, { bounds: b }: Scene): boolean {
+  const overlaps = [0, 1, 2].every((axis) => a.min[axis]! <= b.max[axis]! && b.min[axis]! <= a.max[axis]!);
+  const diagonal = ({ min, max }: Bounds) => Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+  return overlaps && Math.max(diagonal(a), diagonal(b)) <= 2 * Math.min(diagonal(a), diagonal(b));
+}
