@@ -24,8 +24,8 @@ struct Note {
 struct LoadedScene {
   MultispectralMesh mesh;
   std::vector<Note> notes;
-  std::optional<Bounds> core_bounds;  ///< Of the vertices that are no strays; absent: nobody has looked for any.
-  std::vector<std::string> comments;  ///< The header's lines "comment ..." and "obj_info ...", whole, in order.
+  std::optional<Bounds> core_bounds{};  ///< Of the vertices that are no strays; absent: nobody has looked for any.
+  std::vector<std::string> comments{};  ///< The header's lines "comment ..." and "obj_info ...", whole, in order.
 };
 
 /// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file. Safe on untrusted input: every count is checked
