@@ -53,9 +53,9 @@ export function startBrowser() {
   });
 }
 
-/** Opens the client; `problems` collects what the browser complained about (a breach of the content policy among it). */
+/** Opens the client in a browser or one of its contexts; `problems` collects what the browser complained about (a breach of the content policy among it). */
 export async function openClient(browser, url, viewport = { width: 1440, height: 900 }) {
-  const page = await browser.newPage({ viewport });
+  const page = await browser.newPage(viewport === null ? undefined : { viewport });
   const problems = [];
   page.on('console', (message) => {
     if (message.type() === 'error' || message.type() === 'warning') problems.push(message.text());

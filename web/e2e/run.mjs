@@ -17,6 +17,7 @@ import {
   startServer,
   test,
 } from './harness.mjs';
+import { addLayoutTests } from './layout.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLoadTests } from './load.mjs';
 import { addViewTests } from './view.mjs';
@@ -374,6 +375,7 @@ test('Nothing broke the content policy', () => {
   );
 });
 
+addLayoutTests(browser);
 addLinkTests(browser);
 addLoadTests(browser, scratch);
 addViewTests(browser, scratch);

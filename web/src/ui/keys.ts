@@ -1,5 +1,6 @@
 import type { Session } from '../state/session';
 import type { ViewMode } from '../state/store.svelte';
+import { preferences } from './preferences.svelte';
 
 const VIEWS: Record<string, ViewMode> = { '1': 'thermal', '2': 'visible', '3': 'fused' };
 const TURN_RAD = Math.PI / 36;
@@ -14,7 +15,7 @@ export const KEYS: readonly (readonly [string, string])[] = [
   ['R', 'Back to the first view'],
   ['L', 'Lock the temperature range, or let it follow the scene'],
   ['H', 'Hide the controls, or show them'],
-  ['P', 'Read the temperature under the pointer, or in the middle'],
+  ['P', 'Read the temperature under the pointer, or at the mark in the middle'],
   ['S', 'Save a screenshot'],
   ['← → ↑ ↓', 'Turn; with Shift: move'],
   ['+ −', 'Nearer, farther'],
@@ -25,14 +26,16 @@ export const KEYS: readonly (readonly [string, string])[] = [
 interface KeyActions {
   probe: () => void;
   screenshot: () => void;
-  /** The canvas, or nothing, has the focus: arrow keys are the camera's. */
+  /** The scene has the focus: keys act there even where single keys are switched off. */
+  onScene: boolean;
+  /** The scene, or nothing, has the focus: arrow keys are the camera's. */
   onCanvas: boolean;
 }
 
 function isTyping(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
   return target instanceof HTMLInputElement
-    ? target.type !== 'range' && target.type !== 'checkbox'
+    ? !['range', 'checkbox', 'radio'].includes(target.type)
     : target instanceof HTMLSelectElement;
 }
 
@@ -40,13 +43,14 @@ function isTyping(target: EventTarget | null): boolean {
 export function handleKey(event: KeyboardEvent, session: Session, actions: KeyActions): void {
   if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
   const { store } = session;
+  // A dialog has the keyboard for itself.
+  if (store.helpOpen) return;
+  if (!preferences.letterKeys && event.key.length === 1 && !actions.onScene) return;
   const view = VIEWS[event.key];
   if (view !== undefined) session.setViewMode(view);
-  else if (event.key === '?') store.helpOpen = !store.helpOpen;
-  else if (event.key === 'Escape') {
-    store.helpOpen = false;
-    session.unpin();
-  } else if (event.key.toLowerCase() === 'f') session.fitView('fit');
+  else if (event.key === '?') store.helpOpen = true;
+  else if (event.key === 'Escape') session.unpin();
+  else if (event.key.toLowerCase() === 'f') session.fitView('fit');
   else if (event.key.toLowerCase() === 'r') session.fitView('reset');
   else if (event.key.toLowerCase() === 'l') session.toggleRangeLock();
   else if (event.key.toLowerCase() === 'h') store.panelsHidden = !store.panelsHidden;

@@ -1,0 +1,238 @@
+// The controls on every screen that people bring: nothing is cut, nothing lies over something else, a finger finds its targets, and
+// the keyboard and other aids reach everything.
+import assert from 'node:assert/strict';
+import { openClient, screenshot, settled, startServer, test } from './harness.mjs';
+
+/** Width and height in CSS pixels; `touch` screens have no mouse. */
+const SCREENS = [
+  { width: 360, height: 740, touch: true },
+  { width: 390, height: 844, touch: true },
+  { width: 820, height: 1180, touch: true },
+  { width: 1280, height: 720 },
+  { width: 1440, height: 900 },
+  { width: 2560, height: 1440 },
+  { width: 3840, height: 2160 },
+];
+
+/** What the page shows, as boxes: controls and texts with what cuts them, and the parts that must not lie over each other. */
+function boxes(page) {
+  return page.evaluate(() => {
+    const seen = (element) => {
+      const style = getComputedStyle(element);
+      const { width, height } = element.getBoundingClientRect();
+      return style.visibility !== 'hidden' && style.display !== 'none' && width > 0 && height > 0;
+    };
+    const name = (element) =>
+      `${element.tagName.toLowerCase()}${element.getAttribute('class') ? `.${element.getAttribute('class')}` : ''} "${(element.getAttribute('aria-label') ?? element.textContent ?? '').trim().slice(0, 40)}"`;
+    const plain = (box) => ({ left: box.left, top: box.top, right: box.right, bottom: box.bottom });
+    // What lies beyond the edge of a scrolling part can be reached: only what is in view is looked at.
+    const scrolls = (element) => {
+      for (let parent = element.parentElement; parent !== null; parent = parent.parentElement)
+        if (/auto|scroll/.test(getComputedStyle(parent).overflowY)) return true;
+      return false;
+    };
+    const problems = [];
+    const texts = [...document.querySelectorAll('main *')].filter(
+      (element) => seen(element) && [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim() !== ''),
+    );
+    for (const element of texts) {
+      if (element.closest('.hidden-text')) continue;
+      const box = element.getBoundingClientRect();
+      const isBeside = box.left < -0.5 || box.right > innerWidth + 0.5;
+      const isAbove = !scrolls(element) && (box.top < -0.5 || box.bottom > innerHeight + 0.5);
+      if (isBeside || isAbove) problems.push(`${name(element)} reaches beyond the window: ${JSON.stringify(plain(box))}`);
+      const { overflowX } = getComputedStyle(element);
+      if (overflowX === 'hidden' && element.scrollWidth > element.clientWidth + 1 && !element.matches('.summary'))
+        problems.push(`${name(element)} is cut: ${element.scrollWidth} px in ${element.clientWidth}`);
+    }
+    const footer = document.querySelector('footer');
+    if (footer !== null) {
+      const bar = footer.getBoundingClientRect();
+      for (const item of footer.querySelectorAll('.item')) {
+        if (!seen(item)) continue;
+        const box = item.getBoundingClientRect();
+        const isIn = box.top < bar.bottom - 1;
+        if (isIn && (box.left < bar.left - 0.5 || box.right > bar.right + 0.5 || box.bottom > bar.bottom + 0.5))
+          problems.push(`the status bar cuts ${name(item)}`);
+      }
+    }
+    // Numbers of the axis: a digit that the edge swallows makes 27.4 a 7.4.
+    for (const number of document.querySelectorAll('.axis svg text')) {
+      const box = number.getBoundingClientRect();
+      const edge = number.closest('svg').getBoundingClientRect();
+      if (box.left < edge.left - 0.5 || box.right > edge.right + 0.5) problems.push(`${name(number)} is cut by the axis`);
+    }
+    const parts = [
+      ...document.querySelectorAll('.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .card, .show'),
+    ].filter(seen);
+    for (const [i, a] of parts.entries())
+      for (const b of parts.slice(i + 1)) {
+        const [p, q] = [a.getBoundingClientRect(), b.getBoundingClientRect()];
+        const width = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+        const height = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+        if (width > 1 && height > 1) problems.push(`${name(a)} lies over ${name(b)}`);
+      }
+    const targets = [
+      ...document.querySelectorAll(
+        'button, summary, label:has(> input), input:not(label > input), [role="button"], [role="slider"]',
+      ),
+    ]
+      .filter((element) => seen(element) && !element.disabled)
+      .map((element) => ({ name: name(element), box: element.getBoundingClientRect() }))
+      .map(({ name: of, box }) => ({ name: of, width: box.width, height: box.height }));
+    return { problems, targets };
+  });
+}
+
+export function addLayoutTests(browser) {
+  for (const { width, height, touch } of SCREENS) {
+    test(`Nothing is cut and nothing lies over something else at ${width} x ${height}`, async () => {
+      const server = await startServer(['--demo']);
+      const context = await browser.newContext({
+        viewport: { width, height },
+        hasTouch: touch === true,
+        isMobile: touch === true,
+      });
+      const { page, problems } = await openClient(context, server.url, null);
+      await settled(page, 180_000);
+      const look = async (what) => {
+        const { problems: found, targets } = await boxes(page);
+        assert.deepEqual(found, [], what);
+        if (touch) {
+          const small = targets.filter((target) => target.width < 43.5 || target.height < 43.5);
+          assert.deepEqual(small, [], `${what}: smaller than a finger`);
+        }
+      };
+      await look('as it opens');
+      // A reading where a card has least room: at the leftmost and at the rightmost place that shows something.
+      for (const side of ['left', 'right']) {
+        const place = await page.evaluate(async (from) => {
+          const { width, height } = document.querySelector('canvas').getBoundingClientRect();
+          const columns = Array.from({ length: 40 }, (_, i) => ((i + 0.5) / 40) * width);
+          for (const x of from === 'left' ? columns : columns.reverse())
+            for (let y = height * 0.1; y < height; y += height / 16)
+              if (document.elementFromPoint(x, y)?.tagName === 'CANVAS' && (await globalThis.spectra.viewport.pick(x, y)))
+                return { x, y };
+          return null;
+        }, side);
+        assert.notEqual(place, null, 'nothing of the scene can be read');
+        await page.evaluate((at) => globalThis.spectra.pin(at), place);
+        await page.locator('.card').waitFor();
+        await look(`with a reading at the ${side}`);
+      }
+      for (const method of ['colour_mapped_threshold', 'thermal_highlighting', 'histogram_bin']) {
+        await page.evaluate((id) => globalThis.spectra.setMethod(id), method);
+        await settled(page, 180_000);
+        await look(method);
+      }
+      await screenshot(page, `layout-${width}x${height}`);
+      await page.evaluate(() => (globalThis.spectra.store.helpOpen = true));
+      await page.locator('dialog[open]').waitFor();
+      await look('with the help sheet');
+      await page.keyboard.press('Escape');
+      await page.getByLabel('Hide the controls').click();
+      await look('without controls');
+      await page.getByLabel('Show the controls').click();
+      await page.locator('aside.panel').waitFor();
+      assert.deepEqual(problems, []);
+      await context.close();
+      await server.stop();
+    });
+  }
+
+  test('One tab stop a group, arrow keys inside', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const stops = [];
+    await page.locator('canvas').focus();
+    for (let i = 0; i < 80; i += 1) {
+      await page.keyboard.press('Tab');
+      const stop = await page.evaluate(() => {
+        const element = document.activeElement;
+        if (element === document.body || element.tagName === 'CANVAS') return null;
+        const group = element.closest('[role="radiogroup"], [role="toolbar"]');
+        return { in: group?.getAttribute('aria-label') ?? group?.getAttribute('aria-labelledby') ?? null };
+      });
+      if (stop === null) break;
+      stops.push(stop.in);
+    }
+    const groups = stops.filter((group) => group !== null);
+    assert.equal(new Set(groups).size, groups.length, `a group has several tab stops: ${groups}`);
+    assert.ok(stops.length <= 32, `${stops.length} tab stops`);
+
+    const method = () => page.evaluate(() => globalThis.spectra.store.fusion.method);
+    const before = await method();
+    await page.locator(`[data-method="${before}"] input`).focus();
+    await page.keyboard.press('ArrowDown');
+    await page.waitForFunction((earlier) => globalThis.spectra.store.fusion.method !== earlier, before);
+    await page.locator('[data-end="+X"]').focus();
+    await page.keyboard.press('ArrowRight');
+    assert.equal(await page.evaluate(() => document.activeElement.dataset.end), '−X');
+    await page.close();
+    await server.stop();
+  });
+
+  test('Single keys can be switched off, and act on the scene even then', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const method = () => page.evaluate(() => globalThis.spectra.store.fusion.method);
+    await page.keyboard.press('?');
+    await page.locator('dialog[open]').waitFor();
+    assert.equal(await page.evaluate(() => document.querySelector('dialog').matches(':modal')), true);
+    await page.getByText('Single keys act').click();
+    await page.keyboard.press('Escape');
+    await page.locator('dialog').waitFor({ state: 'detached' });
+    await page.getByLabel('Collapse the panel').focus();
+    const before = await method();
+    await page.keyboard.press('1');
+    await page.waitForTimeout(200);
+    assert.equal(await method(), before);
+    await page.locator('canvas').focus();
+    await page.keyboard.press('1');
+    await page.waitForFunction(() => globalThis.spectra.store.fusion.method === 'thermal_only');
+    assert.equal(await page.locator('.aim').evaluate((mark) => getComputedStyle(mark).visibility), 'visible');
+    await page.keyboard.press('p');
+    await page.locator('.card').waitFor();
+    await page.close();
+    await server.stop();
+  });
+
+  test('Forced colours leave every number and every slider readable', async () => {
+    const server = await startServer(['--demo']);
+    const context = await browser.newContext({
+      viewport: { width: 1280, height: 720 },
+      forcedColors: 'active',
+      colorScheme: 'light',
+    });
+    const { page } = await openClient(context, server.url, null);
+    await settled(page);
+    const faults = await page.evaluate(() => {
+      const luminance = (colour) => {
+        const [r, g, b] = colour.match(/[\d.]+/g).map(Number);
+        const linear = (value) => (value / 255 <= 0.04045 ? value / 255 / 12.92 : ((value / 255 + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+      };
+      const contrast = (a, b) => {
+        const [low, high] = [luminance(a), luminance(b)].sort((x, y) => x - y);
+        return (high + 0.05) / (low + 0.05);
+      };
+      const ground = getComputedStyle(document.querySelector('.axis')).backgroundColor;
+      const found = [];
+      for (const text of document.querySelectorAll('.axis svg text')) {
+        const { fill } = getComputedStyle(text);
+        if (contrast(fill, ground) < 4.5) found.push(`${text.textContent}: ${fill} on ${ground}`);
+      }
+      return found;
+    });
+    assert.deepEqual(faults, []);
+    const image = await screenshot(page, 'forced-colours');
+    const slider = await page.locator('.panel input[type=range]').first().boundingBox();
+    const column = [];
+    for (let y = slider.y; y < slider.y + slider.height; y += 1) column.push(image.at(slider.x + slider.width * 0.9, y).join());
+    assert.ok(new Set(column).size > 1, 'the track of a slider cannot be seen');
+    await context.close();
+    await server.stop();
+  });
+}

@@ -1,0 +1,42 @@
+import { describe, expect, it } from 'vitest';
+import { cardPlace, isNarrow } from './layout';
+
+describe('isNarrow', () => {
+  it.each([
+    [360, 740, true],
+    [390, 844, true],
+    [820, 1180, true],
+    [1180, 820, false],
+    [1280, 720, false],
+    [3840, 2160, false],
+    [2160, 3840, false],
+    [640, 360, true],
+  ])('%i x %i: %s', (width, height, expected) => {
+    expect(isNarrow(width, height)).toBe(expected);
+  });
+});
+
+describe('cardPlace', () => {
+  const room = { left: 92, top: 0, right: 360, bottom: 400 };
+  const size = { width: 180, height: 50 };
+
+  it('stands right of the place and above it', () => {
+    expect(cardPlace({ x: 120, y: 200 }, size, room)).toEqual({ left: 134, top: 136 });
+  });
+
+  it('is within the room wherever the place is', () => {
+    for (let x = -50; x <= 450; x += 25) {
+      for (let y = -50; y <= 450; y += 25) {
+        const { left, top } = cardPlace({ x, y }, size, room);
+        expect(left).toBeGreaterThanOrEqual(room.left);
+        expect(left + size.width).toBeLessThanOrEqual(room.right);
+        expect(top).toBeGreaterThanOrEqual(room.top);
+        expect(top + size.height).toBeLessThanOrEqual(room.bottom);
+      }
+    }
+  });
+
+  it('begins at the left and the top of a room that is too small', () => {
+    expect(cardPlace({ x: 100, y: 10 }, { width: 400, height: 500 }, room)).toEqual({ left: 92, top: 0 });
+  });
+});

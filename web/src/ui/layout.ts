@@ -1,0 +1,36 @@
+/** Where the controls leave room, and how a card keeps within it. All in CSS pixels of the page. */
+
+export interface Box {
+  left: number;
+  top: number;
+  right: number;
+  bottom: number;
+}
+
+/** The panel becomes a sheet below the scene where it would leave too little beside it: phones, and tablets held upright. */
+export function isNarrow(width: number, height: number): boolean {
+  return width < 720 || (width < 1100 && height > width);
+}
+
+/**
+ * Left and top of a card of `size` beside a `place`: right of it and above, where that is within `room`, else mirrored, and in any
+ * case pushed inside.
+ */
+export function cardPlace(
+  place: { x: number; y: number },
+  size: { width: number; height: number },
+  room: Box,
+  gap = 14,
+): { left: number; top: number } {
+  const left = place.x + gap + size.width <= room.right ? place.x + gap : place.x - gap - size.width;
+  const top = place.y - gap - size.height >= room.top ? place.y - gap - size.height : place.y + gap;
+  return {
+    left: clamp(left, room.left, room.right - size.width),
+    top: clamp(top, room.top, room.bottom - size.height),
+  };
+}
+
+/** `low` wins where the two contradict each other. */
+function clamp(value: number, low: number, high: number): number {
+  return Math.max(low, Math.min(high, value));
+}
