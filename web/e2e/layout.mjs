@@ -143,7 +143,7 @@ export function addLayoutTests(browser) {
   test('One tab stop a group, arrow keys inside', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);
-    await settled(page);
+    await settled(page, 180_000);
     const stops = [];
     await page.locator('canvas').focus();
     for (let i = 0; i < 80; i += 1) {
@@ -176,7 +176,7 @@ export function addLayoutTests(browser) {
   test('Single keys can be switched off, and act on the scene even then', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);
-    await settled(page);
+    await settled(page, 180_000);
     const method = () => page.evaluate(() => globalThis.spectra.store.fusion.method);
     await page.keyboard.press('?');
     await page.locator('dialog[open]').waitFor();
@@ -207,7 +207,7 @@ export function addLayoutTests(browser) {
       colorScheme: 'light',
     });
     const { page } = await openClient(context, server.url, null);
-    await settled(page);
+    await settled(page, 180_000);
     const faults = await page.evaluate(() => {
       const luminance = (colour) => {
         const [r, g, b] = colour.match(/[\d.]+/g).map(Number);

@@ -12,6 +12,11 @@ export function isNarrow(width: number, height: number): boolean {
   return width < 720 || (width < 1100 && height > width);
 }
 
+/** How much larger the controls are on a screen of very many pixels; app.css has the same bound. */
+export function controlZoom(width: number): number {
+  return width >= 2800 ? 1.5 : 1;
+}
+
 /**
  * Left and top of a card of `size` beside a `place`: right of it and above, where that is within `room`, else mirrored, and in any
  * case pushed inside.
