@@ -30,7 +30,7 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
   'scene.unsubscribe.': (value) => value,
 };
 /** May be absent. */
-const optionalFields = new Set(['resumed_tiles']);
+const optionalFields = new Set(['resumed_tiles', 'core_bounds']);
 const fromServer = list('messages/', '.json').filter(
   (name) => !name.includes('.request.') && !name.startsWith('camera.set') && !name.startsWith('stream.ack'),
 );
