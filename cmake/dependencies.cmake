@@ -12,6 +12,7 @@ find_package(prometheus-cpp REQUIRED)  # 1.0; likewise
 find_package(fmt 9.1 REQUIRED)
 find_package(zstd 1.5 REQUIRED)
 find_package(TinyGLTF 2.7 REQUIRED)
+find_package(ZLIB 1.2 REQUIRED)
 if(SPECTRA_BUILD_TESTS)
   find_package(GTest 1.12 REQUIRED)
   find_package(rapidcheck REQUIRED)

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -28,7 +29,16 @@ Result<BlockFile> BlockFile::open(const std::filesystem::path& path) {
                    S_ISDIR(facts.st_mode) ? "is a folder, not a file" : "is not a regular file");
   }
   ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_SEQUENTIAL);
-  return BlockFile(descriptor, static_cast<std::uint64_t>(facts.st_size));
+  const auto size_bytes = static_cast<std::uint64_t>(facts.st_size);
+  std::array<unsigned char, 2> first_bytes{};
+  if (::pread(descriptor, first_bytes.data(), first_bytes.size(), 0) == static_cast<ssize_t>(first_bytes.size()) &&
+      GzipFile::is_gzip(first_bytes)) {
+    BOOST_OUTCOME_TRY(GzipFile gzip, GzipFile::open(descriptor, size_bytes));
+    BlockFile file(-1, gzip.unpacked_bytes());
+    file.gzip_ = std::move(gzip);
+    return file;
+  }
+  return BlockFile(descriptor, size_bytes);
 }
 
 BlockFile::BlockFile(int descriptor, std::uint64_t size_bytes)
@@ -46,6 +56,7 @@ BlockFile::BlockFile(BlockFile&& other) noexcept {
 
 BlockFile& BlockFile::operator=(BlockFile&& other) noexcept {
   std::swap(descriptor_, other.descriptor_);
+  std::swap(gzip_, other.gzip_);
   std::swap(size_bytes_, other.size_bytes_);
   std::swap(buffer_position_, other.buffer_position_);
   std::swap(begin_, other.begin_);
@@ -63,12 +74,22 @@ void BlockFile::fill() {
   begin_ = 0;
   while (end_ < buffer_.size() && buffer_position_ + end_ < size_bytes_) {
     const std::uint64_t wanted = std::min<std::uint64_t>(buffer_.size() - end_, size_bytes_ - buffer_position_ - end_);
-    const ssize_t count = ::pread(descriptor_, buffer_.data() + end_, static_cast<std::size_t>(wanted),
-                                  static_cast<off_t>(buffer_position_ + end_));
-    if (count < 0 && errno == EINTR) continue;
+    const auto count =
+        read_at(buffer_position_ + end_, std::span(buffer_).subspan(end_, static_cast<std::size_t>(wanted)));
     if (count < 0) read_error_ = errno;
     if (count <= 0) return;
     end_ += static_cast<std::size_t>(count);
+  }
+}
+
+std::ptrdiff_t BlockFile::read_at(std::uint64_t position, std::span<unsigned char> bytes) {
+  if (gzip_) {
+    errno = EIO;  // What zlib finds wrong on its second way through the file is no error of the system.
+    return gzip_->read(position, bytes);
+  }
+  for (;;) {
+    const ssize_t count = ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(position));
+    if (count >= 0 || errno != EINTR) return count;
   }
 }
 

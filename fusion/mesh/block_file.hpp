@@ -3,27 +3,30 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "fusion/error.hpp"
+#include "fusion/mesh/gzip_file.hpp"
 
 namespace spectra::fusion {
 
 /// Reads a regular file from front to back through one buffer of fixed size. A file that shrinks meanwhile only ends
-/// early (a mapped one would end the process).
+/// early (a mapped one would end the process). A gzip file is read as what it unpacks to.
 class BlockFile {
  public:
   /// The most that ready() can be asked for.
   static constexpr std::size_t kBufferBytes = std::size_t{512} * 1024;
 
-  /// FileNotFound, or FileUnreadable (also for what is not a regular file: its size would not bound anything).
+  /// FileNotFound, or FileUnreadable (also for what is not a regular file: its size would not bound anything), or the errors
+  /// of GzipFile::open().
   static Result<BlockFile> open(const std::filesystem::path& path);
   ~BlockFile();
   BlockFile(BlockFile&& other) noexcept;
   BlockFile& operator=(BlockFile&& other) noexcept;
 
-  /// As it was when the file was opened.
+  /// As it was when the file was opened; unpacked.
   std::uint64_t size_bytes() const { return size_bytes_; }
   /// Of the next byte that was not consumed.
   std::uint64_t position() const { return buffer_position_ + begin_; }
@@ -48,8 +51,10 @@ class BlockFile {
  private:
   BlockFile(int descriptor, std::uint64_t size_bytes);
   void fill();
+  std::ptrdiff_t read_at(std::uint64_t position, std::span<unsigned char> bytes);
 
-  int descriptor_ = -1;
+  int descriptor_ = -1;  ///< Not open when the file is gzip's.
+  std::optional<GzipFile> gzip_;
   std::uint64_t size_bytes_ = 0;
   std::uint64_t buffer_position_ = 0;  ///< Where in the file the buffer begins.
   std::size_t begin_ = 0;

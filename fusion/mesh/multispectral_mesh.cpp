@@ -8,12 +8,6 @@
 
 namespace spectra::fusion {
 
-namespace {
-
-constexpr Rgb8 kMidGrey{128, 128, 128};
-
-}  // namespace
-
 struct MultispectralMesh::Storage {
   MeshKernel kernel;
   OpenMesh::VPropHandleT<Rgb8> visible;
@@ -43,7 +37,7 @@ void MultispectralMesh::resize_vertices(std::size_t count) {
   const auto old_count = static_cast<std::ptrdiff_t>(std::min(vertex_count(), count));
   storage_->kernel.resize(count, 0, 0);
   auto& colours = storage_->visible_colours();
-  std::fill(colours.begin() + old_count, colours.end(), kMidGrey);
+  std::fill(colours.begin() + old_count, colours.end(), kNoColour);
   auto& temperatures = storage_->temperatures();
   std::fill(temperatures.begin() + old_count, temperatures.end(), std::numeric_limits<float>::quiet_NaN());
 }

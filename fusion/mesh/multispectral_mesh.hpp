@@ -10,12 +10,24 @@
 
 namespace spectra::fusion {
 
+/// A vertex of the input without a finite position: no part of the scene, but kept for an output that has the input's
+/// vertices in their order.
+struct LeftOutVertex {
+  std::uint32_t input_index = 0;
+  Vec3d position;  ///< As it was.
+  Rgb8 visible;
+  float temperature_celsius = 0;
+};
+
 /// A scene in memory: per vertex a position, a visible colour and a temperature, and triangles (none: a point cloud).
 /// The vertex data live in the property arrays of an OpenMesh mesh, in the order of the input, and are seen here as
 /// flat spans; half-edge connectivity is built only when topology() is asked for, because serving does not need it.
 /// Movable, not copyable. Not thread-safe while it is changed.
 class MultispectralMesh {
  public:
+  /// The visible colour where there is none.
+  static constexpr Rgb8 kNoColour{128, 128, 128};
+
   MultispectralMesh();
   ~MultispectralMesh();
   MultispectralMesh(MultispectralMesh&&) noexcept;
@@ -42,10 +54,11 @@ class MultispectralMesh {
 
   /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM loses nothing).
   Vec3d origin;
-  bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
-  bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.
-  bool double_positions = false;  ///< The input had double positions; output keeps them.
-  std::string name;               ///< For people: the file's name without folder, or "demo".
+  std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
+  bool has_visible = false;             ///< The input had colours; otherwise visible() is mid grey.
+  bool has_temperature = false;         ///< The input had a temperature property, or a thermal file was joined.
+  bool double_positions = false;        ///< The input had double positions; output keeps them.
+  std::string name;                     ///< For people: the file's name without folder, or "demo".
 
  private:
   struct Storage;

@@ -55,27 +55,34 @@ Result<void> PlyEncoder::vertices(std::span<const Vec3f> positions, std::span<co
                                                 std::to_string(temperature_celsius.size()) + " temperatures");
   }
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (buffer_.size() - size_ < kMaxEntryBytes) {
-      BOOST_OUTCOME_TRY(flush());
-    }
-    const double x = layout_.origin.x + static_cast<double>(positions[i].x);
-    const double y = layout_.origin.y + static_cast<double>(positions[i].y);
-    const double z = layout_.origin.z + static_cast<double>(positions[i].z);
-    if (layout_.double_positions) {
-      put(x);
-      put(y);
-      put(z);
-    } else {
-      put(static_cast<float>(x));
-      put(static_cast<float>(y));
-      put(static_cast<float>(z));
-    }
-    put(colours[i].r);
-    put(colours[i].g);
-    put(colours[i].b);
-    if (layout_.has_temperature) put(temperature_celsius[i]);
+    const Vec3d position = {layout_.origin.x + static_cast<double>(positions[i].x),
+                            layout_.origin.y + static_cast<double>(positions[i].y),
+                            layout_.origin.z + static_cast<double>(positions[i].z)};
+    BOOST_OUTCOME_TRY(vertex(position, colours[i], layout_.has_temperature ? temperature_celsius[i] : 0));
   }
-  vertices_done_ += positions.size();
+  return success();
+}
+
+Result<void> PlyEncoder::left_out_vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius) {
+  return vertex(position, colour, temperature_celsius);
+}
+
+inline Result<void> PlyEncoder::vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius) {
+  if (buffer_.size() - size_ < kMaxEntryBytes) {
+    BOOST_OUTCOME_TRY(flush());
+  }
+  for (const double coordinate : {position.x, position.y, position.z}) {
+    if (layout_.double_positions) {
+      put(coordinate);
+    } else {
+      put(static_cast<float>(coordinate));
+    }
+  }
+  put(colour.r);
+  put(colour.g);
+  put(colour.b);
+  if (layout_.has_temperature) put(temperature_celsius);
+  ++vertices_done_;
   return success();
 }
 

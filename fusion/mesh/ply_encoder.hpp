@@ -32,11 +32,14 @@ class PlyEncoder {
   /// read when the layout has one; the spans have the same length.
   Result<void> vertices(std::span<const Vec3f> positions, std::span<const Rgb8> colours,
                         std::span<const float> temperature_celsius);
+  /// One vertex more, whose position is written as it is: it may be no finite one.
+  Result<void> left_out_vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius);
   Result<void> triangles(std::span<const Triangle> triangles);
   /// Hands on what is still buffered. Inconsistent when there were not as many vertices and triangles as was said.
   Result<void> finish();
 
  private:
+  Result<void> vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius);
   Result<void> flush();
   template <class T>
   void put(T value);

@@ -21,12 +21,37 @@ struct FirstPass {
   TemperatureSummary temperature;
 };
 
+/// Calls `use` with the parts of a block that are no holes, as the first index and the number of vertices, and `use_hole`
+/// with every hole between them.
+template <class Use, class UseHole>
+Result<void> for_each_part(const PlyVertexBlock& block, Use&& use, UseHole&& use_hole) {
+  std::size_t begin = 0;
+  for (const std::uint32_t hole : block.left_out) {
+    BOOST_OUTCOME_TRY(use(begin, hole - begin));
+    BOOST_OUTCOME_TRY(use_hole(hole));
+    begin = hole + 1;
+  }
+  return use(begin, block.positions.size() - begin);
+}
+
+/// Calls `use` with the temperatures of the block's vertices that are not left out.
+template <class Use>
+Result<void> for_each_temperature(const PlyVertexBlock& block, Use&& use) {
+  if (block.temperature_celsius.empty()) return success();
+  return for_each_part(
+      block,
+      [&](std::size_t begin, std::size_t count) -> Result<void> {
+        use(block.temperature_celsius.subspan(begin, count));
+        return success();
+      },
+      [](std::uint32_t) -> Result<void> { return success(); });
+}
+
 Result<FirstPass> first_pass(PlyStream& stream) {
   TemperatureAccumulator temperatures;
   PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
-    temperatures.add(block.temperature_celsius);
-    return success();
+  handlers.vertices = [&](const PlyVertexBlock& block) {
+    return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures.add(celsius); });
   };
   BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
   return FirstPass{facts, temperatures.summary()};
@@ -40,9 +65,8 @@ Histogram file_histogram(PlyStream& stream, const TemperatureSummary& summary, s
   histogram.maximum = summary.maximum;
   histogram.counts.resize(bins);
   PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
-    add_to_histogram(block.temperature_celsius, histogram);
-    return success();
+  handlers.vertices = [&](const PlyVertexBlock& block) {
+    return for_each_temperature(block, [&](std::span<const float> celsius) { add_to_histogram(celsius, histogram); });
   };
   if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
   return histogram;
@@ -53,7 +77,7 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
                             PlyEncoder::Sink sink) {
   PlyLayout layout;
   layout.vertex_count = stream.vertex_count();
-  layout.triangle_count = facts.triangle_count;
+  layout.triangle_count = facts.faces.triangle_count;
   layout.origin = scene_origin(facts.min, facts.max);
   layout.double_positions = stream.has_double_positions();
   layout.has_temperature = stream.has_temperature();
@@ -72,16 +96,20 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
     std::copy(block.temperature_celsius.begin(), block.temperature_celsius.end(),
               block_mesh.temperature_celsius().begin());
     plan.fuse(block_mesh.temperature_celsius(), block_mesh.visible(), fused);
-    return encoder.vertices(block_mesh.positions(), fused, block_mesh.temperature_celsius());
+    return for_each_part(
+        block,
+        [&](std::size_t begin, std::size_t part_count) {
+          return encoder.vertices(block_mesh.positions().subspan(begin, part_count),
+                                  std::span(fused).subspan(begin, part_count),
+                                  block_mesh.temperature_celsius().subspan(begin, part_count));
+        },
+        [&](std::uint32_t hole) {
+          return encoder.left_out_vertex(block.positions[hole], block_mesh.visible()[hole],
+                                         block_mesh.temperature_celsius()[hole]);
+        });
   };
   handlers.triangles = [&](std::span<const Triangle> triangles) { return encoder.triangles(triangles); };
-  if (!stream.has_faces_first()) {
-    BOOST_OUTCOME_TRY(stream.read(handlers));
-  } else {
-    // The output has the vertices first.
-    BOOST_OUTCOME_TRY(stream.read({handlers.vertices, {}}));
-    BOOST_OUTCOME_TRY(stream.read({{}, handlers.triangles}));
-  }
+  BOOST_OUTCOME_TRY(stream.read(handlers));
   return encoder.finish();
 }
 
@@ -102,7 +130,7 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
   BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(),
                                    [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
   BOOST_OUTCOME_TRY(file.commit());
-  return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.triangle_count,
+  return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.faces.triangle_count,
                    stream.notes(pass.facts)};
 }
 

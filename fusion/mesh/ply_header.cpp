@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <optional>
 #include <set>
 #include <utility>
+
+#include "fusion/mesh/file_kind.hpp"
 
 namespace spectra::fusion {
 
@@ -16,38 +19,26 @@ struct TypeName {
   PlyScalar type;
 };
 
-constexpr std::array<TypeName, 16> kTypeNames = {{{"char", PlyScalar::Int8},
-                                                  {"uchar", PlyScalar::UInt8},
-                                                  {"short", PlyScalar::Int16},
-                                                  {"ushort", PlyScalar::UInt16},
-                                                  {"int", PlyScalar::Int32},
-                                                  {"uint", PlyScalar::UInt32},
-                                                  {"float", PlyScalar::Float32},
-                                                  {"double", PlyScalar::Float64},
-                                                  {"int8", PlyScalar::Int8},
-                                                  {"uint8", PlyScalar::UInt8},
-                                                  {"int16", PlyScalar::Int16},
-                                                  {"uint16", PlyScalar::UInt16},
-                                                  {"int32", PlyScalar::Int32},
-                                                  {"uint32", PlyScalar::UInt32},
-                                                  {"float32", PlyScalar::Float32},
-                                                  {"float64", PlyScalar::Float64}}};
+constexpr std::array<TypeName, 22> kTypeNames = {
+    {{"char", PlyScalar::Int8},       {"uchar", PlyScalar::UInt8},    {"short", PlyScalar::Int16},
+     {"ushort", PlyScalar::UInt16},   {"int", PlyScalar::Int32},      {"uint", PlyScalar::UInt32},
+     {"float", PlyScalar::Float32},   {"double", PlyScalar::Float64}, {"int8", PlyScalar::Int8},
+     {"uint8", PlyScalar::UInt8},     {"int16", PlyScalar::Int16},    {"uint16", PlyScalar::UInt16},
+     {"int32", PlyScalar::Int32},     {"uint32", PlyScalar::UInt32},  {"float32", PlyScalar::Float32},
+     {"float64", PlyScalar::Float64}, {"int64", PlyScalar::Int64},    {"uint64", PlyScalar::UInt64},
+     {"long", PlyScalar::Int64},      {"ulong", PlyScalar::UInt64},   {"longlong", PlyScalar::Int64},
+     {"ulonglong", PlyScalar::UInt64}}};
 
-std::optional<PlyScalar> scalar_type(std::string_view name) {
+std::optional<PlyScalar> scalar_type(std::string_view word) {
+  const std::string name = lower_case(word);
   for (const TypeName& entry : kTypeNames) {
     if (entry.name == name) return entry.type;
   }
   return std::nullopt;
 }
 
-/// For messages: what a hostile file says must not flood or garble a terminal.
 std::string quoted(std::string_view text) {
-  constexpr std::size_t kMaxShown = 40;
-  std::string shown = "'";
-  for (const char c : text.substr(0, kMaxShown)) shown += c >= ' ' && c <= '~' ? c : '?';
-  if (text.size() > kMaxShown) shown += "...";
-  shown += '\'';
-  return shown;
+  return "'" + printable(text) + "'";
 }
 
 std::vector<std::string_view> words_of(std::string_view line) {
@@ -67,19 +58,18 @@ class HeaderParser {
 
   Result<PlyHeader> parse() {
     if (text_.empty()) return failure(ErrorCode::BadHeader, "the file is empty");
+    BOOST_OUTCOME_TRY(read_first_line());
     std::string_view line;
-    if (text_.substr(0, 3) != "ply" || !next_line(line) || line != "ply") {
-      return failure(ErrorCode::BadHeader, "not a PLY file: the first line is not 'ply'");
-    }
     while (next_line(line)) {
       const std::vector<std::string_view> words = words_of(line);
       if (words.empty()) continue;
-      if (words[0] == "comment" || words[0] == "obj_info") {
+      const std::string keyword = lower_case(words[0]);
+      if (keyword == "comment" || keyword == "obj_info") {
         header_.comments.emplace_back(line);
         continue;
       }
-      if (words[0] == "end_header") return finished();
-      BOOST_OUTCOME_TRY(read_line(words));
+      if (keyword == "end_header") return finished();
+      BOOST_OUTCOME_TRY(read_line(keyword, words));
     }
     if (text_.size() >= kMaxPlyHeaderBytes) {
       return failure(ErrorCode::BadHeader,
@@ -89,11 +79,30 @@ class HeaderParser {
   }
 
  private:
+  /// Passes over what editors put before the word, and finds out how lines end.
+  Result<void> read_first_line() {
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (text_.substr(0, kByteOrderMark.size()) == kByteOrderMark) position_ = kByteOrderMark.size();
+    const std::size_t begin = text_.find_first_not_of(" \t\r\n", position_);
+    const std::size_t end = begin == std::string_view::npos ? begin : text_.find_first_of("\r\n", begin);
+    if (end != std::string_view::npos) {
+      const std::size_t after = text_.find_first_not_of('\r', end);
+      line_end_ = text_[end] == '\n' || (after != std::string_view::npos && text_[after] == '\n') ? '\n' : '\r';
+    }
+    std::string_view line;
+    std::vector<std::string_view> words;
+    while (words.empty() && next_line(line)) words = words_of(line);
+    if (words.size() == 1 && lower_case(words[0]) == "ply") return success();
+    const std::string_view kind = file_kind(text_);
+    return failure(ErrorCode::BadHeader, kind.empty() ? "not a PLY file: the first line is not 'ply'"
+                                                      : "not a PLY file, but " + std::string(kind));
+  }
+
   bool next_line(std::string_view& line) {
-    const std::size_t end = text_.find('\n', position_);
+    const std::size_t end = text_.find(line_end_, position_);
     if (end == std::string_view::npos) return false;
     line = text_.substr(position_, end - position_);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    while (!line.empty() && line.back() == '\r') line.remove_suffix(1);
     position_ = end + 1;
     ++line_number_;
     return true;
@@ -103,21 +112,22 @@ class HeaderParser {
     return failure(code, "header line " + std::to_string(line_number_) + ": " + what);
   }
 
-  Result<void> read_line(const std::vector<std::string_view>& words) {
-    if (words[0] == "format") return read_format(words);
-    if (words[0] == "element") return read_element(words);
-    if (words[0] == "property") return read_property(words);
+  Result<void> read_line(const std::string& keyword, const std::vector<std::string_view>& words) {
+    if (keyword == "format") return read_format(words);
+    if (keyword == "element") return read_element(words);
+    if (keyword == "property") return read_property(words);
     return bad(ErrorCode::BadHeader, "unknown keyword " + quoted(words[0]));
   }
 
   Result<void> read_format(const std::vector<std::string_view>& words) {
     if (has_format_) return bad(ErrorCode::BadHeader, "a second format line");
     if (words.size() != 3) return bad(ErrorCode::BadHeader, "a format line has a name and a version");
-    if (words[1] == "ascii") {
+    const std::string format = lower_case(words[1]);
+    if (format == "ascii") {
       header_.format = PlyFormat::Ascii;
-    } else if (words[1] == "binary_little_endian") {
+    } else if (format == "binary_little_endian") {
       header_.format = PlyFormat::BinaryLittleEndian;
-    } else if (words[1] == "binary_big_endian") {
+    } else if (format == "binary_big_endian") {
       header_.format = PlyFormat::BinaryBigEndian;
     } else {
       return bad(ErrorCode::Unsupported, "unknown format " + quoted(words[1]));
@@ -150,7 +160,7 @@ class HeaderParser {
   Result<void> read_property(const std::vector<std::string_view>& words) {
     if (header_.elements.empty()) return bad(ErrorCode::BadHeader, "a property before any element");
     PlyProperty property;
-    property.is_list = words.size() > 1 && words[1] == "list";
+    property.is_list = words.size() > 1 && lower_case(words[1]) == "list";
     const std::size_t word_count = property.is_list ? 5 : 3;
     if (words.size() != word_count) {
       return bad(ErrorCode::BadHeader,
@@ -180,11 +190,13 @@ class HeaderParser {
   Result<PlyHeader> finished() {
     if (!has_format_) return failure(ErrorCode::BadHeader, "the header has no format line");
     header_.size_bytes = position_;
+    header_.line_count = line_number_;
     return std::move(header_);
   }
 
   std::string_view text_;
   std::size_t position_ = 0;
+  char line_end_ = '\n';
   std::uint64_t line_number_ = 0;
   bool has_format_ = false;
   std::set<std::string> element_names_;
@@ -193,6 +205,20 @@ class HeaderParser {
 };
 
 }  // namespace
+
+std::string lower_case(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return result;
+}
+
+std::string printable(std::string_view name) {
+  constexpr std::size_t kMaxShown = 40;
+  std::string shown;
+  for (const char c : name.substr(0, kMaxShown)) shown += c >= ' ' && c <= '~' ? c : '?';
+  if (name.size() > kMaxShown) shown += "...";
+  return shown;
+}
 
 std::size_t size_bytes(PlyScalar type) {
   switch (type) {
@@ -206,6 +232,8 @@ std::size_t size_bytes(PlyScalar type) {
     case PlyScalar::UInt32:
     case PlyScalar::Float32:
       return 4;
+    case PlyScalar::Int64:
+    case PlyScalar::UInt64:
     case PlyScalar::Float64:
       return 8;
   }
@@ -223,8 +251,9 @@ std::string_view to_string(PlyScalar type) {
 }
 
 const PlyElement* PlyHeader::find(std::string_view name) const {
-  const auto found = std::find_if(elements.begin(), elements.end(),
-                                  [name](const PlyElement& element) { return element.name == name; });
+  const auto found = std::find_if(
+      elements.begin(), elements.end(),
+      [wanted = lower_case(name)](const PlyElement& element) { return lower_case(element.name) == wanted; });
   return found == elements.end() ? nullptr : &*found;
 }
 

@@ -12,7 +12,7 @@ namespace spectra::fusion {
 
 enum class PlyFormat { Ascii, BinaryLittleEndian, BinaryBigEndian };
 
-enum class PlyScalar : std::uint8_t { Int8, UInt8, Int16, UInt16, Int32, UInt32, Float32, Float64 };
+enum class PlyScalar : std::uint8_t { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
 
 /// Bytes of one value in a binary file.
 std::size_t size_bytes(PlyScalar type);
@@ -39,8 +39,9 @@ struct PlyHeader {
   std::vector<PlyElement> elements;   ///< In the order of the body; names are unique, as are properties in each.
   std::vector<std::string> comments;  ///< The lines "comment ..." and "obj_info ...", whole, in order.
   std::uint64_t size_bytes = 0;       ///< The body begins here.
+  std::uint64_t line_count = 0;
 
-  /// The element of that name, or nullptr.
+  /// The element of that name, in any case, or nullptr.
   const PlyElement* find(std::string_view name) const;
 };
 
@@ -48,8 +49,15 @@ struct PlyHeader {
 inline constexpr std::size_t kMaxPlyHeaderBytes = std::size_t{256} * 1024;
 
 /// Reads a header from the first bytes of a file, which must be at least kMaxPlyHeaderBytes of it or all there is.
-/// Lines may end in LF or CR LF. Safe on untrusted input; BadHeader and Unsupported name the line.
+/// Lines may end in LF, CR LF or CR; a byte order mark, blanks and empty lines are passed over, and keywords and types are
+/// known in any case. What is no PLY file is called by its own name where that is known. Safe on untrusted input; BadHeader and Unsupported name the line.
 Result<PlyHeader> parse_ply_header(std::string_view text);
+
+/// A word in lower case; ASCII only.
+std::string lower_case(std::string_view text);
+
+/// A name from a file for a message: short, and without anything that a terminal would obey.
+std::string printable(std::string_view name);
 
 /// The fewest bytes that the element's entries can take in the body, each; for ascii with its separators.
 std::uint64_t minimum_entry_bytes(const PlyElement& element, PlyFormat format);

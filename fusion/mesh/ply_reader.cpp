@@ -21,27 +21,43 @@ struct ThermalVertices {
   std::vector<Note> notes;
 };
 
+bool is_about_temperature(const Note& note) {
+  return note.id.ends_with("_temperatures") || note.id == "no_temperature" || note.id == "temperature_property";
+}
+
 Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path, const ReadOptions& options) {
   BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path, options));
   const std::string name = path.filename().string();
   if (!stream.has_temperature()) {
-    return failure(ErrorCode::Unsupported, name + ": the thermal file has no temperature property", name);
+    return failure(
+        ErrorCode::Unsupported,
+        name + ": the thermal file has no property that says temperature; --temperature-property NAME takes another",
+        name);
   }
   ThermalVertices thermal;
   thermal.positions.reserve(static_cast<std::size_t>(stream.vertex_count()));
   thermal.temperature_celsius.reserve(static_cast<std::size_t>(stream.vertex_count()));
   PlyHandlers handlers;
   handlers.vertices = [&thermal](const PlyVertexBlock& block) -> Result<void> {
-    thermal.positions.insert(thermal.positions.end(), block.positions.begin(), block.positions.end());
-    thermal.temperature_celsius.insert(thermal.temperature_celsius.end(), block.temperature_celsius.begin(),
-                                       block.temperature_celsius.end());
+    auto hole = block.left_out.begin();
+    for (std::size_t i = 0; i < block.positions.size(); ++i) {
+      if (hole != block.left_out.end() && *hole == i) {
+        ++hole;
+        continue;
+      }
+      thermal.positions.push_back(block.positions[i]);
+      thermal.temperature_celsius.push_back(block.temperature_celsius[i]);
+    }
     return success();
   };
   BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
   for (Note& note : stream.notes(facts)) {
     // Its faces and colours are not asked for, and the gaps are counted again after the join.
-    const bool is_about_temperature = note.id.ends_with("_temperatures") && note.id != "missing_temperatures";
-    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && !is_about_temperature) continue;
+    const bool is_asked_for = is_about_temperature(note) && note.id != "missing_temperatures";
+    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && note.id != "left_out_vertices" &&
+        !is_asked_for) {
+      continue;
+    }
     thermal.notes.push_back({"thermal_" + note.id, note.count, name + ": " + note.message});
   }
   return thermal;
@@ -110,6 +126,31 @@ void join_nearest(const ThermalVertices& thermal, double join_distance_m, Loaded
   }
 }
 
+LeftOutVertex left_out_vertex(const PlyVertexBlock& block, std::uint32_t index) {
+  LeftOutVertex vertex;
+  vertex.input_index = static_cast<std::uint32_t>(block.first_vertex) + index;
+  vertex.position = block.positions[index];
+  vertex.visible = block.visible.empty() ? MultispectralMesh::kNoColour : block.visible[index];
+  vertex.temperature_celsius =
+      block.temperature_celsius.empty() ? std::numeric_limits<float>::quiet_NaN() : block.temperature_celsius[index];
+  return vertex;
+}
+
+/// Where the vertices of the file are in the mesh, which still has room for all of them.
+std::vector<std::uint32_t> mesh_indices(const MultispectralMesh& mesh) {
+  std::vector<std::uint32_t> indices(mesh.vertex_count());
+  std::uint32_t next = 0;
+  auto hole = mesh.left_out.begin();
+  for (std::uint32_t v = 0; v < indices.size(); ++v) {
+    if (hole != mesh.left_out.end() && hole->input_index == v) {
+      ++hole;
+    } else {
+      indices[v] = next++;
+    }
+  }
+  return indices;
+}
+
 }  // namespace
 
 Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options) {
@@ -127,25 +168,51 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
   // scaled.
   const bool is_exact = mesh.double_positions || options.metres_per_unit != 1;
   std::vector<Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
-  PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
-    const auto first = static_cast<std::ptrdiff_t>(block.first_vertex);
+  std::size_t kept_count = 0;
+  const auto keep = [&](const PlyVertexBlock& block, std::size_t begin, std::size_t end) {
+    const auto positions = block.positions.subspan(begin, end - begin);
+    const auto out = static_cast<std::ptrdiff_t>(kept_count);
     if (is_exact) {
-      std::copy(block.positions.begin(), block.positions.end(), exact_positions.begin() + first);
+      std::copy(positions.begin(), positions.end(), exact_positions.begin() + out);
     } else {
-      std::transform(block.positions.begin(), block.positions.end(), mesh.positions().begin() + first,
+      std::transform(positions.begin(), positions.end(), mesh.positions().begin() + out,
                      [](const Vec3d& position) { return relative_to({}, position); });
     }
-    std::copy(block.visible.begin(), block.visible.end(), mesh.visible().begin() + first);
-    std::copy(block.temperature_celsius.begin(), block.temperature_celsius.end(),
-              mesh.temperature_celsius().begin() + first);
+    if (!block.visible.empty()) {
+      const auto visible = block.visible.subspan(begin, end - begin);
+      std::copy(visible.begin(), visible.end(), mesh.visible().begin() + out);
+    }
+    if (!block.temperature_celsius.empty()) {
+      const auto temperatures = block.temperature_celsius.subspan(begin, end - begin);
+      std::copy(temperatures.begin(), temperatures.end(), mesh.temperature_celsius().begin() + out);
+    }
+    kept_count += end - begin;
+  };
+  std::vector<std::uint32_t> mesh_index;  // By the file's index, when that is not the same.
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    std::size_t begin = 0;
+    for (const std::uint32_t hole : block.left_out) {
+      keep(block, begin, hole);
+      mesh.left_out.push_back(left_out_vertex(block, hole));
+      begin = hole + 1;
+    }
+    keep(block, begin, block.positions.size());
     return success();
   };
   handlers.triangles = [&](std::span<const Triangle> triangles) -> Result<void> {
+    if (!mesh.left_out.empty() && mesh_index.empty()) mesh_index = mesh_indices(mesh);
     mesh.triangles().insert(mesh.triangles().end(), triangles.begin(), triangles.end());
+    if (!mesh_index.empty()) {
+      for (Triangle& triangle : std::span(mesh.triangles()).last(triangles.size())) {
+        for (std::uint32_t& corner : triangle) corner = mesh_index[corner];
+      }
+    }
     return success();
   };
   BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
+  if (kept_count < mesh.vertex_count()) mesh.resize_vertices(kept_count);
+  exact_positions.resize(is_exact ? kept_count : 0);
 
   mesh.origin = scene_origin(facts.min, facts.max);
   if (is_exact) {
@@ -172,7 +239,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
   visible_options.metres_per_unit = options.metres_per_unit;
   BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, visible_options));
   // What stands in for them is told of below.
-  std::erase_if(scene.notes, [](const Note& note) { return note.id.ends_with("_temperatures"); });
+  std::erase_if(scene.notes, [](const Note& note) { return is_about_temperature(note); });
   if (scene.mesh.has_temperature) {
     scene.notes.push_back({"replaced_temperatures", scene.mesh.vertex_count(),
                            "The file's own temperatures replaced by those of the thermal file"});

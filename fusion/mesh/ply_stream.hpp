@@ -1,19 +1,21 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/block_file.hpp"
+#include "fusion/mesh/ply_face_reader.hpp"
 #include "fusion/mesh/ply_header.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/mesh/ply_schema.hpp"
+#include "fusion/mesh/ply_survey.hpp"
 #include "fusion/mesh/read_options.hpp"
+#include "fusion/mesh/vertex_colour.hpp"
 #include "fusion/mesh/vertex_temperature.hpp"
 #include "fusion/vertex_types.hpp"
 
@@ -22,50 +24,61 @@ namespace spectra::fusion {
 /// Some vertices in the file's order. The spans are valid during the call only.
 struct PlyVertexBlock {
   std::uint64_t first_vertex = 0;
-  std::span<const Vec3d> positions;            ///< Metres; finite, within the range of float.
+  std::span<const Vec3d> positions;            ///< Metres; finite, within the range of float, but for those left out.
   std::span<const Rgb8> visible;               ///< Empty when the file has no colours.
   std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
+  /// Those without a position, by their index in the block, rising: to be left out of the scene. No triangle has them.
+  std::span<const std::uint32_t> left_out;
 };
 
-/// Who gets the body of a file. A handler that fails ends the reading with its error; an empty one is not called.
+/// Who gets the body of a file: all vertices, then all triangles. A handler that fails ends the reading with its error; an
+/// empty one is not called.
 struct PlyHandlers {
   std::function<Result<void>(const PlyVertexBlock&)> vertices;
-  /// Triangles as they will be drawn: polygons cut into fans, indices checked, none with a vertex twice.
+  /// Triangles as they will be drawn: polygons cut into fans, strips into triangles, indices checked and of the file's
+  /// order, none with a vertex twice or one that is left out.
   std::function<Result<void>(std::span<const Triangle>)> triangles;
 };
 
 /// What was found in the body.
 struct PlyBodyFacts {
-  Vec3d min, max;                               ///< Of all positions.
-  std::uint64_t triangle_count = 0;             ///< That were handed on.
-  std::uint64_t polygon_count = 0;              ///< Faces of more than three corners, cut into fans.
-  std::uint64_t degenerate_triangle_count = 0;  ///< Left out: a vertex twice.
-  std::uint64_t incomplete_face_count = 0;      ///< Left out: fewer than three corners.
-  std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
+  Vec3d min, max;  ///< Of all positions.
+  FaceFacts faces;
   TemperatureFacts temperature;
-  std::uint64_t trailing_byte_count = 0;  ///< After the last element; white space does not count in ascii.
+  std::uint64_t left_out_vertex_count = 0;      ///< Without a finite position within the range of float.
+  std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
+  std::uint64_t clamped_colour_count = 0;       ///< Vertices whose colour was out of range or no number.
+  std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
 };
 
-/// A PLY file that is read in blocks, in constant memory but for one bit a vertex: the ground of read_ply(), and the way
-/// to work on files larger than memory. Safe on untrusted input. What is accepted, and what colours and temperatures are
-/// recognised, is told at read_ply().
+/// How the values of a file are taken.
+struct PlyInterpretation {
+  explicit PlyInterpretation(const ReadOptions& options)
+      : temperature(options), metres_per_unit(options.metres_per_unit) {}
+
+  PlySchema schema;
+  PlySurvey survey;
+  ColourConversion colours;  ///< Of the vertices.
+  TemperatureConversion temperature;
+  double metres_per_unit;
+};
+
+/// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the
+/// ground of read_ply(), and the way to work on files larger than memory. Safe on untrusted input. What is accepted, and what
+/// colours and temperatures are recognised, is told at read_ply().
 class PlyStream {
  public:
-  /// Opens the file and judges its header against its size.
+  /// Opens the file, judges its header against its size, and looks at its values where their meaning depends on them.
   static Result<PlyStream> open(const std::filesystem::path& path, const ReadOptions& options = {});
 
   const PlyHeader& header() const { return header_; }
-  std::uint64_t vertex_count() const { return vertex_count_; }
-  /// Faces in the file, of any number of corners.
-  std::uint64_t face_count() const { return face_count_; }
+  std::uint64_t vertex_count() const { return vertices().count; }
   /// More triangles than this the bytes of the file cannot hold, if all faces are triangles.
   std::uint64_t triangle_count_limit() const;
-  bool has_visible() const { return slot_properties_[kRed].has_value(); }
-  bool has_temperature() const { return slot_properties_[kTemperature].has_value(); }
-  /// The faces stand before the vertices in the file, and are handed on in that order.
-  bool has_faces_first() const;
-  /// Some coordinate is a double in the file.
-  bool has_double_positions() const { return has_double_positions_; }
+  bool has_visible() const;
+  bool has_temperature() const;
+  /// Some coordinate has a type that a float cannot hold.
+  bool has_double_positions() const;
 
   /// Reads the whole body from its beginning; may be called again.
   Result<PlyBodyFacts> read(const PlyHandlers& handlers);
@@ -74,27 +87,18 @@ class PlyStream {
   std::vector<Note> notes(const PlyBodyFacts& facts) const;
 
  private:
-  /// What a vertex property means to us.
-  enum Slot : std::size_t { kX, kY, kZ, kRed, kGreen, kBlue, kTemperature, kSlotCount };
-  friend class PlyBodyReader;
-
   PlyStream(BlockFile file, std::string name, ReadOptions options)
-      : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)) {}
-  Result<void> interpret_header();
-  Result<void> interpret_vertex_properties(const PlyElement& element);
-  Result<void> find_temperature(const PlyElement& element);
+      : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)), interpretation_(options_) {}
+  Result<void> interpret();
   Result<void> check_size() const;
+  Result<PlyBodyFacts> with_reason(Result<PlyBodyFacts> facts);
+  const PlyElement& vertices() const { return *header_.find("vertex"); }
 
   BlockFile file_;
   std::string name_;  ///< Of the file, for messages.
   ReadOptions options_;
   PlyHeader header_;
-  std::uint64_t vertex_count_ = 0;
-  std::uint64_t face_count_ = 0;
-  bool has_double_positions_ = false;
-  std::array<std::optional<std::size_t>, kSlotCount> slot_properties_;  ///< Slot -> index of the vertex property.
-  std::size_t face_list_property_ = 0;  ///< Index of the face property that lists the corners.
-  std::vector<Note> header_notes_;
+  PlyInterpretation interpretation_;
 };
 
 }  // namespace spectra::fusion

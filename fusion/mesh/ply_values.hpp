@@ -43,6 +43,10 @@ decltype(auto) with_type(PlyScalar type, Use&& use) {
       return use(std::int32_t{});
     case PlyScalar::UInt32:
       return use(std::uint32_t{});
+    case PlyScalar::Int64:
+      return use(std::int64_t{});
+    case PlyScalar::UInt64:
+      return use(std::uint64_t{});
     case PlyScalar::Float32:
       return use(float{});
     case PlyScalar::Float64:
@@ -51,7 +55,7 @@ decltype(auto) with_type(PlyScalar type, Use&& use) {
   return use(double{});
 }
 
-/// One value of any type; a double holds them all exactly.
+/// One value of any type; a double holds them all exactly but whole numbers beyond 2^53.
 template <bool kSwapped>
 double load_double(PlyScalar type, const unsigned char* bytes) {
   return with_type(type,
@@ -71,7 +75,8 @@ void load_column(PlyScalar type, const unsigned char* bytes, std::size_t stride,
 
 /// The shortest text that is read back as that number.
 std::string number_text(double value);
-/// A number as text files have it: "nan", "inf" and a leading '+' are numbers too. nullopt: not a number.
+/// A number as text files have it: with a leading '+', with an exponent as Fortran writes it (1.5D+01), "inf", and nan in
+/// every spelling that programs have for it, "null" and "NA" among them. nullopt: not a number.
 std::optional<double> parse_number(std::string_view token);
 /// A whole number as text files have it.
 std::optional<std::int64_t> parse_whole_number(std::string_view token);

@@ -1,6 +1,7 @@
 #include "fusion/mesh/ply_writer.hpp"
 
 #include <ostream>
+#include <vector>
 
 #include "fusion/mesh/output_file.hpp"
 #include "fusion/mesh/ply_encoder.hpp"
@@ -9,16 +10,50 @@ namespace spectra::fusion {
 
 namespace {
 
+/// The triangles in the input's numbers, in which the vertices that were left out count.
+std::vector<Triangle> input_triangles(const MultispectralMesh& mesh) {
+  std::vector<std::uint32_t> input_index;
+  input_index.reserve(mesh.vertex_count());
+  auto hole = mesh.left_out.begin();
+  for (std::uint32_t v = 0; input_index.size() < mesh.vertex_count(); ++v) {
+    if (hole != mesh.left_out.end() && hole->input_index == v) {
+      ++hole;
+    } else {
+      input_index.push_back(v);
+    }
+  }
+  std::vector<Triangle> triangles = mesh.triangles();
+  for (Triangle& triangle : triangles) {
+    for (std::uint32_t& corner : triangle) corner = input_index[corner];
+  }
+  return triangles;
+}
+
 Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours, PlyEncoder::Sink sink) {
   PlyLayout layout;
-  layout.vertex_count = mesh.vertex_count();
+  layout.vertex_count = mesh.vertex_count() + mesh.left_out.size();
   layout.triangle_count = mesh.triangle_count();
   layout.origin = mesh.origin;
   layout.double_positions = mesh.double_positions;
   layout.has_temperature = mesh.has_temperature;
   PlyEncoder encoder(layout, std::move(sink));
-  BOOST_OUTCOME_TRY(encoder.vertices(mesh.positions(), colours, mesh.temperature_celsius()));
-  BOOST_OUTCOME_TRY(encoder.triangles(mesh.triangles()));
+  if (colours.size() != mesh.vertex_count()) {
+    return failure(ErrorCode::Inconsistent, "a mesh of " + std::to_string(mesh.vertex_count()) +
+                                                " vertices cannot be written with " + std::to_string(colours.size()) +
+                                                " colours");
+  }
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= mesh.left_out.size(); ++i) {
+    const std::size_t end = i < mesh.left_out.size() ? mesh.left_out[i].input_index - i : mesh.vertex_count();
+    const std::size_t count = end - begin;
+    BOOST_OUTCOME_TRY(encoder.vertices(mesh.positions().subspan(begin, count), colours.subspan(begin, count),
+                                       mesh.temperature_celsius().subspan(begin, count)));
+    begin = end;
+    if (i == mesh.left_out.size()) break;
+    const LeftOutVertex& hole = mesh.left_out[i];
+    BOOST_OUTCOME_TRY(encoder.left_out_vertex(hole.position, hole.visible, hole.temperature_celsius));
+  }
+  BOOST_OUTCOME_TRY(encoder.triangles(mesh.left_out.empty() ? mesh.triangles() : input_triangles(mesh)));
   return encoder.finish();
 }
 

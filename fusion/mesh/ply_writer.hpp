@@ -10,7 +10,8 @@
 namespace spectra::fusion {
 
 /// Writes binary little-endian PLY: x,y,z (double when the input was), red,green,blue from `colours` (one a vertex),
-/// temperature when the mesh has one, and the triangles. Vertices keep order and number.
+/// temperature when the mesh has one, and the triangles. Vertices keep order and number; those of the input that were left
+/// out of the mesh stand in their places again, in their visible colour.
 Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
 
 /// The same into a file that appears whole or not at all: written beside it, synced, then renamed.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace spectra::fusion {
 
@@ -13,6 +12,37 @@ constexpr float kBeyond = std::numeric_limits<float>::infinity();
 constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max());
 /// Compared as a float, because that is how files have it: the nearest float lies above the real number.
 constexpr float kAbsoluteZeroCelsius = -273.15F;
+
+/// Takes note of finite temperatures.
+void describe(std::span<const float> celsius, TemperatureFacts& facts) {
+  float lowest = facts.lowest;
+  float highest = facts.highest;
+  std::uint32_t zero = 0;
+  std::uint32_t kelvin = 0;
+  std::uint32_t tenths = 0;
+  std::uint32_t hundredths = 0;
+  std::uint32_t hot = 0;
+  std::uint32_t cold = 0;
+  for (const float c : celsius) {
+    lowest = c < lowest ? c : lowest;
+    highest = c > highest ? c : highest;
+    zero += static_cast<std::uint32_t>(c == 0.0F);
+    kelvin += static_cast<std::uint32_t>(c >= 200.0F) & static_cast<std::uint32_t>(c < 400.0F);
+    tenths += static_cast<std::uint32_t>(c >= 2000.0F) & static_cast<std::uint32_t>(c < 4000.0F);
+    hundredths += static_cast<std::uint32_t>(c >= 20'000.0F) & static_cast<std::uint32_t>(c < 40'000.0F);
+    hot += static_cast<std::uint32_t>(c > 3000.0F);
+    cold += static_cast<std::uint32_t>(c < -100.0F);
+  }
+  facts.finite_count += celsius.size();
+  facts.lowest = lowest;
+  facts.highest = highest;
+  facts.zero_count += zero;
+  facts.kelvin_like_count += kelvin;
+  facts.tenth_kelvin_like_count += tenths;
+  facts.centikelvin_like_count += hundredths;
+  facts.too_hot_count += hot;
+  facts.too_cold_count += cold;
+}
 
 }  // namespace
 
@@ -28,30 +58,44 @@ bool TemperatureConversion::is_no_data(double value) const {
   });
 }
 
+float TemperatureConversion::converted(double value, TemperatureFacts& facts) const {
+  if (std::isnan(value)) return kNone;
+  if (is_no_data(value)) {
+    ++facts.no_data_count;
+    return kNone;
+  }
+  const double scaled = scale_.factor * value + scale_.offset;
+  if (scaled > kFloatMax) {
+    ++facts.over_range_count;
+    return kBeyond;
+  }
+  if (std::isinf(value)) {
+    ++facts.under_range_count;
+    return -kBeyond;
+  }
+  if (scaled < -kFloatMax || static_cast<float>(scaled) <= kAbsoluteZeroCelsius) {
+    ++facts.impossible_count;
+    return kNone;
+  }
+  const auto celsius = static_cast<float>(scaled);
+  describe({&celsius, 1}, facts);
+  return celsius;
+}
+
 void TemperatureConversion::convert(std::span<const double> values, std::span<float> celsius,
                                     TemperatureFacts& facts) const {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double scaled = scale_.factor * values[i] + scale_.offset;
-    // The usual value first, so that a file of usual values is read as fast as it can be.
-    if (std::abs(scaled) <= kFloatMax && static_cast<float>(scaled) > kAbsoluteZeroCelsius && no_data_.empty()) {
+  // Usual values first, so that a file of them is read as fast as it can be.
+  if (no_data_.empty()) {
+    bool all_usual = true;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double scaled = scale_.factor * values[i] + scale_.offset;
       celsius[i] = static_cast<float>(scaled);
-    } else if (std::isnan(values[i])) {
-      celsius[i] = kNone;
-    } else if (is_no_data(values[i])) {
-      celsius[i] = kNone;
-      ++facts.no_data_count;
-    } else if (scaled > kFloatMax) {
-      celsius[i] = kBeyond;
-      ++facts.over_range_count;
-    } else if (std::isinf(values[i])) {
-      celsius[i] = -kBeyond;
-      ++facts.under_range_count;
-    } else if (scaled < -kFloatMax || static_cast<float>(scaled) <= kAbsoluteZeroCelsius) {
-      celsius[i] = kNone;
-      ++facts.impossible_count;
-    } else {
-      celsius[i] = static_cast<float>(scaled);
+      all_usual = all_usual & (scaled <= kFloatMax) & (celsius[i] > kAbsoluteZeroCelsius);
     }
+    if (all_usual) return describe(celsius, facts);
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    celsius[i] = converted(values[i], facts);
     facts.missing_count += std::isnan(celsius[i]) ? 1U : 0U;
   }
 }

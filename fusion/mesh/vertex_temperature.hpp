@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -17,6 +17,17 @@ struct TemperatureFacts {
   std::uint64_t no_data_count = 0;      ///< One of the values that the options name.
   std::uint64_t over_range_count = 0;   ///< +inf, or beyond the largest float.
   std::uint64_t under_range_count = 0;  ///< -inf.
+
+  // Of the finite ones, which may be in another unit than degC.
+  std::uint64_t finite_count = 0;
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -std::numeric_limits<float>::infinity();
+  std::uint64_t zero_count = 0;               ///< Exactly 0, which often stands for nothing.
+  std::uint64_t kelvin_like_count = 0;        ///< 200 to 400.
+  std::uint64_t tenth_kelvin_like_count = 0;  ///< 2000 to 4000.
+  std::uint64_t centikelvin_like_count = 0;   ///< 20000 to 40000.
+  std::uint64_t too_hot_count = 0;            ///< Above 3000.
+  std::uint64_t too_cold_count = 0;           ///< Below -100.
 };
 
 /// Turns the numbers of a file into temperatures in degC: NaN where nothing was measured, +inf and -inf where the sensor
@@ -29,6 +40,7 @@ class TemperatureConversion {
   void convert(std::span<const double> values, std::span<float> celsius, TemperatureFacts& facts) const;
 
  private:
+  float converted(double value, TemperatureFacts& facts) const;
   bool is_no_data(double value) const;
 
   CelsiusScale scale_;

@@ -385,7 +385,7 @@ TEST(PlyStream, HandsOnBlocksInOrderAndAgain) {
   auto stream = PlyStream::open(path);
   ASSERT_TRUE(stream);
   EXPECT_EQ(stream.value().vertex_count(), 10'000U);
-  EXPECT_EQ(stream.value().face_count(), 19'602U);
+  EXPECT_GE(stream.value().triangle_count_limit(), 19'602U);
   const auto scene = read_ply(path);
   ASSERT_TRUE(scene);
   for (int pass = 0; pass < 2; ++pass) {
@@ -409,7 +409,7 @@ TEST(PlyStream, HandsOnBlocksInOrderAndAgain) {
     ASSERT_TRUE(facts);
     EXPECT_EQ(next_vertex, 10'000U);
     EXPECT_EQ(triangles, scene.value().mesh.triangles());
-    EXPECT_EQ(facts.value().triangle_count, 19'602U);
+    EXPECT_EQ(facts.value().faces.triangle_count, 19'602U);
     EXPECT_EQ(facts.value().max.x, 99);
   }
 }

@@ -28,7 +28,7 @@ MultispectralMesh sample_mesh() {
   mesh.positions()[1] = {1, 0, 0};
   mesh.positions()[2] = {0, 1, 0};
   mesh.temperature_celsius()[0] = 36.6F;
-  mesh.temperature_celsius()[2] = -273.15F;
+  mesh.temperature_celsius()[2] = -273.0F;
   mesh.has_temperature = true;
   mesh.triangles() = {{0, 1, 2}};
   return mesh;
@@ -71,7 +71,7 @@ TEST(PlyWriter, RoundTripsAndLeavesOutWhatIsNotThere) {
     EXPECT_EQ(scene.mesh.positions()[i], mesh.positions()[i]);
     EXPECT_EQ(scene.mesh.visible()[i], kColours[i]);
   }
-  EXPECT_EQ(scene.mesh.temperature_celsius()[2], -273.15F);
+  EXPECT_EQ(scene.mesh.temperature_celsius()[2], -273.0F);
   EXPECT_EQ(scene.mesh.triangles(), mesh.triangles());
 
   mesh.has_temperature = false;

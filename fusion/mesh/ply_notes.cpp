@@ -1,0 +1,337 @@
+#include "fusion/mesh/ply_notes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "fusion/mesh/ply_values.hpp"
+#include "fusion/mesh/scene_origin.hpp"
+#include "fusion/mesh/temperature_name.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t kMaxNames = 12;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMaxNames); ++i) {
+    text += (i == 0 ? "" : ", ") + printable(names[i]);
+  }
+  if (names.size() > kMaxNames) text += " and " + std::to_string(names.size() - kMaxNames) + " more";
+  return text;
+}
+
+std::string short_number(double value) {
+  std::array<char, 32> text;
+  constexpr int kDigits = 6;
+  const auto [end, status] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits);
+  return {text.data(), end};
+}
+
+bool is_used(const PlySlots& slots, std::size_t property) {
+  return std::find(slots.begin(), slots.end(), std::optional(property)) != slots.end();
+}
+
+/// The properties of an element that are not read.
+std::vector<std::string> unused_names(const PlyElement& element, const PlySlots& slots,
+                                      std::optional<std::size_t> list) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    if (!is_used(slots, i) && list != i) names.push_back(element.properties[i].name);
+  }
+  return names;
+}
+
+class Notes {
+ public:
+  Notes(const PlyHeader& header, const PlyInterpretation& interpretation, const ReadOptions& options,
+        const PlyBodyFacts& facts)
+      : header_(header),
+        schema_(interpretation.schema),
+        survey_(interpretation.survey),
+        options_(options),
+        facts_(facts),
+        vertices_(*header.find("vertex")) {}
+
+  std::vector<Note> take() {
+    about_positions();
+    about_colours();
+    about_temperature_property();
+    about_temperatures();
+    about_what_is_skipped();
+    about_faces();
+    add("trailing_bytes", facts_.trailing_byte_count,
+        counted(facts_.trailing_byte_count, "byte", "bytes") + " after the last element left out");
+    return std::move(notes_);
+  }
+
+ private:
+  void add(const char* id, std::uint64_t count, std::string message) {
+    if (count > 0) notes_.push_back({id, count, std::move(message)});
+  }
+
+  void about_positions() {
+    add("left_out_vertices", facts_.left_out_vertex_count,
+        counted(facts_.left_out_vertex_count, "vertex", "vertices") + " without a finite position left out");
+    add("left_out_faces", facts_.faces.left_out_face_count,
+        counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
+    // Float coordinates far from 0 have been rounded before they came here.
+    constexpr double kTooCoarse = 1.0 / 20'000;
+    const Vec3d origin = scene_origin(facts_.min, facts_.max);
+    const double extent =
+        std::max({facts_.max.x - facts_.min.x, facts_.max.y - facts_.min.y, facts_.max.z - facts_.min.z});
+    const std::array<std::pair<double, double>, 3> axes = {
+        {{facts_.min.x, facts_.max.x}, {facts_.min.y, facts_.max.y}, {facts_.min.z, facts_.max.z}}};
+    double rounding = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (vertices_.properties[*schema_.vertex[kX + axis]].type != PlyScalar::Float32) continue;
+      const double furthest = std::max(std::abs(axes[axis].first), std::abs(axes[axis].second));
+      const auto stored = static_cast<float>(furthest / options_.metres_per_unit);
+      const float next = std::nextafter(stored, 0.0F);
+      rounding =
+          std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.metres_per_unit);
+    }
+    if (origin != Vec3d{} && extent > 0 && rounding > kTooCoarse * extent) {
+      add("rounded_positions", vertices_.count,
+          "Positions are floats far from 0, which the file itself rounds to " + short_number(rounding) +
+              " m; write them as double, or closer to 0");
+    }
+  }
+
+  void about_colours() {
+    const PlyElement* const faces = header_.find("face");
+    if (schema_.has_face_colours()) {
+      add("face_colours", faces->count,
+          "Colours of the faces carried to their corners (mean over the faces of a vertex)");
+    }
+    if (schema_.has_vertex_colours() || schema_.has_face_colours()) {
+      const bool is_of_faces = !schema_.has_vertex_colours();
+      const PlySlots& slots = is_of_faces ? schema_.face : schema_.vertex;
+      const PlyElement& element = is_of_faces ? *faces : vertices_;
+      PlyScalar type = element.properties[*slots[kRed]].type;
+      for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
+        if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
+      }
+      const std::string text = conversion_text(schema_.colour_coding, type, survey_.largest_colour);
+      if (!text.empty()) add("converted_colours", vertices_.count, text);
+    } else {
+      about_textures();
+    }
+    add("clamped_colours", facts_.clamped_colour_count,
+        counted(facts_.clamped_colour_count, "colour", "colours") +
+            " out of range taken as black or white, or as grey where there is no number");
+  }
+
+  void about_textures() {
+    std::string file;
+    bool is_textured = false;
+    for (const std::string& comment : header_.comments) {
+      const std::size_t at = lower_case(comment).find("texturefile");
+      if (at == std::string::npos) continue;
+      is_textured = true;
+      const std::size_t name = comment.find_first_not_of(" \t:=", at + std::string_view("texturefile").size());
+      if (file.empty() && name != std::string::npos) file = printable(comment.substr(name));
+    }
+    const auto is_texture_property = [](const PlyProperty& property) {
+      const std::string name = lower_case(property.name);
+      return name == "texcoord" || name == "texnumber" || name == "texture_u" || name == "u" || name == "s" ||
+             name == "texture_s" || name == "tex_u";
+    };
+    if (const PlyElement* const faces = header_.find("face")) {
+      is_textured = is_textured || std::any_of(faces->properties.begin(), faces->properties.end(), is_texture_property);
+    }
+    is_textured =
+        is_textured || std::any_of(vertices_.properties.begin(), vertices_.properties.end(), is_texture_property);
+    if (!is_textured) return;
+    add("texture", vertices_.count,
+        "The colours are in a texture" + (file.empty() ? "" : " (" + file + ")") +
+            ", which is not read: everything is grey; bake it into the vertices first, in MeshLab with Filters, "
+            "Texture, "
+            "Transfer Color: Texture to Vertex");
+  }
+
+  void about_temperature_property() {
+    if (schema_.has_face_temperature()) {
+      add("face_temperatures", header_.find("face")->count,
+          "Temperatures of the faces carried to their corners (mean over the faces of a vertex)");
+    }
+    const PlyProperty* const property = temperature_property();
+    if (property == nullptr) return about_candidates();
+    std::string others;
+    for (const PlyProperty& other : vertices_.properties) {
+      if (!other.is_list && &other != property && temperature_name(other.name).rank > 0) {
+        others += (others.empty() ? "" : ", ") + ("'" + printable(other.name) + "'");
+      }
+    }
+    if (property->name == "temperature" && others.empty()) return;
+    add("temperature_property", vertices_.count,
+        "The temperature is taken from the property '" + printable(property->name) + "'" +
+            (others.empty() ? std::string() : ", not from " + others + " (--temperature-property names another)"));
+  }
+
+  const PlyProperty* temperature_property() const {
+    if (schema_.has_vertex_temperature()) return &vertices_.properties[*schema_.vertex[kTemperature]];
+    if (schema_.has_face_temperature()) return &header_.find("face")->properties[*schema_.face[kTemperature]];
+    return nullptr;
+  }
+
+  /// No temperature was found: what could be one.
+  void about_candidates() {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < vertices_.properties.size(); ++i) {
+      const PlyProperty& property = vertices_.properties[i];
+      if (property.is_list || is_used(schema_.vertex, i)) continue;
+      if (temperature_name(property.name).is_candidate) names.push_back(property.name);
+    }
+    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
+      for (std::size_t i = 0; i < faces->properties.size(); ++i) {
+        const PlyProperty& property = faces->properties[i];
+        if (property.is_list || is_used(schema_.face, i)) continue;
+        if (temperature_name(property.name).is_candidate) names.push_back(property.name);
+      }
+    }
+    std::string text;
+    if (schema_.is_temperature_doubtful) {
+      text = "'t' is not taken for a temperature, because of its values (" + number_text(survey_.least_doubtful) +
+             " to " + number_text(survey_.most_doubtful) + ")";
+    } else if (!names.empty()) {
+      text = "No property is called a temperature";
+    } else {
+      names = plain_t();
+      if (names.empty()) return;
+      text = "'" + printable(names[0]) + "' is not taken for a temperature, because of what stands beside it";
+    }
+    if (names.empty()) names.emplace_back("t");
+    add("no_temperature", names.size(), text + "; --temperature-property NAME takes one of: " + joined(names));
+  }
+
+  /// A bare t that was not even looked at.
+  std::vector<std::string> plain_t() const {
+    std::vector<std::string> names;
+    for (const PlyProperty& property : vertices_.properties) {
+      if (!property.is_list && temperature_name(property.name).is_bare_t) names.push_back(property.name);
+    }
+    return names;
+  }
+
+  void about_temperatures() {
+    const TemperatureFacts& facts = facts_.temperature;
+    add("missing_temperatures", facts.missing_count,
+        counted(facts.missing_count, "vertex", "vertices") + " without a temperature");
+    add("impossible_temperatures", facts.impossible_count,
+        counted(facts.impossible_count, "temperature", "temperatures") +
+            " at or below -273.15 degC (absolute zero) taken as missing");
+    add("no_data_temperatures", facts.no_data_count,
+        counted(facts.no_data_count, "temperature", "temperatures") + " of a --no-data value taken as missing");
+    add("over_range_temperatures", facts.over_range_count,
+        counted(facts.over_range_count, "temperature", "temperatures") +
+            " over the range of the sensor (infinite), shown as the hottest");
+    add("under_range_temperatures", facts.under_range_count,
+        counted(facts.under_range_count, "temperature", "temperatures") +
+            " under the range of the sensor (-infinite), shown as the coldest");
+    if (!options_.celsius_scale() && facts.finite_count > 0) about_plausibility(facts);
+  }
+
+  /// Nobody has said what unit it is, and degrees Celsius are hard to believe.
+  void about_plausibility(const TemperatureFacts& facts) {
+    const std::string range = "Temperatures from " + short_number(static_cast<double>(facts.lowest)) + " to " +
+                              short_number(static_cast<double>(facts.highest)) + ", taken as degC, ";
+    const auto most = [&facts](std::uint64_t count) {
+      constexpr std::uint64_t kMost = 9;
+      return count > 0 && 10 * count >= kMost * (facts.finite_count - facts.zero_count);
+    };
+    const PlyProperty& property = *temperature_property();
+    const std::optional<TemperatureUnit> named = temperature_name(property.name).unit;
+    const std::string call = "'" + printable(property.name) + "'";
+    const char* const kId = "implausible_temperatures";
+    if (named == TemperatureUnit::Fahrenheit) {
+      add(kId, facts.finite_count, range + "are in Fahrenheit by the name " + call + ": --temperature-unit fahrenheit");
+    } else if (named == TemperatureUnit::Centikelvin || most(facts.centikelvin_like_count)) {
+      add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin");
+    } else if (named == TemperatureUnit::Kelvin || most(facts.kelvin_like_count)) {
+      add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin");
+    } else if (most(facts.tenth_kelvin_like_count)) {
+      add(kId, facts.finite_count,
+          range + "look like tenths of kelvin: --temperature-scale 0.1 --temperature-offset -273.15");
+    } else if (size_bytes(property.type) == 1) {
+      add(kId, facts.finite_count,
+          range + "are of type " + std::string(to_string(property.type)) +
+              " and look like grey values: --temperature-scale A --temperature-offset B (degC = A value + B)");
+    } else if (facts.too_hot_count > facts.finite_count / 2) {
+      add(kId, facts.finite_count,
+          range +
+              "look like counts of a sensor or another quantity: --temperature-scale A --temperature-offset B "
+              "(degC = A value + B), or --temperature-property NAME");
+    } else if (facts.too_hot_count > 0) {
+      const std::string value = short_number(static_cast<double>(facts.highest));
+      add(kId, facts.too_hot_count,
+          range + counted(facts.too_hot_count, "is", "are") + " above 3000: if " + value +
+              " stands for no data, --no-data " + value);
+    } else if (facts.too_cold_count > 0) {
+      const std::string value = short_number(static_cast<double>(facts.lowest));
+      add(kId, facts.too_cold_count,
+          range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
+              " stands for no data, --no-data " + value);
+    }
+  }
+
+  void about_what_is_skipped() {
+    const auto of = [](std::size_t count) { return counted(count, "property", "properties"); };
+    const auto names = unused_names(vertices_, schema_.vertex, std::nullopt);
+    add("skipped_vertex_properties", names.size(),
+        of(names.size()) + " of the vertices without meaning here left out: " + joined(names));
+    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
+      const auto face_names = unused_names(*faces, schema_.face, schema_.corner_list);
+      add("skipped_face_properties", face_names.size(),
+          of(face_names.size()) + " of the faces without meaning here left out: " + joined(face_names));
+    }
+    for (const PlyElement& element : header_.elements) {
+      const bool is_read =
+          &element == &vertices_ || &element == header_.find("face") || &element == header_.find("tristrips");
+      if (is_read || element.count == 0) continue;
+      add("skipped_elements", element.count,
+          "Element '" + printable(element.name) + "' with " + counted(element.count, "entry", "entries") + " left out");
+    }
+  }
+
+  void about_faces() {
+    const FaceFacts& faces = facts_.faces;
+    add("triangulated_strips", faces.strip_count,
+        counted(faces.strip_count, "triangle strip", "triangle strips") + " cut into triangles");
+    add("triangulated_polygons", faces.polygon_count,
+        counted(faces.polygon_count, "polygon", "polygons") + " of more than three corners cut into triangles");
+    add("degenerate_faces", faces.degenerate_triangle_count,
+        counted(faces.degenerate_triangle_count, "triangle", "triangles") + " with the same vertex twice left out");
+    add("incomplete_faces", faces.incomplete_face_count,
+        counted(faces.incomplete_face_count, "face", "faces") + " of fewer than three corners left out");
+    add("unreferenced_vertices", facts_.unreferenced_vertex_count,
+        counted(facts_.unreferenced_vertex_count, "vertex", "vertices") + " of no triangle kept");
+  }
+
+  const PlyHeader& header_;
+  const PlySchema& schema_;
+  const PlySurvey& survey_;
+  const ReadOptions& options_;
+  const PlyBodyFacts& facts_;
+  const PlyElement& vertices_;
+  std::vector<Note> notes_;
+};
+
+}  // namespace
+
+std::string counted(std::uint64_t count, std::string_view one, std::string_view many) {
+  return std::to_string(count) + " " + std::string(count == 1 ? one : many);
+}
+
+std::vector<Note> ply_notes(const PlyHeader& header, const PlyInterpretation& interpretation,
+                            const ReadOptions& options, const PlyBodyFacts& facts) {
+  return Notes(header, interpretation, options, facts).take();
+}
+
+}  // namespace spectra::fusion
