@@ -28,18 +28,19 @@ struct LoadedScene {
   std::vector<std::string> comments{};  ///< The header's lines "comment ..." and "obj_info ...", whole, in order.
 };
 
-/// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file. Safe on untrusted input: every count is checked
-/// against the bytes that are there, and memory is bounded by a small multiple of the file's size.
-/// - Positions: x, y, z, float or double, finite. The mesh's origin is chosen as scene_origin.hpp says.
-/// - Visible colour: red, green, blue, or diffuse_red ..., or r, g, b, in any case; alpha is left out. uchar as it is, other
-///   whole-number types when the values are 0..255, float and double from 0..1 scaled (note "converted_colours").
-/// - Temperature: a scalar named temperature, temp, thermal, t or scalar_temperature, in any case and in this order of
-///   preference, or named by the options; t beside an s is a texture coordinate. Scaled to degC as the options say. NaN, at
-///   or below -273.15 degC, or a value that the options name: missing (NaN). +inf and what is beyond the largest float stays
-///   +inf (over range), -inf stays -inf.
-/// - Faces: the list vertex_indices or vertex_index. Polygons are cut into fans from their first corner; triangles with a
-///   vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are kept.
-/// Everything else is skipped. What was cut, left out, converted or skipped is in the notes.
+/// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file, plain or packed with gzip. Safe on untrusted input:
+/// every count is checked against the bytes that are there, and memory is bounded by a small multiple of the (unpacked)
+/// file's size. docs/input.md tells what is recognised; in short:
+/// - Positions: x, y, z of any type. Vertices without a finite one are left out with their faces (MultispectralMesh::
+///   left_out). The mesh's origin is chosen as scene_origin.hpp says.
+/// - Visible colour: three channels of any type, scaled by the largest value in the file; packed; of splats; of the faces.
+/// - Temperature: a scalar whose name says so, or that the options name, of the vertices or the faces. Scaled to degC as the
+///   options say. NaN, at or below -273.15 degC, or a value that the options name: missing (NaN). +inf and what is beyond
+///   the largest float is +inf (over range), -inf stays -inf.
+/// - Faces: the list vertex_indices or vertex_index, and triangle strips. Polygons are cut into fans from their first
+///   corner; triangles with a vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are
+///   kept.
+/// Everything else is skipped. What was guessed, cut, left out, converted or skipped is in the notes.
 /// Errors: those of check_read_options(), FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;
 /// the message begins with the file's name and says what and where.
 Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options = {});

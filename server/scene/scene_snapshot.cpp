@@ -161,7 +161,8 @@ class TiledSnapshot final : public SceneSnapshot {
         origin_(scene.mesh.origin),
         has_visible_(scene.mesh.has_visible),
         has_temperature_(scene.mesh.has_temperature),
-        double_positions_(scene.mesh.double_positions) {
+        double_positions_(scene.mesh.double_positions),
+        left_out_(scene.mesh.left_out) {
     std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
     std::vector<LeafFacts> facts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
@@ -230,6 +231,7 @@ class TiledSnapshot final : public SceneSnapshot {
     mesh.has_visible = has_visible_;
     mesh.has_temperature = has_temperature_;
     mesh.double_positions = double_positions_;
+    mesh.left_out = left_out_;
     mesh.name = name_;
     mesh.resize_vertices(static_cast<std::size_t>(vertex_count_));
     mesh.triangles().resize(static_cast<std::size_t>(triangle_count_));
@@ -326,6 +328,7 @@ class TiledSnapshot final : public SceneSnapshot {
   bool is_point_cloud_;
   fusion::Vec3d origin_;
   bool has_visible_, has_temperature_, double_positions_;
+  std::vector<fusion::LeftOutVertex> left_out_;
   Bounds bounds_, core_bounds_;
   std::vector<std::shared_ptr<const Tile>> tiles_;
   std::vector<std::shared_ptr<const Tile>> leaves_;
