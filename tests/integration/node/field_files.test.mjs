@@ -99,15 +99,17 @@ function generator(seed) {
 const TOKENS = ["nan", "-1", "999999999999", "1e308", "-1e39", "inf", "1.#IND", "0,5", "\n", "\r", "\0", "end_header\n", "element face 4000000000\n",
   "element vertex 99999999\n", "property list uint int64 vertex_indices\n", "property float temperature\n", "4294967295", " ", "\x1f\x8b"];
 
+const VALUES = ["nan", "-nan(ind)", "inf", "-inf", "0", "-1", "1", "7", "143", "255", "65535", "1e39", "-1e39", "1e300", "-273.15", "-9999", "1.5D+01", "0.5", "float"];
+
 function mutated(bytes, others, random) {
   const at = (length) => Math.floor(random() * length);
   let result = Buffer.from(bytes);
-  // Half of the changes go into the header, which is a small part of the file.
-  const place = () => (random() < 0.5 ? at(Math.min(400, result.length)) : at(result.length));
-  for (let change = 1 + at(4); change > 0 && result.length > 0; --change) {
+  // Some of the changes go into the header, which is a small part of the file.
+  const place = () => (random() < 0.2 ? at(Math.min(400, result.length)) : at(result.length));
+  for (let change = 1 + at(2); change > 0 && result.length > 0; --change) {
     const from = place();
     const length = Math.min(1 + at(60), result.length - from);
-    switch (at(6)) {
+    switch (at(9)) {
       case 0:
         result[from] = at(256);
         break;
@@ -123,8 +125,16 @@ function mutated(bytes, others, random) {
       case 4:
         result = result.subarray(0, from);
         break;
-      default:
+      case 5:
         result = Buffer.concat([result.subarray(0, from), others[at(others.length)].subarray(at(300))]);
+        break;
+      default: {
+        // A value in the place of another.
+        const begin = result.indexOf(" ", from) + 1;
+        const end = result.indexOf(" ", begin);
+        if (begin === 0 || end < 0) break;
+        result = Buffer.concat([result.subarray(0, begin), Buffer.from(VALUES[at(VALUES.length)]), result.subarray(end)]);
+      }
     }
   }
   return result;
