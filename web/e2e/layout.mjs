@@ -121,7 +121,7 @@ export function addLayoutTests(browser) {
         await look(`with a reading at the ${side}`);
       }
       for (const method of ['colour_mapped_threshold', 'thermal_highlighting', 'histogram_bin']) {
-        await page.evaluate((id) => globalThis.spectra.setMethod(id), method);
+        await page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
         await settled(page, 180_000);
         await look(method);
       }

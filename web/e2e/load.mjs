@@ -160,7 +160,7 @@ export function addLoadTests(browser, scratch) {
         const { store } = globalThis.spectra;
         for (let i = 0; i < many; i += 1) {
           const generation = store.generation;
-          globalThis.spectra.setParameter('alpha', ((i * 37) % 100) / 100, true);
+          globalThis.spectra.settings.setParameter('alpha', ((i * 37) % 100) / 100, true);
           while (store.generation === generation) await new Promise((resolve) => setTimeout(resolve, 1));
         }
       }, count);

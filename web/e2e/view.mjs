@@ -215,9 +215,9 @@ export function addViewTests(browser, scratch) {
     assert.match(await page.locator('footer').innerText(), /graphics restarting, \d+\s*s/);
     assert.equal(await page.locator('canvas.dead').evaluate((canvas) => getComputedStyle(canvas).visibility), 'hidden');
     // What comes while there is no picture is in it afterwards.
-    await page.evaluate(() => globalThis.spectra.setViewMode('visible'));
+    await page.evaluate(() => globalThis.spectra.settings.setViewMode('visible'));
     await settled(page);
-    await page.evaluate(() => globalThis.spectra.setViewMode('fused'));
+    await page.evaluate(() => globalThis.spectra.settings.setViewMode('fused'));
     await settled(page);
     await screenshot(page, 'context-lost');
     await page.evaluate(() => {

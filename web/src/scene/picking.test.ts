@@ -28,6 +28,16 @@ describe('nearestHit', () => {
     expect(nearestHit([square(20, true)], downwards(0, 0), 0)).toBeNull();
   });
 
+  it('misses what is behind the eye and near it', () => {
+    for (const indexed of [true, false]) {
+      const behind = { ...square(10.5, indexed), radius: 20 };
+      expect(nearestHit([behind], { origin: [1, 1, 10], direction: [0, 0, -1] }, 0.5)).toBeNull();
+      expect(nearestHit([behind], { origin: [1, 1, 10], direction: [0, 0, 1] }, 0.5)).toBeCloseTo(0.5, 6);
+      const ahead = square(0, indexed);
+      expect(nearestHit([behind, ahead], { origin: [1, 1, 10], direction: [0, 0, -1] }, 0.01)).toBeCloseTo(10, 6);
+    }
+  });
+
   it('finds a point of a cloud within the cone alone', () => {
     expect(nearestHit([square(0, false)], downwards(0.98, 0.98), 0.01)).toBeCloseTo(10, 6);
     expect(nearestHit([square(0, false)], downwards(0.5, 0.5), 0.01)).toBeNull();

@@ -3,12 +3,10 @@ import { decodeTileFrame, FrameKind, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
   extremes,
-  type Fusion,
   type FusionChange,
   fusionState,
   type Hello,
   histogram,
-  type ParameterValue,
   probe,
   type Quality,
   type QualityChange,
@@ -26,19 +24,18 @@ import { FrameIntake } from '../scene/frame_intake';
 import { TileSet } from '../scene/tile_set';
 import { Viewport, type ViewportEvents } from '../scene/viewport';
 import { Coalescer } from '../transport/coalescer';
-import { BUSY, Connection, ConnectionLost, RpcError } from '../transport/connection';
+import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
 import { UpChoices } from '../view/up_choices';
 import { cacheBytes } from './cache_bytes';
-import { mergedChange, wholeChange } from './fusion_change';
-import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
+import { Settings } from './settings';
+import type { Store } from './store.svelte';
 
 const HISTOGRAM_BINS = 192;
-/** Least time between two changes of the settings, and between two camera messages. */
-const CHANGE_INTERVAL_MS = 33;
+/** Least time between two changes of the quality, and between two camera messages. */
+const QUALITY_INTERVAL_MS = 33;
 const CAMERA_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
-const BUSY_WAIT_MS = 300;
 const TICK_MS = 100;
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
@@ -51,8 +48,8 @@ function createDecodeWorker(): Worker {
 export class Session {
   readonly viewport: Viewport;
   readonly tiles: TileSet;
+  readonly settings: Settings;
   readonly #connection: Connection;
-  readonly #fusionSender: Coalescer<FusionChange>;
   readonly #qualitySender: Coalescer<QualityChange>;
   readonly #cameraSender: Coalescer<CameraPose>;
   readonly #histogramAsker: Coalescer<true>;
@@ -68,8 +65,6 @@ export class Session {
   #isHovering = false;
   #qualityChanged = false;
   #bytesBefore = 0;
-  #rememberedParams = new Map<string, Record<string, ParameterValue>>();
-  #lastFusedMethod: string | null = null;
   #rateWindow: { at: number; bytes: number }[] = [];
 
   constructor(
@@ -117,19 +112,16 @@ export class Session {
         store.round_trip_ms = before === null ? round_trip_ms : before + (round_trip_ms - before) * 0.3;
       },
     });
-    this.#fusionSender = new Coalescer({
-      send: (change) => this.#sendFusion(change),
-      merge: mergedChange,
-      interval_ms: CHANGE_INTERVAL_MS,
-      max_in_flight: 3,
-      onIdle: () => {
-        store.wanted = null;
-      },
+    this.settings = new Settings(store, {
+      request: (method, params) => this.#connection.request(method, params),
+      onChange: () => this.#markBehind(),
+      onInForce: () => this.#histogramAsker.push(true),
+      onProblem: (error) => this.#say(error),
     });
     this.#qualitySender = new Coalescer({
       send: (change) => this.#sendQuality(change),
       merge: (earlier, later) => ({ ...earlier, ...later }),
-      interval_ms: CHANGE_INTERVAL_MS,
+      interval_ms: QUALITY_INTERVAL_MS,
       max_in_flight: 1,
     });
     this.#cameraSender = new Coalescer({
@@ -168,59 +160,6 @@ export class Session {
   }
 
   // Actions of the interface
-
-  setMethod(method: string): void {
-    const current = this.store.fusion;
-    if (current === null || current.method === method) return;
-    this.#rememberedParams.set(current.method, current.params);
-    const remembered = this.#rememberedParams.get(method);
-    this.#change(remembered === undefined ? { method } : { method, params: remembered });
-    this.#fusionSender.flush();
-  }
-
-  setViewMode(mode: ViewMode): void {
-    if (mode === 'thermal') this.setMethod(THERMAL_VIEW);
-    else if (mode === 'visible') this.setMethod(VISIBLE_VIEW);
-    else if (this.store.viewMode !== 'fused') {
-      const first = this.store.methods.find((method) => viewModeOf(method.id) === 'fused');
-      const method = this.#lastFusedMethod ?? first?.id;
-      if (method !== undefined) this.setMethod(method);
-    }
-  }
-
-  /** `settled` false while a slider is being dragged. */
-  setParameter(name: string, value: ParameterValue, settled: boolean): void {
-    this.#change({ params: { [name]: value } });
-    if (settled) this.#fusionSender.flush();
-  }
-
-  setPalette(palette: string): void {
-    this.#change({ palette });
-    this.#fusionSender.flush();
-  }
-
-  setMissing(missing: string, settled: boolean): void {
-    this.#change({ missing });
-    if (settled) this.#fusionSender.flush();
-  }
-
-  setRange(min: number, max: number, settled: boolean): void {
-    this.#change({ range: { mode: 'manual', min: Math.min(min, max), max: Math.max(min, max) } });
-    if (settled) this.#fusionSender.flush();
-  }
-
-  setRangeAutomatic(): void {
-    this.#change({ range: { mode: 'auto' } });
-    this.#fusionSender.flush();
-  }
-
-  /** Holds the range where it is, or lets it follow the scene again. */
-  toggleRangeLock(): void {
-    const range = this.store.fusion?.range;
-    if (range === undefined || range.min === null || range.max === null) return;
-    if (range.mode === 'auto') this.setRange(range.min, range.max, true);
-    else this.setRangeAutomatic();
-  }
 
   setQuality(change: QualityChange): void {
     this.#qualityChanged = true;
@@ -298,21 +237,16 @@ export class Session {
   #greeted(message: Hello): void {
     const { store } = this;
     const returning = store.scene !== undefined;
-    const before = returning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
     const qualityBefore = returning && this.#qualityChanged ? store.quality : null;
     this.#connectionNumber += 1;
-    this.#fusionSender.reset();
     this.#qualitySender.reset();
     this.#histogramAsker.reset();
 
     store.server = message;
     store.methods = message.methods;
     store.palettes = message.palettes;
-    store.fusionInForce = message.fusion;
-    store.wanted = before;
-    store.refusals = {};
+    const before = this.settings.greeted(message.fusion, returning);
     store.quality = qualityBefore ?? message.quality;
-    store.generation = 0;
     store.lostAt = null;
     store.statuses = [];
     store.complete = null;
@@ -320,16 +254,15 @@ export class Session {
     this.#setScene(message.scene, true);
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
-    this.#rememberFused(message.fusion);
     void this.#subscribe(message, before, qualityBefore);
   }
 
   /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */
   async #subscribe(greeting: Hello, fusion: FusionChange | null, quality: Quality | null): Promise<void> {
     const connectionNumber = this.#connectionNumber;
-    await Promise.all([fusion && this.#sendFusion(fusion), quality && this.#sendQuality(quality)]);
+    await Promise.all([fusion && this.settings.send(fusion), quality && this.#sendQuality(quality)]);
     if (connectionNumber !== this.#connectionNumber) return;
-    if (!this.#fusionSender.busy) this.store.wanted = null;
+    if (!this.settings.busy) this.store.wanted = null;
     const session_id = this.#claimableSession;
     const claims = session_id !== null && greeting.capabilities.includes('resume') ? this.tiles.claims(MOST_CLAIMED) : [];
     try {
@@ -368,7 +301,7 @@ export class Session {
         break;
       case 'fusion.changed': {
         const { generation, fusion } = fusionState(params, method);
-        this.#fusionIs(generation, fusion);
+        this.settings.inForce(generation, fusion);
         break;
       }
       case 'stream.complete':
@@ -415,50 +348,13 @@ export class Session {
 
   // Settings
 
-  #change(change: FusionChange): void {
-    const { store } = this;
-    store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
-    store.refusals = {};
-    if (!store.connected) return;
-    this.#markBehind();
-    this.#fusionSender.push(change);
-  }
-
-  async #sendFusion(change: FusionChange): Promise<void> {
-    try {
-      const answer = fusionState(await this.#connection.request('fusion.set', change), 'fusion.set');
-      this.#fusionIs(answer.generation, answer.fusion);
-    } catch (error) {
-      if (error instanceof RpcError && error.code === BUSY) {
-        // Too fast for the server, not wrong: the newest wish is still to be told.
-        await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
-        if (this.store.connected) this.#fusionSender.push(this.store.wanted ?? change);
-      } else if (error instanceof RpcError) {
-        this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
-      } else this.#say(error);
-    }
-  }
-
-  #fusionIs(generation: number, fusion: Fusion): void {
-    if (generation < this.store.generation) return;
-    const changed = generation !== this.store.generation;
-    this.store.generation = generation;
-    this.store.fusionInForce = fusion;
-    this.#rememberFused(fusion);
-    if (changed) this.#histogramAsker.push(true);
-  }
-
-  #rememberFused(fusion: Fusion): void {
-    if (viewModeOf(fusion.method) === 'fused') this.#lastFusedMethod = fusion.method;
-  }
-
   async #sendQuality(change: QualityChange): Promise<void> {
     try {
       const wire: Partial<Quality> = { mode: this.store.quality?.mode ?? 'manual', ...change };
       this.#markBehind();
       this.store.quality = qualityState(await this.#connection.request('quality.set', wire), 'quality.set').quality;
     } catch (error) {
-      if (error instanceof RpcError) this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
+      if (error instanceof RpcError) this.settings.refused(error);
       else this.#say(error);
     }
   }
@@ -520,7 +416,7 @@ export class Session {
     this.tiles.settle();
     store.shown = this.tiles.counts();
     store.complete = message;
-    if (message.generation >= store.generation && !this.#fusionSender.busy) {
+    if (message.generation >= store.generation && !this.settings.busy) {
       if (store.behindSince !== null) {
         store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: performance.now() - store.behindSince };
       }

@@ -58,7 +58,10 @@ function setUp() {
 
 describe('Connection', () => {
   beforeEach(() => vi.useFakeTimers());
-  afterEach(() => vi.useRealTimers());
+  afterEach(() => {
+    vi.restoreAllMocks();
+    vi.useRealTimers();
+  });
 
   it('is open after hello, and asks and answers by id', async () => {
     const { connection, states, last } = setUp();
@@ -97,6 +100,26 @@ describe('Connection', () => {
     expect(states.some(({ phase }) => phase === 'waiting')).toBe(true);
     await vi.advanceTimersByTimeAsync(1000);
     expect(sockets.length).toBe(2);
+  });
+
+  it('does not take a link for dead because the page slept', async () => {
+    const { sockets, last } = setUp();
+    const awake = performance.now.bind(performance);
+    let slept_ms = 0;
+    vi.spyOn(performance, 'now').mockImplementation(() => awake() + slept_ms);
+    last().receive(helloText);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(last().sent).toHaveLength(1);
+    // The answer comes while the page sleeps; when it wakes up its timers may run before the message is handed out.
+    slept_ms = 60_000;
+    await vi.advanceTimersByTimeAsync(500);
+    expect(sockets[0]?.closed).toBe(false);
+    last().answer({});
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(sockets).toHaveLength(1);
+    // One that gives no sign of life after that is dead all the same.
+    await vi.advanceTimersByTimeAsync(5000);
+    expect(sockets[0]?.closed).toBe(true);
   });
 
   it('stays with a link that answers', async () => {

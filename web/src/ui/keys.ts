@@ -47,12 +47,12 @@ export function handleKey(event: KeyboardEvent, session: Session, actions: KeyAc
   if (store.helpOpen) return;
   if (!preferences.letterKeys && event.key.length === 1 && !actions.onScene) return;
   const view = VIEWS[event.key];
-  if (view !== undefined) session.setViewMode(view);
+  if (view !== undefined) session.settings.setViewMode(view);
   else if (event.key === '?') store.helpOpen = true;
   else if (event.key === 'Escape') session.unpin();
   else if (event.key.toLowerCase() === 'f') session.fitView('fit');
   else if (event.key.toLowerCase() === 'r') session.fitView('reset');
-  else if (event.key.toLowerCase() === 'l') session.toggleRangeLock();
+  else if (event.key.toLowerCase() === 'l') session.settings.toggleRangeLock();
   else if (event.key.toLowerCase() === 'h') store.panelsHidden = !store.panelsHidden;
   else if (event.key.toLowerCase() === 'p') actions.probe();
   else if (event.key.toLowerCase() === 's') actions.screenshot();

@@ -1,0 +1,173 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import type { Fusion, FusionChange } from '../protocol/messages';
+import { BUSY, ConnectionLost, RpcError } from '../transport/connection';
+import { Settings } from './settings';
+import { Store } from './store.svelte';
+
+function fusionWith(alpha: number, method = 'blend'): Fusion {
+  return {
+    method,
+    params: { alpha },
+    params_in_force: { alpha },
+    palette: 'iron',
+    range: { mode: 'auto', min: 10, max: 30 },
+    missing: 'visible',
+  };
+}
+
+function refusal(field: string, reason: string, code = -32602): RpcError {
+  return new RpcError({ code, message: 'invalid', data: { field, reason } });
+}
+
+interface Asked {
+  change: FusionChange;
+  answer: (generation: number, fusion: Fusion) => Promise<void>;
+  refuse: (error: Error) => Promise<void>;
+}
+
+/** Settings of a session that is connected, and the other end of it. */
+function setUp() {
+  const store = new Store();
+  store.link = { phase: 'open' };
+  const asked: Asked[] = [];
+  const problems: unknown[] = [];
+  const events = { changes: 0, inForce: 0 };
+  const later = () => vi.advanceTimersByTimeAsync(0);
+  const settings = new Settings(store, {
+    request: (method, params) =>
+      new Promise((resolve, reject) => {
+        expect(method).toBe('fusion.set');
+        asked.push({
+          change: params as FusionChange,
+          answer: async (generation, fusion) => {
+            resolve({ generation, fusion });
+            await later();
+          },
+          refuse: async (error) => {
+            reject(error);
+            await later();
+          },
+        });
+      }),
+    onChange: () => (events.changes += 1),
+    onInForce: () => (events.inForce += 1),
+    onProblem: (error) => problems.push(error),
+  });
+  expect(settings.greeted(fusionWith(0.5), false)).toBeNull();
+  return { store, settings, asked, problems, events };
+}
+
+describe('Settings', () => {
+  beforeEach(() => vi.useFakeTimers());
+  afterEach(() => vi.useRealTimers());
+
+  it('shows what is asked for at once, and what is in force when the answer has come', async () => {
+    const { store, settings, asked, events } = setUp();
+    settings.setParameter('alpha', 0.7, true);
+    expect(asked.map(({ change }) => change)).toEqual([{ params: { alpha: 0.7 } }]);
+    expect(store.fusion?.params).toEqual({ alpha: 0.7 });
+    expect(store.fusionInForce?.params).toEqual({ alpha: 0.5 });
+    expect([events.changes, settings.busy]).toEqual([1, true]);
+    await asked[0]?.answer(1, fusionWith(0.7));
+    expect([store.generation, store.fusionInForce?.params, store.wanted]).toEqual([1, { alpha: 0.7 }, null]);
+    expect([events.inForce, settings.busy]).toEqual([1, false]);
+  });
+
+  it('keeps to the newest generation, in whatever order answers and notifications come', async () => {
+    const { store, settings, asked, events } = setUp();
+    settings.setParameter('alpha', 0.6, true);
+    settings.setParameter('alpha', 0.7, true);
+    settings.inForce(3, fusionWith(0.9));
+    await asked[1]?.answer(2, fusionWith(0.7));
+    await asked[0]?.answer(1, fusionWith(0.6));
+    expect([store.generation, store.fusionInForce?.params]).toEqual([3, { alpha: 0.9 }]);
+    expect(events.inForce).toBe(1);
+    // The same generation again may say more of what it means, the range for one; it is no other picture.
+    settings.inForce(3, { ...fusionWith(0.9), range: { mode: 'auto', min: 12, max: 28 } });
+    expect(store.fusionInForce?.range.min).toBe(12);
+    expect(events.inForce).toBe(1);
+  });
+
+  it('counts generations anew with each connection', () => {
+    const { store, settings } = setUp();
+    settings.inForce(7, fusionWith(0.9));
+    settings.greeted(fusionWith(0.5), true);
+    settings.inForce(1, fusionWith(0.4));
+    expect([store.generation, store.fusionInForce?.params]).toEqual([1, { alpha: 0.4 }]);
+  });
+
+  it('shows a refusal at its field until the user changes something, and goes back to what is in force', async () => {
+    const { store, settings, asked, problems } = setUp();
+    settings.setParameter('alpha', 7, true);
+    await asked[0]?.refuse(refusal('params.alpha', 'above 1'));
+    expect(store.refusals).toEqual({ 'params.alpha': 'above 1' });
+    expect(store.fusion?.params).toEqual({ alpha: 0.5 });
+    settings.refused(refusal('quality.colour_bits', 'below 4'));
+    settings.refused(refusal('', 'no'));
+    expect(store.refusals).toEqual({ 'params.alpha': 'above 1', 'quality.colour_bits': 'below 4', '': 'no' });
+    settings.setPalette('grey');
+    expect(store.refusals).toEqual({});
+    expect(problems).toEqual([]);
+  });
+
+  it('tells a server that was too busy again, with the newest wish', async () => {
+    const { store, settings, asked } = setUp();
+    settings.setParameter('alpha', 0.6, true);
+    await asked[0]?.refuse(refusal('', 'too fast', BUSY));
+    settings.setPalette('grey');
+    await vi.advanceTimersByTimeAsync(400);
+    expect(store.refusals).toEqual({});
+    expect(asked.at(-1)?.change).toEqual({ params: { alpha: 0.6 }, palette: 'grey' });
+  });
+
+  it('hands anything but a refusal on', async () => {
+    const { store, settings, asked, problems } = setUp();
+    settings.setPalette('grey');
+    await asked[0]?.refuse(new ConnectionLost());
+    expect(problems).toHaveLength(1);
+    expect(store.refusals).toEqual({});
+  });
+
+  it('keeps what the user wants while there is no connection, and asks for all of it on the next', () => {
+    const { store, settings, asked, events } = setUp();
+    store.link = { phase: 'waiting', attempt: 1, retry_at: 0 };
+    settings.setParameter('alpha', 0.9, true);
+    settings.setRange(30, 20, true);
+    expect([asked.length, events.changes]).toEqual([0, 0]);
+    const whole = settings.greeted(fusionWith(0.5), true);
+    expect(whole).toEqual({
+      method: 'blend',
+      params: { alpha: 0.9 },
+      palette: 'iron',
+      range: { mode: 'manual', min: 20, max: 30 },
+      missing: 'visible',
+    });
+    expect(store.fusion?.params).toEqual({ alpha: 0.9 });
+  });
+
+  it('goes back to the parameters a method was left with, and to the fused view that was left', async () => {
+    const { store, settings, asked } = setUp();
+    const force = async (generation: number, fusion: Fusion) => await asked.at(-1)?.answer(generation, fusion);
+    settings.setMethod('other');
+    expect(asked.at(-1)?.change).toEqual({ method: 'other' });
+    await force(1, fusionWith(1, 'other'));
+    store.scene = { temperature: { min: 1, max: 2 } } as unknown as NonNullable<Store['scene']>;
+    settings.setViewMode('thermal');
+    expect(asked.at(-1)?.change).toEqual({ method: 'thermal_only' });
+    await force(2, fusionWith(1, 'thermal_only'));
+    settings.setViewMode('fused');
+    expect(asked.at(-1)?.change).toEqual({ method: 'other', params: { alpha: 1 } });
+    await force(3, fusionWith(1, 'other'));
+    settings.setMethod('blend');
+    expect(asked.at(-1)?.change).toEqual({ method: 'blend', params: { alpha: 0.5 } });
+  });
+
+  it('holds the range where it is and lets it go again', async () => {
+    const { settings, asked } = setUp();
+    settings.toggleRangeLock();
+    expect(asked.at(-1)?.change).toEqual({ range: { mode: 'manual', min: 10, max: 30 } });
+    await asked.at(-1)?.answer(1, { ...fusionWith(0.5), range: { mode: 'manual', min: 10, max: 30 } });
+    settings.toggleRangeLock();
+    expect(asked.at(-1)?.change).toEqual({ range: { mode: 'auto' } });
+  });
+});

@@ -1,0 +1,163 @@
+import { type Fusion, type FusionChange, fusionState, type ParameterValue } from '../protocol/messages';
+import { Coalescer } from '../transport/coalescer';
+import { BUSY, RpcError } from '../transport/connection';
+import { mergedChange, wholeChange } from './fusion_change';
+import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
+
+/** Least time between two changes of the settings. */
+const CHANGE_INTERVAL_MS = 33;
+const BUSY_WAIT_MS = 300;
+
+/** What the settings need of the session they belong to. */
+export interface SettingsSession {
+  /** Asks the server; rejects with RpcError when it refuses. */
+  request: (method: string, params: object) => Promise<unknown>;
+  /** The user has asked for other settings: the picture is behind until they are shown. */
+  onChange: () => void;
+  /** Other settings are in force. */
+  onInForce: () => void;
+  /** Anything but a refusal. */
+  onProblem: (error: unknown) => void;
+}
+
+/**
+ * The settings of the fusion: what is in force, what the user has asked for and what the server refused, in the store. The newest
+ * generation counts, in whatever order answers and notifications come.
+ */
+export class Settings {
+  readonly #sender: Coalescer<FusionChange>;
+  #rememberedParams = new Map<string, Record<string, ParameterValue>>();
+  #lastFusedMethod: string | null = null;
+
+  constructor(
+    private readonly store: Store,
+    private readonly session: SettingsSession,
+  ) {
+    this.#sender = new Coalescer({
+      send: (change) => this.send(change),
+      merge: mergedChange,
+      interval_ms: CHANGE_INTERVAL_MS,
+      max_in_flight: 3,
+      onIdle: () => {
+        store.wanted = null;
+      },
+    });
+  }
+
+  /** True while a change waits or is unanswered. */
+  get busy(): boolean {
+    return this.#sender.busy;
+  }
+
+  // Actions of the interface
+
+  setMethod(method: string): void {
+    const current = this.store.fusion;
+    if (current === null || current.method === method) return;
+    this.#rememberedParams.set(current.method, current.params);
+    const remembered = this.#rememberedParams.get(method);
+    this.#change(remembered === undefined ? { method } : { method, params: remembered }, true);
+  }
+
+  setViewMode(mode: ViewMode): void {
+    if (mode === 'thermal') this.setMethod(THERMAL_VIEW);
+    else if (mode === 'visible') this.setMethod(VISIBLE_VIEW);
+    else if (this.store.viewMode !== 'fused') {
+      const first = this.store.methods.find((method) => viewModeOf(method.id) === 'fused');
+      const method = this.#lastFusedMethod ?? first?.id;
+      if (method !== undefined) this.setMethod(method);
+    }
+  }
+
+  /** `settled` false while a slider is being dragged. */
+  setParameter(name: string, value: ParameterValue, settled: boolean): void {
+    this.#change({ params: { [name]: value } }, settled);
+  }
+
+  setPalette(palette: string): void {
+    this.#change({ palette }, true);
+  }
+
+  setMissing(missing: string, settled: boolean): void {
+    this.#change({ missing }, settled);
+  }
+
+  setRange(min: number, max: number, settled: boolean): void {
+    this.#change({ range: { mode: 'manual', min: Math.min(min, max), max: Math.max(min, max) } }, settled);
+  }
+
+  setRangeAutomatic(): void {
+    this.#change({ range: { mode: 'auto' } }, true);
+  }
+
+  /** Holds the range where it is, or lets it follow the scene again. */
+  toggleRangeLock(): void {
+    const range = this.store.fusion?.range;
+    if (range === undefined || range.min === null || range.max === null) return;
+    if (range.mode === 'auto') this.setRange(range.min, range.max, true);
+    else this.setRangeAutomatic();
+  }
+
+  // The connection
+
+  /**
+   * A new connection with its own settings. Returns the user's, when `isReturning` and there are any: they are to be sent before
+   * anything is drawn, and are shown as wanted until then.
+   */
+  greeted(fusion: Fusion, isReturning: boolean): FusionChange | null {
+    const { store } = this;
+    const before = isReturning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
+    this.#sender.reset();
+    store.fusionInForce = fusion;
+    store.wanted = before;
+    store.refusals = {};
+    store.generation = 0;
+    this.#rememberFused(fusion);
+    return before;
+  }
+
+  /** Sends a change at once and takes in the answer; never rejects. */
+  async send(change: FusionChange): Promise<void> {
+    try {
+      const answer = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      this.inForce(answer.generation, answer.fusion);
+    } catch (error) {
+      if (error instanceof RpcError && error.code === BUSY) {
+        // Too fast for the server, not wrong: the newest wish is still to be told.
+        await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
+        if (this.store.connected) this.#sender.push(this.store.wanted ?? change);
+      } else if (error instanceof RpcError) this.refused(error);
+      else this.session.onProblem(error);
+    }
+  }
+
+  /** The server says what is in force; an older generation than the one known is news of yesterday. */
+  inForce(generation: number, fusion: Fusion): void {
+    const { store } = this;
+    if (generation < store.generation) return;
+    const isNew = generation !== store.generation;
+    store.generation = generation;
+    store.fusionInForce = fusion;
+    this.#rememberFused(fusion);
+    if (isNew) this.session.onInForce();
+  }
+
+  /** Shows a refusal at the field it is about. */
+  refused(error: RpcError): void {
+    this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
+  }
+
+  #change(change: FusionChange, isSettled: boolean): void {
+    const { store } = this;
+    store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
+    store.refusals = {};
+    if (!store.connected) return;
+    this.session.onChange();
+    this.#sender.push(change);
+    if (isSettled) this.#sender.flush();
+  }
+
+  #rememberFused(fusion: Fusion): void {
+    if (viewModeOf(fusion.method) === 'fused') this.#lastFusedMethod = fusion.method;
+  }
+}
