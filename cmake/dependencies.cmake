@@ -1,4 +1,8 @@
 # Every third-party library, with the oldest version that is tried; all come from Debian 12.
+
+# What deploy/dependencies.sh could not install without taking something away from the machine is unpacked here.
+list(PREPEND CMAKE_PREFIX_PATH "${PROJECT_SOURCE_DIR}/build/packages/usr")
+
 find_package(Boost 1.81 REQUIRED)
 find_package(Threads REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)

@@ -1,7 +1,13 @@
 #!/bin/bash
 # Installs from Debian what is missing: `dependencies.sh run` for building and serving, `dependencies.sh test` for the
 # tests as well. Repeatable; asks apt only when something is absent.
+#
+# Packages are added, never removed or downgraded: apt is asked first what it would do. A package that it could only install
+# by taking another one away (libboost1.81-dev on a machine with libpcl-dev, which needs Debian's Boost 1.74) is unpacked
+# into build/packages instead, where only this build looks (cmake/dependencies.cmake). Where that does not go either, nothing
+# is changed and the reason is said.
 set -euo pipefail
+beside=$(cd "$(dirname "$0")/.." && pwd)/build/packages
 
 build_packages=(
   g++ cmake ninja-build ccache ca-certificates
@@ -22,6 +28,9 @@ case "${1:-run}" in
   *) echo "usage: $0 [run|test]" >&2; exit 2 ;;
 esac
 
+say() { echo "dependencies: $*" >&2; }
+stop() { say "$*"; say "nothing was changed"; exit 1; }
+
 # A Node.js that is already there is kept when it is new enough; otherwise Debian's (18.19) is installed.
 node_is_usable() {
   command -v node >/dev/null && command -v npm >/dev/null &&
@@ -29,17 +38,91 @@ node_is_usable() {
 }
 node_is_usable || packages+=(nodejs npm)
 
+installed=" $(dpkg-query -W -f '${db:Status-Status}:${Package} ' "${packages[@]}" 2>/dev/null || true) "
 missing=()
 for package in "${packages[@]}"; do
-  [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+  [[ $installed == *" installed:$package "* || -e $beside/.complete/$package ]] || missing+=("$package")
 done
 [ ${#missing[@]} -eq 0 ] && exit 0
 
+install_options=(-y --no-install-recommends -o APT::Get::AutomaticRemove=false -o DPkg::Lock::Timeout=120)
+
+# Prints why these packages cannot simply be added: what apt would remove or downgrade, or apt's own reason. Nothing when they can.
+harm_of() {
+  local plan harm verb name old new
+  if ! plan=$(LC_ALL=C apt-get -s install "${install_options[@]}" "$@" 2>&1); then
+    # apt refuses a downgrade, and a change of what is on hold, by itself.
+    grep -E '^(E:| [a-z0-9])' <<<"$plan" | sed 's/^E: //' | tr -s ' \n' ' ' | cut -c1-400
+    return
+  fi
+  harm=$(while read -r verb name old new _; do
+    case $verb in
+      Remv) echo "remove $name" ;;
+      Inst)
+        [[ $old == \[* ]] || continue
+        old=${old#[} old=${old%]} new=${new#(}
+        ! dpkg --compare-versions "$new" lt "$old" || echo "downgrade $name from $old to $new" ;;
+    esac
+  done <<<"$plan")
+  [ -n "$harm" ] || return 0
+  awk 'NR == 1 { text = "it would " $0 } NR > 1 && NR <= 6 { text = text ", " $0 }
+       END { print text (NR > 6 ? " and " (NR - 6) " more" : "") }' <<<"$harm"
+}
+
+# Puts a package into a folder. Only one that needs no shared library of a package that is not here.
+unpack() {
+  local package=$1 folder=$2 download dangling
+  download=$(mktemp -d "$folder/.download-XXXX")
+  (cd "$download" && apt-get -qq download "$package" >/dev/null 2>log) ||
+    { grep -m 1 '^E:' "$download/log" | sed 's/^E: //'; return 1; }
+  dpkg-deb -x "$download"/*.deb "$folder" || return 1
+  rm -r "$download"
+  dangling=$(find "$folder" -xtype l -name '*.so*' -print -quit)
+  [ -z "$dangling" ] || { echo "its $(basename "$dangling") needs a library of another package"; return 1; }
+  mkdir -p "$folder/.complete"
+  : > "$folder/.complete/$package"
+}
+
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
-  command -v sudo >/dev/null || { echo "dependencies: run as root or install sudo; missing: ${missing[*]}" >&2; exit 1; }
+  command -v sudo >/dev/null || stop "run as root or install sudo; missing: ${missing[*]}"
   as_root=(sudo)
+  # Without a terminal nobody can type a password.
+  [ -t 0 ] || as_root=(sudo -n)
+  "${as_root[@]}" true || stop "sudo did not let us; an administrator can run: apt-get install --no-remove ${missing[*]}"
 fi
-echo "dependencies: installing ${missing[*]}" >&2
-"${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2
+"${as_root[@]}" test -w /var/lib/dpkg || stop "/var/lib/dpkg cannot be written (a read-only system?); missing: ${missing[*]}"
+"${as_root[@]}" apt-get update -qq >&2 || say "the package lists could not be brought up to date; going on with those that are here"
+
+plain=("${missing[@]}")
+conflicting=()
+if [ -n "$(harm_of "${plain[@]}")" ]; then
+  plain=()
+  for package in "${missing[@]}"; do
+    if [ -z "$(harm_of "$package")" ]; then plain+=("$package"); else conflicting+=("$package"); fi
+  done
+  if [ ${#plain[@]} -gt 0 ]; then
+    harm=$(harm_of "${plain[@]}")
+    [ -z "$harm" ] || stop "${plain[*]} cannot be added to this machine: $harm"
+  fi
+fi
+
+if [ ${#conflicting[@]} -gt 0 ]; then
+  mkdir -p "$beside"
+  new=$(mktemp -d "$beside.new-XXXX")
+  trap 'rm -rf "$new"' EXIT
+  cp -a "$beside/." "$new"
+  for package in "${conflicting[@]}"; do
+    harm=$(harm_of "$package")
+    say "$package cannot be installed here ($harm); unpacking it for this build alone into $beside"
+    reason=$(unpack "$package" "$new") || stop "$package cannot be unpacked beside the build either: $reason"
+  done
+fi
+if [ ${#plain[@]} -gt 0 ]; then
+  say "installing ${plain[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -qq --no-remove "${install_options[@]}" "${plain[@]}" >&2
+fi
+if [ ${#conflicting[@]} -gt 0 ]; then
+  rm -r "$beside"
+  mv "$new" "$beside"
+fi
