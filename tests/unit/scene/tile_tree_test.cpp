@@ -10,6 +10,7 @@
 #include <random>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "server/scene/surface.hpp"
@@ -302,6 +303,19 @@ std::vector<Vec3f> samples(std::span<const Vec3f> positions, std::span<const Tri
   return result;
 }
 
+/// The full mesh beneath a tile.
+std::pair<std::vector<Vec3f>, std::vector<Triangle>> leaves_beneath(const std::map<TileId, const Tile*>& tiles,
+                                                                    const Tile& top) {
+  std::pair<std::vector<Vec3f>, std::vector<Triangle>> mesh;
+  auto& [positions, triangles] = mesh;
+  visit_leaves(tiles, top, [&](const Tile& leaf) {
+    const auto first = static_cast<std::uint32_t>(positions.size());
+    positions.insert(positions.end(), leaf.positions.begin(), leaf.positions.end());
+    for (const Triangle& t : leaf.triangles) triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  });
+  return mesh;
+}
+
 TEST(TileTree, StatedErrorIsNeverBelowTheSampledDistance) {
   MultispectralMesh rough = testing::terrain({.columns = 110, .rows = 100});
   std::mt19937 random(3);
@@ -312,13 +326,7 @@ TEST(TileTree, StatedErrorIsNeverBelowTheSampledDistance) {
     const auto tiles = by_id(*scene);
     for (const auto& tile : scene->tiles()) {
       if (tile->child_mask == 0) continue;
-      std::vector<Vec3f> positions;
-      std::vector<Triangle> triangles;
-      visit_leaves(tiles, *tile, [&](const Tile& leaf) {
-        const auto first = static_cast<std::uint32_t>(positions.size());
-        positions.insert(positions.end(), leaf.positions.begin(), leaf.positions.end());
-        for (const Triangle& t : leaf.triangles) triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      });
+      const auto [positions, triangles] = leaves_beneath(tiles, *tile);
       const Surface full(positions, triangles), coarse(tile->positions, tile->triangles);
       const double enough = std::pow(double{tile->geometric_error_m}, 2);
       double largest = 0;
@@ -333,6 +341,41 @@ TEST(TileTree, StatedErrorIsNeverBelowTheSampledDistance) {
       measure(full, samples(tile->positions, tile->triangles, 3000, random));
       EXPECT_LE(std::sqrt(largest), double{tile->geometric_error_m});
       EXPECT_GT(8 * std::sqrt(largest), double{tile->geometric_error_m}) << "so large that it says nothing";
+    }
+  }
+}
+
+TEST(TileTree, StatedErrorCoversWhatLiesBetweenTheMeasuredPoints) {
+  // Peaks as narrow as the measured points are apart: the farthest point lies on a coarse flank, between them.
+  constexpr int kSteps = 16;
+  for (const unsigned seed : {1U, 2U}) {
+    for (const bool is_flat : {true, false}) {
+      MultispectralMesh mesh = testing::terrain({.columns = 24, .rows = 24, .seed = seed});
+      std::mt19937 random(seed);
+      for (Vec3f& p : mesh.positions()) p.z = is_flat ? 0 : p.z;
+      for (int i = 0; i < 40; ++i) {
+        Vec3f& peak = mesh.positions()[random() % mesh.vertex_count()];
+        peak.z += static_cast<float>(random() % 100) * 0.06f;
+      }
+      const auto scene = tree_of(mesh, 2, 250);
+      ASSERT_EQ(scene->level_count(), 2) << "with more levels the errors of all of them add up";
+      const auto tiles = by_id(*scene);
+      const Tile& root = *scene->tiles()[0];
+      const auto [positions, triangles] = leaves_beneath(tiles, root);
+      const Surface full(positions, triangles);
+      double largest = 0;
+      for (const Triangle& t : root.triangles) {
+        const Vec3f &a = root.positions[t[0]], &b = root.positions[t[1]], &c = root.positions[t[2]];
+        for (int i = 0; i <= kSteps; ++i) {
+          for (int j = 0; i + j <= kSteps; ++j) {
+            const float u = static_cast<float>(i) / kSteps, v = static_cast<float>(j) / kSteps, w = 1 - u - v;
+            const Vec3f p{w * a.x + u * b.x + v * c.x, w * a.y + u * b.y + v * c.y, w * a.z + u * b.z + v * c.z};
+            largest =
+                std::max(largest, full.squared_distance_anywhere(p, largest, std::numeric_limits<double>::infinity()));
+          }
+        }
+      }
+      EXPECT_LE(std::sqrt(largest), double{root.geometric_error_m}) << "seed " << seed << ", flat: " << is_flat;
     }
   }
 }

@@ -1,12 +1,16 @@
 #include "server/scene/worker_pool.hpp"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <atomic>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -39,12 +43,35 @@ TEST(WorkerPool, StartsLowerPriorityNumbersFirstAndEqualsInOrder) {
   EXPECT_EQ(order, (std::vector<int>{0, 1, 10, 11}));
 }
 
-TEST(WorkerPool, SurvivesAJobThatThrows) {
-  WorkerPool pool(1);
-  std::promise<void> after;
-  pool.post([] { throw std::runtime_error("expected by a test"); });
-  pool.post([&] { after.set_value(); });
-  after.get_future().wait();
+/// What is logged while it lives.
+class CapturedLog {
+ public:
+  CapturedLog() { spdlog::set_default_logger(std::make_shared<spdlog::logger>("captured", sink_)); }
+  ~CapturedLog() { spdlog::set_default_logger(before_); }
+  CapturedLog(const CapturedLog&) = delete;
+  CapturedLog& operator=(const CapturedLog&) = delete;
+
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
+  spdlog::sink_ptr sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_, true);
+};
+
+TEST(WorkerPool, SurvivesJobsThatThrowAndLogsThem) {
+  const CapturedLog log;
+  std::promise<std::thread::id> before, after;
+  {
+    WorkerPool pool(1);
+    pool.post([&] { before.set_value(std::this_thread::get_id()); });
+    pool.post([] { throw std::runtime_error("expected by a test"); });
+    pool.post([] { throw 42; });
+    pool.post([&] { after.set_value(std::this_thread::get_id()); });
+    EXPECT_EQ(after.get_future().get(), before.get_future().get()) << "the worker itself lives on";
+  }
+  EXPECT_NE(log.text().find("a worker's job failed: expected by a test"), std::string::npos) << log.text();
+  EXPECT_NE(log.text().find("a worker's job failed with something"), std::string::npos) << log.text();
 }
 
 TEST(WorkerPool, ForEachRunsEveryIndexOnce) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "fake_scene.hpp"
 #include "server/stream/viewer_stream.hpp"
@@ -71,6 +72,27 @@ TEST(TileLattice, IsWithinHalfAStepAndSharedByNeighbours) {
     ASSERT_EQ(left->positions[row * 20 + 19].x, right->positions[row * 20].x);
     EXPECT_EQ(decoded_x(left_lattice, row * 20 + 19), decoded_x(right_lattice, row * 20));
   }
+}
+
+TEST(TileLattice, HoldsEveryCornerOfTheLargestSceneThatAStepIsKeptFor) {
+  // A step of 1 m up to 2^21 steps and a little beyond: where a scene is too large for it, it must have been raised.
+  constexpr int kMostSteps = 1 << 21;
+  std::set<float> steps;
+  for (float reach_m = kMostSteps - 4; reach_m < kMostSteps + 2; reach_m += 0.25F) {
+    for (const float low_share : {0.0F, 0.5F, 1.0F}) {
+      const float low_m = -low_share * reach_m;
+      const Bounds bounds{{low_m, 0, 0}, {low_m + reach_m, 1, 1}};
+      const float step = position_step_in_force(0, 1, bounds);
+      steps.insert(step);
+      auto tile = testing::patch_tile({}, 2, 0, 20);
+      tile->positions[0] = bounds.min;
+      tile->positions[3] = bounds.max;
+      const auto lattice = tile_lattice(*tile, step);
+      ASSERT_TRUE(lattice.has_value()) << reach_m << " m from " << low_m << " m: " << lattice.error().message;
+      for (const auto& point : lattice.value().points) EXPECT_LT(point[0], kMostSteps);
+    }
+  }
+  EXPECT_EQ(steps, (std::set{1.0F, 2.0F}));
 }
 
 TEST(TileLattice, RefusesWhatItCannotHold) {

@@ -31,6 +31,17 @@ class Link {
     }
   }
 
+  /// Everything on its way arrives.
+  void drain() {
+    for (; !acknowledgements_.empty(); acknowledgements_.pop()) {
+      now_s_ = acknowledgements_.front().first;
+      EXPECT_TRUE(window.on_acknowledged(acknowledgements_.front().second, now_s_));
+    }
+  }
+
+  double now_s() const { return now_s_; }
+  std::uint32_t last_sequence() const { return last_sequence_; }
+
   SendingWindow window;
   double arrived_bytes = 0;
   double longest_queue_s = 0;
@@ -91,6 +102,24 @@ TEST(SendingWindow, AFrameLargerThanItGoesAlone) {
   EXPECT_TRUE(window.admits(1'000'000));
 }
 
+TEST(SendingWindow, DetailWaitsUntilWhatWasOvertakenHasArrived) {
+  using Urgency = SendingWindow::Urgency;
+  constexpr std::size_t kFrame = SendingWindow::kInitialBytes / 2;
+  SendingWindow window;
+  window.on_sent(1, kFrame, 0);
+  EXPECT_TRUE(window.admits(kFrame, Urgency::Detail));
+  window.on_overtaken();
+  EXPECT_FALSE(window.admits(kFrame, Urgency::Detail));
+  EXPECT_TRUE(window.admits(kFrame, Urgency::Answer));
+  window.on_sent(2, kFrame, 0);
+  EXPECT_TRUE(window.on_acknowledged(1, 0.001));
+  EXPECT_FALSE(window.admits(kFrame, Urgency::Detail)) << "the next frame is still on its way";
+  EXPECT_TRUE(window.admits(kFrame, Urgency::Answer));
+  window.on_sent(3, kFrame, 0.001);
+  EXPECT_TRUE(window.on_acknowledged(2, 0.002));
+  EXPECT_TRUE(window.admits(kFrame, Urgency::Detail));
+}
+
 TEST(SendingWindow, IgnoresAcknowledgementsThatMakeNoSense) {
   SendingWindow window;
   EXPECT_FALSE(window.on_acknowledged(1, 0));
@@ -107,18 +136,18 @@ TEST(SendingWindow, IgnoresAcknowledgementsThatMakeNoSense) {
 TEST(SendingWindow, APauseDoesNotCountAsASlowLink) {
   Link link(30'000);
   link.run(3, 5e6, 0.05);
-  const double before = link.window.rate_bytes_per_s();
+  link.drain();
   SendingWindow& window = link.window;
+  ASSERT_EQ(window.in_flight_bytes(), 0U);
+  const double before = window.rate_bytes_per_s();
   // Some small frames, far apart.
-  std::uint32_t sequence = 1'000'000;
-  double now_s = 100;
-  while (window.in_flight_bytes() > 0 && window.on_acknowledged(static_cast<std::uint32_t>(--sequence), now_s)) {
-  }
+  std::uint32_t sequence = link.last_sequence();
+  double now_s = link.now_s();
   for (int i = 0; i < 30; ++i) {
-    window.on_idle();
-    window.on_sent(2'000'000 + static_cast<std::uint32_t>(i), 500, now_s);
-    window.on_acknowledged(2'000'000 + static_cast<std::uint32_t>(i), now_s + 0.05);
     now_s += 1;
+    window.on_idle();
+    window.on_sent(++sequence, 500, now_s);
+    EXPECT_TRUE(window.on_acknowledged(sequence, now_s + 0.05));
   }
   EXPECT_GE(window.rate_bytes_per_s(), 0.9 * before);
 }

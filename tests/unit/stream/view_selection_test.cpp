@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "fake_scene.hpp"
 
@@ -187,6 +188,18 @@ TEST(MayBeInView, KeepsWhatIsSeenAndDropsWhatIsBehindOrBeside) {
   Camera looking_along_up = camera;
   looking_along_up.up = {1, 0, 0};
   EXPECT_TRUE(may_be_in_view(looking_along_up, box(5, 0, 0)));
+}
+
+TEST(MayBeInView, ReachesATenthBeyondThePicture) {
+  // Ten metres ahead the picture ends 10 m above and below the middle and 20 m beside it.
+  const Camera camera{.eye = {0, 0, 0}, .target = {1, 0, 0}, .up = {0, 0, 1}, .fov_y_deg = 90, .viewport = {1600, 800}};
+  for (const auto& [share, is_in_view] : {std::pair(1.05F, true), std::pair(1.15F, false)}) {
+    for (const float side : {-1.0F, 1.0F}) {
+      const fusion::Vec3f beside{10, 20 * share * side, 0}, above{10, 0, 10 * share * side};
+      EXPECT_EQ(may_be_in_view(camera, {beside, beside}), is_in_view) << share * side;
+      EXPECT_EQ(may_be_in_view(camera, {above, above}), is_in_view) << share * side;
+    }
+  }
 }
 
 TEST(CameraIsUsable, OnlyWhenItMakesSense) {
