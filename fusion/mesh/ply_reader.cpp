@@ -5,125 +5,60 @@
 #include <limits>
 #include <utility>
 
-#include "fusion/mesh/nearest_vertex.hpp"
 #include "fusion/mesh/ply_stream.hpp"
 #include "fusion/mesh/ply_values.hpp"
 #include "fusion/mesh/scene_origin.hpp"
+#include "fusion/mesh/thermal_join.hpp"
 
 namespace spectra::fusion {
 
 namespace {
 
-/// What a thermal file is read for.
-struct ThermalVertices {
-  std::vector<Vec3d> positions;
-  std::vector<float> temperature_celsius;
-  std::vector<Note> notes;
-};
-
 bool is_about_temperature(const Note& note) {
   return note.id.ends_with("_temperatures") || note.id == "no_temperature" || note.id == "temperature_property";
 }
 
-Result<ThermalVertices> read_thermal_vertices(const std::filesystem::path& path, const ReadOptions& options) {
-  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path, options));
-  const std::string name = path.filename().string();
-  if (!stream.has_temperature()) {
+/// A scene and the thermal file that shall lie on it.
+struct ScenePair {
+  LoadedScene scene;
+  LoadedScene thermal;
+};
+
+Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
+                            const ReadOptions& options) {
+  ReadOptions scene_options;  // those about temperature belong to the thermal file
+  scene_options.metres_per_unit = options.metres_per_unit;
+  BOOST_OUTCOME_TRY(LoadedScene thermal, read_ply(thermal_path, options));
+  if (!thermal.mesh.has_temperature) {
     return failure(
         ErrorCode::Unsupported,
-        name + ": the thermal file has no property that says temperature; --temperature-property NAME takes another",
-        name);
+        thermal.mesh.name +
+            ": the thermal file has no property that says temperature; --temperature-property NAME takes another",
+        thermal.mesh.name);
   }
-  ThermalVertices thermal;
-  thermal.positions.reserve(static_cast<std::size_t>(stream.vertex_count()));
-  thermal.temperature_celsius.reserve(static_cast<std::size_t>(stream.vertex_count()));
-  PlyHandlers handlers;
-  handlers.vertices = [&thermal](const PlyVertexBlock& block) -> Result<void> {
-    auto hole = block.left_out.begin();
-    for (std::size_t i = 0; i < block.positions.size(); ++i) {
-      if (hole != block.left_out.end() && *hole == i) {
-        ++hole;
-        continue;
-      }
-      thermal.positions.push_back(block.positions[i]);
-      thermal.temperature_celsius.push_back(block.temperature_celsius[i]);
+  BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, scene_options));
+  Result<void> overlap = check_overlap(scene, thermal);
+  if (!overlap && options.metres_per_unit != 1) {
+    const auto tell = [&options](LoadedScene& told, const std::string& scaled, const std::string& as_it_is) {
+      told.notes.push_back({"scaled_one_file", 1,
+                            "--scale " + number_text(options.metres_per_unit) + " taken for " + scaled +
+                                " alone: " + as_it_is + " is in metres already"});
+    };
+    ReadOptions unscaled = options;
+    unscaled.metres_per_unit = 1;
+    BOOST_OUTCOME_TRY(LoadedScene thermal_as_it_is, read_ply(thermal_path, unscaled));
+    if (check_overlap(scene, thermal_as_it_is)) {
+      tell(scene, scene.mesh.name, thermal.mesh.name);
+      return ScenePair{std::move(scene), std::move(thermal_as_it_is)};
     }
-    return success();
-  };
-  BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
-  for (Note& note : stream.notes(facts)) {
-    // Its faces and colours are not asked for, and the gaps are counted again after the join.
-    const bool is_asked_for = is_about_temperature(note) && note.id != "missing_temperatures";
-    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && note.id != "left_out_vertices" &&
-        !is_asked_for) {
-      continue;
+    BOOST_OUTCOME_TRY(LoadedScene scene_as_it_is, read_ply(path));
+    if (check_overlap(scene_as_it_is, thermal)) {
+      tell(scene_as_it_is, thermal.mesh.name, scene.mesh.name);
+      return ScenePair{std::move(scene_as_it_is), std::move(thermal)};
     }
-    thermal.notes.push_back({"thermal_" + note.id, note.count, name + ": " + note.message});
   }
-  return thermal;
-}
-
-std::string in_metres(double distance) {
-  return number_text(distance) + " m";
-}
-
-Vec3d absolute_position(const MultispectralMesh& mesh, std::size_t vertex) {
-  const Vec3f& p = mesh.positions()[vertex];
-  return {mesh.origin.x + static_cast<double>(p.x), mesh.origin.y + static_cast<double>(p.y),
-          mesh.origin.z + static_cast<double>(p.z)};
-}
-
-/// The temperature of vertex i of the thermal file for vertex i; says so when they are not where the others are.
-void join_in_order(const ThermalVertices& thermal, LoadedScene& scene) {
-  MultispectralMesh& mesh = scene.mesh;
-  const std::size_t count = mesh.vertex_count();
-  std::copy(thermal.temperature_celsius.begin(), thermal.temperature_celsius.end(), mesh.temperature_celsius().begin());
-  scene.notes.push_back(
-      {"thermal_joined_in_order", count,
-       "Temperatures of the thermal file taken in order: it has the same " + std::to_string(count) + " vertices"});
-  Vec3d min = thermal.positions[0];
-  Vec3d max = min;
-  for (const Vec3d& p : thermal.positions) {
-    min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
-    max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
-  }
-  constexpr double kSamePlace = 1e-3;
-  const double tolerance = kSamePlace * std::max({max.x - min.x, max.y - min.y, max.z - min.z});
-  std::uint64_t moved_count = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d p = absolute_position(mesh, i);
-    const Vec3d& q = thermal.positions[i];
-    const double distance = std::max({std::abs(p.x - q.x), std::abs(p.y - q.y), std::abs(p.z - q.z)});
-    moved_count += distance > tolerance ? 1U : 0U;
-  }
-  if (moved_count > 0) {
-    scene.notes.push_back(
-        {"thermal_positions_differ", moved_count,
-         std::to_string(moved_count) + " vertices are elsewhere in the thermal file, although it has as many"});
-  }
-}
-
-void join_nearest(const ThermalVertices& thermal, double join_distance_m, LoadedScene& scene) {
-  MultispectralMesh& mesh = scene.mesh;
-  const NearestVertex nearest(thermal.positions);
-  constexpr double kSpacings = 3;
-  const double distance = join_distance_m > 0 ? join_distance_m : kSpacings * nearest.median_spacing();
-  const std::span<float> temperatures = mesh.temperature_celsius();
-  std::uint64_t joined_count = 0;
-  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
-    const auto hit = nearest.find(absolute_position(mesh, i), distance);
-    temperatures[i] = hit ? thermal.temperature_celsius[hit->index] : std::numeric_limits<float>::quiet_NaN();
-    joined_count += hit ? 1U : 0U;
-  }
-  scene.notes.push_back({"thermal_joined_nearest", joined_count,
-                         std::to_string(joined_count) + " of " + std::to_string(mesh.vertex_count()) +
-                             " vertices have the temperature of the nearest thermal vertex within " +
-                             in_metres(distance)});
-  if (joined_count < mesh.vertex_count()) {
-    scene.notes.push_back({"thermal_not_reached", mesh.vertex_count() - joined_count,
-                           std::to_string(mesh.vertex_count() - joined_count) +
-                               " vertices have no thermal vertex within " + in_metres(distance)});
-  }
+  BOOST_OUTCOME_TRYV(overlap);
+  return ScenePair{std::move(scene), std::move(thermal)};
 }
 
 LeftOutVertex left_out_vertex(const PlyVertexBlock& block, std::uint32_t index) {
@@ -234,10 +169,9 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
     return failure(ErrorCode::OutOfRange, "join_distance_m is a finite distance of 0 (automatic) or more",
                    "join_distance_m");
   }
-  BOOST_OUTCOME_TRY(ThermalVertices thermal, read_thermal_vertices(thermal_path, options));
-  ReadOptions visible_options;
-  visible_options.metres_per_unit = options.metres_per_unit;
-  BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, visible_options));
+  BOOST_OUTCOME_TRY(auto pair, read_pair(path, thermal_path, options));
+  LoadedScene scene = std::move(pair.scene);
+  const LoadedScene& thermal = pair.thermal;
   // What stands in for them is told of below.
   std::erase_if(scene.notes, [](const Note& note) { return is_about_temperature(note); });
   if (scene.mesh.has_temperature) {
@@ -245,11 +179,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
                            "The file's own temperatures replaced by those of the thermal file"});
   }
   scene.mesh.has_temperature = true;
-  if (thermal.positions.size() == scene.mesh.vertex_count()) {
-    join_in_order(thermal, scene);
-  } else {
-    join_nearest(thermal, join_distance_m, scene);
-  }
+  BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene));
   const auto missing_count = static_cast<std::uint64_t>(
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
                     [](float celsius) { return std::isnan(celsius); }));
@@ -257,7 +187,15 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
     scene.notes.push_back(
         {"missing_temperatures", missing_count, std::to_string(missing_count) + " vertices without a temperature"});
   }
-  scene.notes.insert(scene.notes.end(), thermal.notes.begin(), thermal.notes.end());
+  for (const Note& note : thermal.notes) {
+    // Its faces and colours are not asked for, and the gaps are counted again after the join.
+    const bool is_asked_for = is_about_temperature(note) && note.id != "missing_temperatures";
+    if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && note.id != "left_out_vertices" &&
+        !is_asked_for) {
+      continue;
+    }
+    scene.notes.push_back({"thermal_" + note.id, note.count, thermal.mesh.name + ": " + note.message});
+  }
   return scene;
 }
 

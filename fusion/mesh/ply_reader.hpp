@@ -45,10 +45,10 @@ struct LoadedScene {
 /// the message begins with the file's name and says what and where.
 Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// The same, and takes the temperature of a second file, to which the options about temperature then belong (the scale of
-/// positions belongs to both): same vertex count = same order, else the nearest thermal vertex
-/// within `join_distance_m` (0 = three times the median spacing of the thermal vertices); vertices without one are missing.
-/// The notes tell which of the two was done, how many vertices were joined, and how many were not reached.
+/// The same, and takes the temperature of a second file, as thermal_join.hpp says; vertices without one are missing. The options
+/// about temperature then belong to the second file; the scale of positions belongs to both, or, where they overlap only so,
+/// to the one that needs it (note "scaled_one_file"). `join_distance_m`: 0 = found out.
+/// The notes tell how vertices were joined, how many and how far. Unsupported when the two do not overlap in place or size.
 Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
                                           const ReadOptions& options = {}, double join_distance_m = 0);
 

@@ -1,26 +1,13 @@
 #include "fusion/mesh/scene_survey.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdio>
 #include <string>
 
+#include "fusion/mesh/distance_text.hpp"
 #include "fusion/mesh/stray_points.hpp"
 
 namespace spectra::fusion {
 
 namespace {
-
-/// A distance to three digits, in the unit that people would use.
-std::string distance_text(double metres) {
-  const bool is_far = metres >= 1000;
-  const double value = is_far ? metres / 1000 : metres;
-  const int decimals = value > 0 ? std::clamp(2 - static_cast<int>(std::floor(std::log10(value))), 0, 6) : 0;
-  std::array<char, 400> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return std::string(text.data()) + (is_far ? " km" : " m");
-}
 
 void find_strays(LoadedScene& scene) {
   const StrayPoints strays = stray_points(scene.mesh.positions(), scene.mesh.triangles());

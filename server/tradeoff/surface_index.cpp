@@ -23,20 +23,6 @@ using Vec = std::array<double, 3>;
 Vec to_vec(fusion::Vec3f p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
-Vec minus(const Vec& a, const Vec& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-double dot(const Vec& a, const Vec& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/// Weights (of a, of b) of the point of the segment a-b nearest to p.
-std::pair<double, double> nearest_on_segment(const Vec& p, const Vec& a, const Vec& b) {
-  const Vec ab = minus(b, a);
-  const double length = dot(ab, ab);
-  const double t = length > 0 ? std::clamp(dot(minus(p, a), ab) / length, 0.0, 1.0) : 0.0;
-  return {1 - t, t};
-}
 
 double squared_distance(const Vec& p, const std::array<Vec, 3>& corners, const std::array<double, 3>& weights) {
   double sum = 0;
@@ -48,32 +34,6 @@ double squared_distance(const Vec& p, const std::array<Vec, 3>& corners, const s
 }
 
 }  // namespace
-
-std::array<double, 3> nearest_on_triangle(fusion::Vec3f place, fusion::Vec3f a, fusion::Vec3f b, fusion::Vec3f c) {
-  const Vec p = to_vec(place);
-  const std::array<Vec, 3> corner{to_vec(a), to_vec(b), to_vec(c)};
-  // Inside the triangle's prism the foot of the perpendicular is the answer, elsewhere the nearest of the three edges.
-  const Vec u = minus(corner[1], corner[0]), v = minus(corner[2], corner[0]), w = minus(p, corner[0]);
-  const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
-  const double area = uu * vv - uv * uv;
-  if (area > 0) {
-    const double s = (vv * uw - uv * vw) / area, t = (uu * vw - uv * uw) / area;
-    if (s >= 0 && t >= 0 && s + t <= 1) return {1 - s - t, s, t};
-  }
-  std::array<double, 3> best{};
-  double best_distance = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = (i + 1) % 3;
-    std::array<double, 3> weights{};
-    std::tie(weights[i], weights[j]) = nearest_on_segment(p, corner[i], corner[j]);
-    const double distance = squared_distance(p, corner, weights);
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = weights;
-    }
-  }
-  return best;
-}
 
 struct SurfaceIndex::State {
   std::vector<fusion::Vec3f> positions;

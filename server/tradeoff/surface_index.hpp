@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "fusion/mesh/nearest_surface.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::server {
@@ -32,7 +33,6 @@ class SurfaceIndex {
   std::unique_ptr<State> state_;
 };
 
-/// The point of the triangle a, b, c nearest to p, as barycentric weights; total for degenerate triangles.
-std::array<double, 3> nearest_on_triangle(fusion::Vec3f p, fusion::Vec3f a, fusion::Vec3f b, fusion::Vec3f c);
+using fusion::nearest_on_triangle;
 
 }  // namespace spectra::server

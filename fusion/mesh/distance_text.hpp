@@ -1,0 +1,10 @@
+#pragma once
+
+#include <string>
+
+namespace spectra::fusion {
+
+/// A distance in metres for people: three digits, and kilometres from 1000 m on.
+std::string distance_text(double metres);
+
+}  // namespace spectra::fusion
