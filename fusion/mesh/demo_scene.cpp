@@ -131,6 +131,7 @@ MultispectralMesh demo_scene(const DemoSceneOptions& options) {
   const std::vector<Vec3f> normals = demo::vertex_normals(scene);
   MultispectralMesh mesh;
   mesh.name = "demo";
+  mesh.up = UpAxis::Y;
   mesh.has_visible = true;
   mesh.has_temperature = true;
   mesh.resize_vertices(scene.positions.size());

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fusion/mesh/up_axis.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
@@ -55,10 +56,11 @@ class MultispectralMesh {
   /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM loses nothing).
   Vec3d origin;
   std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
-  bool has_visible = false;             ///< The input had colours; otherwise visible() is mid grey.
-  bool has_temperature = false;         ///< The input had a temperature property, or a thermal file was joined.
-  bool double_positions = false;        ///< The input had double positions; output keeps them.
-  std::string name;                     ///< For people: the file's name without folder, or "demo".
+  UpAxis up = UpAxis::Z;
+  bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
+  bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.
+  bool double_positions = false;  ///< The input had double positions; output keeps them.
+  std::string name;               ///< For people: the file's name without folder, or "demo".
 
  private:
   struct Storage;

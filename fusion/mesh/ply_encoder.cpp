@@ -16,8 +16,9 @@ constexpr std::size_t kMaxEntryBytes = 3 * 8 + 3 + 4;
 
 std::string header_text(const PlyLayout& layout) {
   const std::string coordinate = layout.double_positions ? "double" : "float";
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment written by Spectra\nelement vertex " +
-                     std::to_string(layout.vertex_count) + "\n";
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment written by Spectra\n";
+  if (!layout.comment.empty()) text += "comment " + layout.comment + "\n";
+  text += "element vertex " + std::to_string(layout.vertex_count) + "\n";
   for (const char* const axis : {"x", "y", "z"}) text += "property " + coordinate + " " + axis + "\n";
   for (const char* const channel : {"red", "green", "blue"}) {
     text += "property uchar " + std::string(channel) + "\n";

@@ -19,6 +19,7 @@ struct PlyLayout {
   Vec3d origin;                      ///< Added to every position.
   bool double_positions = false;
   bool has_temperature = false;
+  std::string comment;  ///< One line of the header; empty: none.
 };
 
 /// Makes the bytes of a binary little-endian PLY file, block after block, in constant memory.

@@ -18,6 +18,8 @@ struct Note {
   std::string id;  ///< snake_case, stable: "degenerate_faces", "triangulated_polygons", ...
   std::uint64_t count = 0;
   std::string message;  ///< One sentence for a person, with the count.
+  /// Something is probably not as it was meant, and the message says what mends it.
+  bool needs_attention = false;
 };
 
 /// A scene and what has to be said about it.

@@ -29,13 +29,15 @@ std::vector<Triangle> input_triangles(const MultispectralMesh& mesh) {
   return triangles;
 }
 
-Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours, PlyEncoder::Sink sink) {
+Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours, const std::string& comment,
+                    PlyEncoder::Sink sink) {
   PlyLayout layout;
   layout.vertex_count = mesh.vertex_count() + mesh.left_out.size();
   layout.triangle_count = mesh.triangle_count();
   layout.origin = mesh.origin;
   layout.double_positions = mesh.double_positions;
   layout.has_temperature = mesh.has_temperature;
+  layout.comment = comment;
   PlyEncoder encoder(layout, std::move(sink));
   if (colours.size() != mesh.vertex_count()) {
     return failure(ErrorCode::Inconsistent, "a mesh of " + std::to_string(mesh.vertex_count()) +
@@ -60,7 +62,7 @@ Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours
 }  // namespace
 
 Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours) {
-  BOOST_OUTCOME_TRY(encode(mesh, colours, [&out](std::span<const std::byte> bytes) -> Result<void> {
+  BOOST_OUTCOME_TRY(encode(mesh, colours, {}, [&out](std::span<const std::byte> bytes) -> Result<void> {
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     if (!out) return failure(ErrorCode::FileUnwritable, "the PLY stream cannot be written");
     return success();
@@ -69,10 +71,11 @@ Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::sp
   return success();
 }
 
-Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh,
-                       std::span<const Rgb8> colours) {
+Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours,
+                       const std::string& comment) {
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(path));
-  BOOST_OUTCOME_TRY(encode(mesh, colours, [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
+  BOOST_OUTCOME_TRY(
+      encode(mesh, colours, comment, [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
   return file.commit();
 }
 

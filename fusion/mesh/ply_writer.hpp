@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iosfwd>
 #include <span>
+#include <string>
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
@@ -14,7 +15,9 @@ namespace spectra::fusion {
 /// out of the mesh stand in their places again, in their visible colour.
 Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
 
-/// The same into a file that appears whole or not at all: written beside it, synced, then renamed.
-Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
+/// The same into a file that appears whole or not at all: written beside it, synced, then renamed. `comment`: one more line
+/// of the header.
+Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours,
+                       const std::string& comment = {});
 
 }  // namespace spectra::fusion

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fusion/error.hpp"
+#include "fusion/mesh/up_axis.hpp"
 
 namespace spectra::fusion {
 
@@ -33,6 +34,8 @@ struct ReadOptions {
   std::vector<double> no_data;
   /// Metres in one unit of the file's positions.
   double metres_per_unit = 1;
+  /// Which way is up; absent: found out. Reading does not need it, survey() does.
+  std::optional<UpAxis> up;
 
   /// How the temperature is scaled; nullopt: nobody said so, it is taken for degrees Celsius.
   std::optional<CelsiusScale> celsius_scale() const;

@@ -1,13 +1,32 @@
 #include "fusion/mesh/scene_survey.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "fusion/mesh/distance_text.hpp"
 #include "fusion/mesh/stray_points.hpp"
+#include "fusion/mesh/up_search.hpp"
 
 namespace spectra::fusion {
 
 namespace {
+
+/// Scenes this large and larger are maps, or count in millimetres.
+constexpr double kRoomInMillimetres = 1000;
+/// A map is flatter: its height is a smaller share of its width.
+constexpr double kFlat = 0.1;
+/// The step of floats in relation to the distance of neighbours above which shapes suffer.
+constexpr double kCoarse = 1.0 / 8;
+
+std::array<double, 3> extents_of(const Bounds& box) {
+  return {static_cast<double>(box.max.x) - static_cast<double>(box.min.x),
+          static_cast<double>(box.max.y) - static_cast<double>(box.min.y),
+          static_cast<double>(box.max.z) - static_cast<double>(box.min.z)};
+}
 
 void find_strays(LoadedScene& scene) {
   const StrayPoints strays = stray_points(scene.mesh.positions(), scene.mesh.triangles());
@@ -20,10 +39,85 @@ void find_strays(LoadedScene& scene) {
                              (is_one ? "it stays" : "they stay") + " in the scene, and views are fitted to the rest"});
 }
 
+void find_up(LoadedScene& scene, const std::optional<UpAxis>& wanted) {
+  if (wanted) {
+    scene.mesh.up = *wanted;
+    return;
+  }
+  const auto told = up_told(scene.comments);
+  const auto seen = told ? std::nullopt : up_seen(scene.mesh, *scene.core_bounds);
+  scene.mesh.up = told.value_or(seen.value_or(UpAxis::Z));
+  if (scene.mesh.up == UpAxis::Z) return;
+  const std::string name(to_string(scene.mesh.up));
+  scene.notes.push_back({"up_found", 1,
+                         name + " is taken for up, as " +
+                             (told ? "the file's comments say" : "this is a map that is flat in that direction") +
+                             "; --up z takes z"});
+}
+
+bool speaks_of_metres(const LoadedScene& scene) {
+  return std::any_of(scene.comments.begin(), scene.comments.end(), [](const std::string& comment) {
+    std::string text = comment;
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    for (std::size_t at = 0; (at = text.find("met", at)) != std::string::npos; ++at) {
+      const std::string_view rest = std::string_view(text).substr(at);
+      const bool is_word = at == 0 || text[at - 1] < 'a' || text[at - 1] > 'z';
+      if (is_word && (rest.starts_with("metre") || rest.starts_with("meter"))) return true;
+    }
+    return false;
+  });
+}
+
+/// Rooms and machines measured in millimetres look like mountains. Maps are flatter, or lie at map coordinates (then
+/// there is an origin), or say what they count in.
+void judge_size(LoadedScene& scene, double metres_per_unit) {
+  const auto extents = extents_of(*scene.core_bounds);
+  const double largest = *std::max_element(extents.begin(), extents.end());
+  const double smallest = *std::min_element(extents.begin(), extents.end());
+  const bool is_at_map_coordinates = scene.mesh.origin != Vec3d{};
+  if (metres_per_unit != 1 || largest < kRoomInMillimetres || smallest < kFlat * largest || is_at_map_coordinates ||
+      speaks_of_metres(scene)) {
+    return;
+  }
+  scene.notes.push_back({"may_be_millimetres", 1,
+                         "The scene is " + distance_text(largest) +
+                             " across: if its file counts in millimetres, --scale 0.001 gives it its true size",
+                         true});
+}
+
+/// Of floats in the file; doubles are finer than anything that is measured.
+void judge_precision(LoadedScene& scene) {
+  const MultispectralMesh& mesh = scene.mesh;
+  if (mesh.double_positions || mesh.vertex_count() < 2) return;
+  const Bounds& core = *scene.core_bounds;
+  const auto extents = extents_of(core);
+  const double diagonal = std::hypot(extents[0], extents[1], extents[2]);
+  const double spacing = diagonal / std::sqrt(static_cast<double>(mesh.vertex_count()));
+  double farthest = 0;
+  for (const double c :
+       {mesh.origin.x + static_cast<double>(core.min.x), mesh.origin.x + static_cast<double>(core.max.x),
+        mesh.origin.y + static_cast<double>(core.min.y), mesh.origin.y + static_cast<double>(core.max.y),
+        mesh.origin.z + static_cast<double>(core.min.z), mesh.origin.z + static_cast<double>(core.max.z)}) {
+    farthest = std::max(farthest, std::abs(c));
+  }
+  if (farthest == 0) return;
+  const double step = std::ldexp(1.0, std::ilogb(farthest) - 23);
+  if (step < kCoarse * spacing) return;
+  scene.notes.push_back({"coarse_positions", mesh.vertex_count(),
+                         "Positions are floats up to " + distance_text(farthest) + " from zero, where they are " +
+                             distance_text(step) +
+                             " apart: finer shape is not in the file; write doubles, or subtract an offset first",
+                         true});
+}
+
 }  // namespace
 
-void survey(LoadedScene& scene) {
+void survey(LoadedScene& scene, const ReadOptions& options) {
   find_strays(scene);
+  find_up(scene, options.up);
+  judge_size(scene, options.metres_per_unit);
+  judge_precision(scene);
 }
 
 }  // namespace spectra::fusion

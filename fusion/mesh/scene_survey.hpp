@@ -1,12 +1,17 @@
 #pragma once
 
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/mesh/read_options.hpp"
 
 namespace spectra::fusion {
 
-/// Finds out of a scene that was read what its numbers alone do not say, for those who look at it: sets core_bounds. What a
-/// person should know of it is added to the notes:
-/// - "stray_points": vertices far from everything else.
-void survey(LoadedScene& scene);
+/// Finds out of a scene that was read what its numbers alone do not say, for those who look at it: sets core_bounds and the
+/// mesh's up (as the options say; else as the file's comments tell it or its shape shows it; else z). What a person should
+/// know of it is added to the notes:
+/// - "stray_points": vertices far from everything else;
+/// - "up_found": up is not z, and nobody said so;
+/// - "may_be_millimetres": the size is one of a room, but in millimetres;
+/// - "coarse_positions": floats so far from 0 that what lies between neighbours was rounded away.
+void survey(LoadedScene& scene, const ReadOptions& options = {});
 
 }  // namespace spectra::fusion

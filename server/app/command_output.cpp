@@ -44,7 +44,7 @@ fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scen
                                                const std::optional<std::filesystem::path>& thermal,
                                                const fusion::ReadOptions& options) {
   auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal, options) : fusion::read_ply(scene, options);
-  if (loaded) fusion::survey(loaded.value());
+  if (loaded) fusion::survey(loaded.value(), options);
   return loaded;
 }
 

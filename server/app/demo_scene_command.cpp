@@ -1,5 +1,7 @@
 #include "fusion/mesh/demo_scene.hpp"
 
+#include <string>
+
 #include "fusion/mesh/ply_writer.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
@@ -10,7 +12,7 @@ namespace spectra::server {
 int run_demo_scene(const DemoSceneFileOptions& options) {
   const Interruption interruption;
   const auto mesh = fusion::demo_scene({options.vertex_count, options.seed});
-  const auto written = fusion::write_ply(options.output, mesh, mesh.visible());
+  const auto written = fusion::write_ply(options.output, mesh, mesh.visible(), "up " + std::string(to_string(mesh.up)));
   return written ? kDone : fail(written.error());
 }
 

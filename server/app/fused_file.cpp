@@ -120,7 +120,7 @@ fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std:
                                      const SceneFileOptions& options) {
   if (options.format == SceneFileFormat::Draco) return draco_file(mesh, colours, options);
   if (options.format == SceneFileFormat::Glb) {
-    BOOST_OUTCOME_TRY(auto bytes, glb_file(mesh, colours, options.up));
+    BOOST_OUTCOME_TRY(auto bytes, glb_file(mesh, colours, fusion::direction_of(mesh.up)));
     return SceneFile{std::move(bytes), {}};
   }
   std::ostringstream out;

@@ -36,7 +36,6 @@ std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, c
 /// How a fused scene is written.
 struct SceneFileOptions {
   SceneFileFormat format = SceneFileFormat::Ply;
-  fusion::Vec3f up{0, 0, 1};                                       ///< Of a GLB: which way the scene's up is.
   protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
   float position_step_m = 0;                                       ///< Of a Draco file that does not keep everything.
 };

@@ -31,6 +31,24 @@ protocol::ParameterKind to_message(fusion::ParameterKind kind) {
   return protocol::ParameterKind::Number;
 }
 
+protocol::UpAxis to_message(fusion::UpAxis up) {
+  switch (up) {
+    case fusion::UpAxis::X:
+      return protocol::UpAxis::X;
+    case fusion::UpAxis::Y:
+      return protocol::UpAxis::Y;
+    case fusion::UpAxis::Z:
+      return protocol::UpAxis::Z;
+    case fusion::UpAxis::MinusX:
+      return protocol::UpAxis::MinusX;
+    case fusion::UpAxis::MinusY:
+      return protocol::UpAxis::MinusY;
+    case fusion::UpAxis::MinusZ:
+      return protocol::UpAxis::MinusZ;
+  }
+  return protocol::UpAxis::Z;
+}
+
 protocol::ParameterValue to_message(const fusion::ParameterValue& value) {
   return std::visit(
       [](const auto& held) -> protocol::ParameterValue {
@@ -208,6 +226,8 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   message.tile_count = scene.tiles().size();
   message.levels = static_cast<std::uint32_t>(scene.level_count());
   message.position_step_m = double{scene.suggested_position_step_m()};
+  message.up = to_message(scene.up());
+  for (const auto& note : scene.notes()) message.notes.push_back({note.id, note.count, note.message});
   return message;
 }
 

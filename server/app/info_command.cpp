@@ -30,6 +30,12 @@ protocol::Bounds bounds_of(std::span<const fusion::Vec3f> positions) {
   return bounds;
 }
 
+/// Without strays.
+protocol::Bounds core_bounds_of(const fusion::LoadedScene& loaded) {
+  const auto& [low, high] = *loaded.core_bounds;
+  return {{double{low.x}, double{low.y}, double{low.z}}, {double{high.x}, double{high.y}, double{high.z}}};
+}
+
 std::array<double, 3> size_of(const protocol::Bounds& bounds) {
   return {bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1], bounds.max[2] - bounds.min[2]};
 }
@@ -37,7 +43,8 @@ std::array<double, 3> size_of(const protocol::Bounds& bounds) {
 nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::TemperatureSummary& temperature,
                          const protocol::Bounds& bounds, const fusion::TopologyFacts& topology) {
   const auto& mesh = loaded.mesh;
-  const auto size = size_of(bounds);
+  const auto core = core_bounds_of(loaded);
+  const auto size = size_of(core);
   auto notes = nlohmann::json::array();
   for (const auto& note : loaded.notes) {
     notes.push_back({{"id", note.id}, {"count", note.count}, {"message", note.message}});
@@ -51,7 +58,9 @@ nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::Temper
           {"double_positions", mesh.double_positions},
           {"origin", {mesh.origin.x, mesh.origin.y, mesh.origin.z}},
           {"bounds", protocol::to_json(bounds)},
+          {"core_bounds", protocol::to_json(core)},
           {"size_m", {size[0], size[1], size[2]}},
+          {"up", to_string(mesh.up)},
           {"temperature", protocol::to_json(to_message(temperature))},
           {"topology",
            {{"boundary_edge_count", topology.boundary_edge_count},
@@ -73,8 +82,9 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
   fmt::print("origin       {} {} {} m\n", mesh.origin.x, mesh.origin.y, mesh.origin.z);
   fmt::print("bounds       {} {} {} to {} {} {} m from the origin\n", bounds.min[0], bounds.min[1], bounds.min[2],
              bounds.max[0], bounds.max[1], bounds.max[2]);
-  const auto size = size_of(bounds);
+  const auto size = size_of(core_bounds_of(loaded));
   fmt::print("size         {:.6g} x {:.6g} x {:.6g} m\n", size[0], size[1], size[2]);
+  fmt::print("up           {}\n", to_string(mesh.up));
   fmt::print("colours      {}\n", mesh.has_visible ? "yes" : "none (shown as mid grey)");
   if (temperature.has_temperature()) {
     fmt::print("temperature  {} to {} degC, mean {:.3f}, sigma {:.3f}\n", temperature.minimum, temperature.maximum,

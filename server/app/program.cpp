@@ -33,6 +33,12 @@ void add_reading(CLI::App& command, fusion::ReadOptions& options) {
       ->allow_extra_args(false);
   command.add_option("--scale", options.metres_per_unit, "Metres in one unit of the file's positions")
       ->capture_default_str();
+  const auto set_up = [&options](const std::string& name) {
+    options.up = fusion::up_axis(name);
+    if (!options.up && name != "auto")
+      throw CLI::ValidationError("--up " + name, "x, y, z, -x, -y, -z or auto is wanted");
+  };
+  command.add_option_function<std::string>("--up", set_up, "Which way is up: x, y, z, -x, -y, -z or auto");
 }
 
 void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {

@@ -5,7 +5,10 @@
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "fusion/colour/palette.hpp"
 #include "fusion/registry.hpp"
@@ -25,6 +28,8 @@ namespace {
 /// Answers that one viewer may have computing at once, and changes it may have waiting.
 constexpr std::size_t kMaxComputing = 16;
 constexpr std::size_t kMaxWaiting = 512;
+/// The statuses that are notes on the scene: this and the note's id.
+const std::string kNotePrefix = "scene.";
 
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
   return scene ? scene->temperature() : fusion::SceneTemperature{};
@@ -127,6 +132,7 @@ void ViewerSession::opened() {
   hello.quality = to_message(quality());
   notify("hello", protocol::to_json(hello));
   if (stream_) set_plan(*plan_);
+  tell_notes();
   if (const auto message = served_.progress.message()) {
     set_status("scene_loading", protocol::StatusLevel::Info, message);
   }
@@ -374,6 +380,7 @@ void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& prepa
     plan_ = preparation->plan;
     begin_stream();
     notify("scene.changed", protocol::to_json(protocol::SceneChanged{to_message(*scene_)}));
+    tell_notes();
   }
   if (preparation->plan) set_plan(*preparation->plan);
   if (preparation->is_new_scene && preparation->plan) {
@@ -408,6 +415,20 @@ void ViewerSession::begin_stream() {
   if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
   if (camera_) stream_->set_camera(*camera_);
   if (is_subscribed_) stream_->subscribe(subscription_);
+}
+
+void ViewerSession::tell_notes() {
+  std::set<std::string> held;
+  for (const fusion::Note& note : scene_ ? scene_->notes() : std::span<const fusion::Note>()) {
+    const std::string id = kNotePrefix + note.id;
+    set_status(id, note.needs_attention ? protocol::StatusLevel::Warning : protocol::StatusLevel::Info, note.message);
+    held.insert(id);
+  }
+  std::vector<std::string> outdated;
+  for (const auto& [id, message] : statuses_) {
+    if (id.starts_with(kNotePrefix) && !held.contains(id)) outdated.push_back(id);
+  }
+  for (const auto& id : outdated) set_status(id, protocol::StatusLevel::Info, std::nullopt);
 }
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {

@@ -70,6 +70,8 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void start_preparation();
   void finish_preparation(const std::shared_ptr<Preparation>& preparation);
   void begin_stream();
+  /// Says what was noticed while the scene was read, and takes back what was said of the one before.
+  void tell_notes();
   void set_plan(fusion::FusionPlan plan);
   protocol::FusionReply fusion_reply() const;
   StreamQuality quality() const;

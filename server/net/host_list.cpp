@@ -21,6 +21,7 @@ bool is_name(std::string_view text) {
 /// One spelling per address: "::0001" and "::1" are the same host, and so are an IPv4 address and its mapped form.
 std::string canonical(std::string_view name) {
   std::string text(name);
+  if (text.size() > 1 && text.ends_with('.')) text.pop_back();
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   boost::system::error_code error;
@@ -68,6 +69,14 @@ bool HostList::add(std::string_view name) {
   const auto parsed = error ? host_name(name) : std::optional(canonical(name));
   if (parsed) names_.insert(*parsed);
   return parsed.has_value();
+}
+
+void HostList::add_machine(std::string_view name) {
+  const auto short_name = name.substr(0, name.find('.'));
+  if (short_name.empty()) return;
+  add(name);
+  add(short_name);
+  add(std::string(short_name) + ".local");
 }
 
 bool HostList::allows_name(const std::optional<std::string>& name, std::string_view local_address) const {

@@ -8,7 +8,7 @@
 namespace spectra::server {
 
 /// The name part of a `Host` value ("localhost:8080", "[::1]:80", "10.0.0.7"): lower case, IPv6 without brackets, no
-/// port. Nothing when the text is no host with an optional port. Safe on untrusted input.
+/// port, no dot at the end. Nothing when the text is no host with an optional port. Safe on untrusted input.
 std::optional<std::string> host_name(std::string_view host);
 
 /// The same for an `Origin` value ("http://robot:8080"); nothing for "null" and for schemes other than http and https.
@@ -23,6 +23,10 @@ class HostList {
 
   /// A name or address, as a person writes it (a port is ignored); false when it is none.
   bool add(std::string_view name);
+
+  /// The machine's own name, as gethostname() has it: whole, up to its first dot, and that with ".local", as which it is found
+  /// on a link without name servers. What is no name is left out.
+  void add_machine(std::string_view name);
 
   /// True when the value of a Host header names one of the list, or `local_address`, the address that the connection
   /// arrived at.

@@ -10,6 +10,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
@@ -155,6 +156,7 @@ void HttpServer::State::listen() {
   } else {
     context.hosts.add(endpoint.address().to_string());
   }
+  context.hosts.add_machine(asio::ip::host_name(error));
   for (const auto& name : options.allowed_hosts) {
     if (!context.hosts.add(name)) throw std::runtime_error("not a host name: " + name);
   }

@@ -162,7 +162,9 @@ class TiledSnapshot final : public SceneSnapshot {
         has_visible_(scene.mesh.has_visible),
         has_temperature_(scene.mesh.has_temperature),
         double_positions_(scene.mesh.double_positions),
-        left_out_(scene.mesh.left_out) {
+        left_out_(scene.mesh.left_out),
+        up_(scene.mesh.up),
+        notes_(std::move(scene.notes)) {
     std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
     std::vector<LeafFacts> facts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
@@ -185,6 +187,8 @@ class TiledSnapshot final : public SceneSnapshot {
   fusion::Vec3d origin() const override { return origin_; }
   const Bounds& bounds() const override { return bounds_; }
   const Bounds& core_bounds() const override { return core_bounds_; }
+  fusion::UpAxis up() const override { return up_; }
+  std::span<const fusion::Note> notes() const override { return notes_; }
   int level_count() const override { return tiles_.empty() ? 0 : tiles_.back()->id.level + 1; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return temperature_; }
@@ -233,6 +237,7 @@ class TiledSnapshot final : public SceneSnapshot {
     mesh.double_positions = double_positions_;
     mesh.left_out = left_out_;
     mesh.name = name_;
+    mesh.up = up_;
     mesh.resize_vertices(static_cast<std::size_t>(vertex_count_));
     mesh.triangles().resize(static_cast<std::size_t>(triangle_count_));
     const std::span<Vec3f> positions = mesh.positions();
@@ -329,6 +334,8 @@ class TiledSnapshot final : public SceneSnapshot {
   fusion::Vec3d origin_;
   bool has_visible_, has_temperature_, double_positions_;
   std::vector<fusion::LeftOutVertex> left_out_;
+  fusion::UpAxis up_;
+  std::vector<fusion::Note> notes_;
   Bounds bounds_, core_bounds_;
   std::vector<std::shared_ptr<const Tile>> tiles_;
   std::vector<std::shared_ptr<const Tile>> leaves_;

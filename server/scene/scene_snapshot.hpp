@@ -92,6 +92,9 @@ class SceneSnapshot {
   virtual const Bounds& bounds() const = 0;
   /// Of all that is worth a look: bounds() without the few vertices that lie far from everything else.
   virtual const Bounds& core_bounds() const = 0;
+  virtual fusion::UpAxis up() const = 0;
+  /// What was noticed while the scene was read.
+  virtual std::span<const fusion::Note> notes() const = 0;
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;

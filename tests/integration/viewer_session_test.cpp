@@ -396,6 +396,37 @@ TEST_F(ViewerSessionTest, WarnsWhenAMethodCannotShowWhatItShould) {
   EXPECT_EQ((*unsafe)["id"], "palette_not_fusion_safe");
 }
 
+TEST_F(ViewerSessionTest, TellsWhatWasNoticedInTheSceneAndTakesItBack) {
+  fusion::LoadedScene loaded{sheet(40), {}};
+  loaded.mesh.up = fusion::UpAxis::MinusY;
+  loaded.core_bounds = fusion::Bounds{{0, 0, 0}, {0.5F, 0.5F, 0}};
+  loaded.notes.push_back({"stray_points", 2, "2 are astray"});
+  loaded.notes.push_back({"may_be_millimetres", 1, "so large", true});
+  served_.scenes.replace(std::move(loaded), served_.pool);
+  Viewer viewer(server_->port());
+  const auto hello = viewer.wait_for("hello");
+  ASSERT_TRUE(hello);
+  const json& scene = (*hello)["scene"];
+  EXPECT_EQ(scene["up"], "-y");
+  EXPECT_EQ(scene["core_bounds"]["max"], (json{0.5, 0.5, 0}));
+  EXPECT_EQ(scene["notes"], (json{{{"id", "stray_points"}, {"count", 2}, {"message", "2 are astray"}},
+                                  {{"id", "may_be_millimetres"}, {"count", 1}, {"message", "so large"}}}));
+  EXPECT_EQ(*viewer.wait_for("status"),
+            (json{{"id", "scene.stray_points"}, {"level", "info"}, {"message", "2 are astray"}}));
+  EXPECT_EQ(*viewer.wait_for("status"),
+            (json{{"id", "scene.may_be_millimetres"}, {"level", "warning"}, {"message", "so large"}}));
+
+  serve(sheet(50));
+  std::map<std::string, json> cleared;
+  for (int i = 0; i < 2; ++i) {
+    const auto status = viewer.wait_for("status");
+    ASSERT_TRUE(status);
+    cleared[(*status)["id"]] = (*status)["message"];
+  }
+  EXPECT_EQ(cleared,
+            (std::map<std::string, json>{{"scene.stray_points", nullptr}, {"scene.may_be_millimetres", nullptr}}));
+}
+
 TEST_F(ViewerSessionTest, SendsStatisticsToASubscriber) {
   serve(sheet(40));
   Viewer viewer(server_->port());

@@ -109,17 +109,18 @@ TEST(GlbFile, IsTurnedToHaveYUp) {
   mesh.resize_vertices(1);
   mesh.positions()[0] = {1, 2, 3};
   const std::vector<fusion::Rgb8> colours(1);
-  const auto turned = [&](fusion::Vec3f up) {
-    const auto model = read_glb(scene_file(mesh, colours, {SceneFileFormat::Glb, up}).value().bytes);
+  const auto turned = [&](fusion::UpAxis up) {
+    mesh.up = up;
+    const auto model = read_glb(scene_file(mesh, colours, {SceneFileFormat::Glb}).value().bytes);
     return values_of<float>(model, model.meshes.at(0).primitives.at(0).attributes.at("POSITION"), 3);
   };
   // Each is a turn, not a mirror image: what was right-handed stays so.
-  EXPECT_EQ(turned({1, 0, 0}), (std::vector<float>{-2, 1, 3}));
-  EXPECT_EQ(turned({-1, 0, 0}), (std::vector<float>{2, -1, 3}));
-  EXPECT_EQ(turned({0, 1, 0}), (std::vector<float>{1, 2, 3}));
-  EXPECT_EQ(turned({0, -1, 0}), (std::vector<float>{1, -2, -3}));
-  EXPECT_EQ(turned({0, 0, 1}), (std::vector<float>{1, 3, -2}));
-  EXPECT_EQ(turned({0, 0, -1}), (std::vector<float>{1, -3, 2}));
+  EXPECT_EQ(turned(fusion::UpAxis::X), (std::vector<float>{-2, 1, 3}));
+  EXPECT_EQ(turned(fusion::UpAxis::MinusX), (std::vector<float>{2, -1, 3}));
+  EXPECT_EQ(turned(fusion::UpAxis::Y), (std::vector<float>{1, 2, 3}));
+  EXPECT_EQ(turned(fusion::UpAxis::MinusY), (std::vector<float>{1, -2, -3}));
+  EXPECT_EQ(turned(fusion::UpAxis::Z), (std::vector<float>{1, 3, -2}));
+  EXPECT_EQ(turned(fusion::UpAxis::MinusZ), (std::vector<float>{1, -3, 2}));
 }
 
 TEST(GlbFile, HasNoInfinity) {

@@ -42,6 +42,24 @@ TEST(HostList, KnowsLoopbackAndWhatWasAdded) {
   EXPECT_FALSE(hosts.add("not a host"));
 }
 
+TEST(HostList, KnowsTheMachineByItsNames) {
+  HostList hosts;
+  hosts.add_machine("Rescue-7.lab.example");
+  for (const char* host :
+       {"rescue-7", "RESCUE-7.local:8080", "rescue-7.lab.example", "Rescue-7.Lab.Example.:80", "rescue-7.local."}) {
+    EXPECT_TRUE(hosts.allows_host(host, "127.0.0.1")) << host;
+    EXPECT_TRUE(hosts.allows_origin(std::string("http://") + host, "127.0.0.1")) << host;
+  }
+  for (const char* host :
+       {"rescue-8.local", "rescue-7.local.evil", "lab.example", "local", ".local", "rescue-7..", "rescue-7.lab"}) {
+    EXPECT_FALSE(hosts.allows_host(host, "127.0.0.1")) << host;
+  }
+  HostList nameless;
+  for (const char* name : {"", ".", ".local", "no name"}) nameless.add_machine(name);
+  EXPECT_FALSE(nameless.allows_host(".local", "127.0.0.1"));
+  EXPECT_FALSE(nameless.allows_host("no", "127.0.0.1"));
+}
+
 TEST(HostList, AllowsTheAddressThatTheConnectionArrivedAt) {
   const HostList hosts;
   EXPECT_TRUE(hosts.allows_host("192.168.1.5:8080", "192.168.1.5"));

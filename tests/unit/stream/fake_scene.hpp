@@ -26,6 +26,8 @@ class FakeScene : public SceneSnapshot {
   fusion::Vec3d origin() const override { return {}; }
   const Bounds& bounds() const override { return bounds_; }
   const Bounds& core_bounds() const override { return bounds_; }
+  fusion::UpAxis up() const override { return fusion::UpAxis::Z; }
+  std::span<const fusion::Note> notes() const override { return {}; }
   int level_count() const override { return 3; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return temperature_; }
