@@ -1,8 +1,39 @@
 #include "fusion/fusion_plan.hpp"
 
+#include <algorithm>
+#include <array>
+#include <tuple>
+#include <utility>
+
 #include "fusion/registry.hpp"
 
 namespace spectra::fusion {
+namespace {
+
+std::pair<double, double> active_range(const RangeSetting& range, const SceneTemperature& scene) {
+  if (range.mode == RangeMode::Manual) return {range.minimum_celsius, range.maximum_celsius};
+  if (!scene.summary.has_temperature()) return {0, 0};
+  const double minimum = double{scene.summary.minimum};
+  const double maximum = double{scene.summary.maximum};
+  if (range.mode == RangeMode::Auto || !scene.histogram) return {minimum, maximum};
+  const Histogram histogram = scene.histogram(kPercentileBins);
+  return {std::clamp(histogram_quantile(histogram, range.low_percent / 100), minimum, maximum),
+          std::clamp(histogram_quantile(histogram, range.high_percent / 100), minimum, maximum)};
+}
+
+/// A colour that no method makes of a highlight over kUnmarked.
+constexpr Rgb8 kUnmarked = {0, 200, 100};
+
+const PaletteTable& telling_palette() {
+  static const PaletteTable table = [] {
+    PaletteTable rows;
+    rows.fill({250, 10, 10});
+    return rows;
+  }();
+  return table;
+}
+
+}  // namespace
 
 Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const SceneTemperature& scene) {
   const Palette* palette = find_palette(settings.palette);
@@ -19,14 +50,8 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
     return failure(ErrorCode::UnknownMethod, "method '" + settings.method + "' is unknown", "method");
   }
   FusionPlan plan;
-  if (!settings.range.automatic) {
-    plan.range_minimum_ = settings.range.minimum_celsius;
-    plan.range_maximum_ = settings.range.maximum_celsius;
-  } else if (scene.summary.has_temperature()) {
-    plan.range_minimum_ = double{scene.summary.minimum};
-    plan.range_maximum_ = double{scene.summary.maximum};
-  }
-  ParameterValues in_force = method->resolve(settings.params, plan.range_minimum_, plan.range_maximum_);
+  std::tie(plan.range_minimum_, plan.range_maximum_) = active_range(settings.range, scene);
+  ParameterValues in_force = method->resolve(settings.params, scene);
   // Without temperature nothing is compared, so automatic values cannot contradict anything.
   if (scene.summary.has_temperature()) {
     BOOST_OUTCOME_TRYV(method->check(in_force));
@@ -35,6 +60,10 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
   const MethodContext context{plan.range_minimum_, plan.range_maximum_, scene, palette, settings.missing};
   PreparedMethod prepared = method->prepare(in_force, context);
   plan.kernel_ = std::move(prepared.kernel);
+  if (method->highlights) {
+    const MethodContext telling{plan.range_minimum_, plan.range_maximum_, scene, telling_palette(), std::nullopt};
+    plan.marking_kernel_ = method->prepare(in_force, telling).kernel;
+  }
   plan.settings_ = std::make_shared<const FusionSettings>(settings);
   plan.params_in_force_ = std::make_shared<const ParameterValues>(std::move(in_force));
   plan.highlighted_ = std::make_shared<const std::vector<TemperatureInterval>>(std::move(prepared.highlighted));
@@ -44,6 +73,22 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
 void FusionPlan::fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
                       std::span<Rgb8> fused) const noexcept {
   kernel_->fuse(temperature_celsius, visible, fused);
+}
+
+void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept {
+  if (!marking_kernel_) {
+    std::ranges::fill(marked, std::uint8_t{0});
+    return;
+  }
+  constexpr std::size_t kBlock = 1024;
+  std::array<Rgb8, kBlock> colours;
+  for (std::size_t begin = 0; begin < temperature_celsius.size(); begin += kBlock) {
+    const std::size_t size = std::min(kBlock, temperature_celsius.size() - begin);
+    const std::span<Rgb8> block = std::span(colours).first(size);
+    std::ranges::fill(block, kUnmarked);
+    marking_kernel_->fuse(temperature_celsius.subspan(begin, size), block, block);
+    for (std::size_t i = 0; i < size; ++i) marked[begin + i] = block[i] == kUnmarked ? 0 : 1;
+  }
 }
 
 }  // namespace spectra::fusion

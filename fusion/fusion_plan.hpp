@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -38,13 +39,17 @@ class FusionPlan {
   void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
             std::span<Rgb8> fused) const noexcept;
 
+  /// Writes 1 where the method highlights a temperature so that it can be seen at all, else 0: of one visible colour that no
+  /// highlight resembles, it makes another. All 0 for a method that treats all temperatures alike.
+  void mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept;
+
   const FusionSettings& settings() const { return *settings_; }
 
   /// The active range in degC; both 0 when the scene has no temperature.
   double range_minimum() const { return range_minimum_; }
   double range_maximum() const { return range_maximum_; }
 
-  /// Every parameter with the value in force: automatic temperatures resolved to numbers.
+  /// Every parameter with the value in force: automatic ones resolved to numbers.
   const ParameterValues& params_in_force() const { return *params_in_force_; }
 
   /// The temperatures that the method shows otherwise than by the visible colour, ascending and disjoint, within the
@@ -54,6 +59,8 @@ class FusionPlan {
  private:
   FusionPlan() = default;
   std::shared_ptr<const Kernel> kernel_;
+  std::shared_ptr<const Kernel>
+      marking_kernel_;  ///< Under a palette of the plan's own; none where nothing is highlighted.
   std::shared_ptr<const FusionSettings> settings_;
   std::shared_ptr<const ParameterValues> params_in_force_;
   std::shared_ptr<const std::vector<TemperatureInterval>> highlighted_;

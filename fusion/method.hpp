@@ -50,10 +50,20 @@ struct Method {
   /// The method gives lightness to the visible picture, so that a palette which is not fusion_safe loses temperature.
   bool wants_fusion_safe_palette = false;
 
+  // What a method promises; the property tests hold it to its word.
+
+  /// Some temperatures are shown otherwise than by the visible colour, and FusionPlan::highlighted() says which.
+  bool highlights = false;
+  /// With `invert` what is highlighted is exactly what is not without it, except what stands on a threshold.
+  bool invert_complements = false;
+  /// Under a palette that gets lighter the hotter of two vertices is in no channel darker, where both are of one visible
+  /// colour (for a method that highlights: black, and beyond the hot threshold).
+  bool hotter_is_lighter = false;
+
   /// Whether values that are each allowed also go together; automatic ones are left out of the question.
   std::function<Result<void>(const ParameterValues&)> check;
-  /// The automatic temperatures among the values replaced by numbers, which follow the active range.
-  std::function<ParameterValues(const ParameterValues&, double range_minimum, double range_maximum)> resolve;
+  /// The automatic values replaced by numbers, which follow the scene and never the active range.
+  std::function<ParameterValues(const ParameterValues&, const SceneTemperature&)> resolve;
   /// Builds the kernel; the values are resolved and checked.
   std::function<PreparedMethod(const ParameterValues&, const MethodContext&)> prepare;
 };

@@ -28,8 +28,8 @@ std::string shown(const ParameterValue& value) {
   return std::visit(Visitor{}, value);
 }
 
-/// What the parameter takes, as words that follow "must be".
-std::string expectation(const Parameter& parameter) {
+/// What the parameter takes beside Automatic, as words that follow "must be".
+std::string number_expectation(const Parameter& parameter) {
   switch (parameter.kind) {
     case ParameterKind::Toggle:
       return "true or false";
@@ -39,7 +39,7 @@ std::string expectation(const Parameter& parameter) {
       return text;
     }
     case ParameterKind::Temperature:
-      return "a finite temperature in degC, or null for automatic";
+      return "a finite temperature in degC";
     case ParameterKind::Number:
     case ParameterKind::Integer:
       break;
@@ -56,6 +56,14 @@ std::string expectation(const Parameter& parameter) {
     text += " of at most " + shown(parameter.max);
   }
   return text;
+}
+
+bool allows_automatic(const Parameter& parameter) {
+  return parameter.automatic || parameter.kind == ParameterKind::Temperature;
+}
+
+std::string expectation(const Parameter& parameter) {
+  return number_expectation(parameter) + (allows_automatic(parameter) ? ", or null for automatic" : "");
 }
 
 auto refused(ErrorCode code, const Parameter& parameter, const std::string& given) {
@@ -92,6 +100,7 @@ std::string_view to_string(ParameterKind kind) {
 }
 
 Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value) {
+  if (std::holds_alternative<Automatic>(value) && allows_automatic(parameter)) return value;
   const std::optional<double> number = number_in(value);
   switch (parameter.kind) {
     case ParameterKind::Toggle:
@@ -106,8 +115,6 @@ Result<ParameterValue> validated(const Parameter& parameter, const ParameterValu
       }
       break;
     case ParameterKind::Temperature:
-      if (std::holds_alternative<Automatic>(value)) return value;
-      [[fallthrough]];
     case ParameterKind::Number:
       if (number) {
         if (!std::isfinite(*number) || !within_bounds(parameter, *number)) {
@@ -134,6 +141,7 @@ Result<ParameterValue> validated(const Parameter& parameter, const ParameterValu
 
 Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text) {
   const std::string given = "'" + std::string(text) + "'";
+  if (allows_automatic(parameter) && (text == "null" || text == "auto")) return ParameterValue{Automatic{}};
   switch (parameter.kind) {
     case ParameterKind::Toggle:
       if (text == "true" || text == "1" || text == "on" || text == "yes") return ParameterValue{true};
@@ -142,8 +150,6 @@ Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_v
     case ParameterKind::Choice:
       return validated(parameter, ParameterValue{std::string(text)});
     case ParameterKind::Temperature:
-      if (text == "null" || text == "auto") return ParameterValue{Automatic{}};
-      [[fallthrough]];
     case ParameterKind::Number:
     case ParameterKind::Integer:
       break;

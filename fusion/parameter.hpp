@@ -18,13 +18,13 @@ enum class ParameterKind { Number, Integer, Toggle, Choice, Temperature };
 /// "number", "integer", "toggle", "choice", "temperature".
 std::string_view to_string(ParameterKind kind);
 
-/// Stands for "automatic": a temperature that follows the active range. JSON null.
+/// Stands for "automatic": a value that follows the scene. JSON null.
 struct Automatic {
   friend bool operator==(Automatic, Automatic) = default;
 };
 
-/// The value of one parameter: Automatic or double for Temperature, double for Number, int64 for Integer,
-/// bool for Toggle, the option's id for Choice.
+/// The value of one parameter: double for Number and Temperature, int64 for Integer, bool for Toggle, the option's id for
+/// Choice; or Automatic where the parameter allows it.
 using ParameterValue = std::variant<Automatic, double, std::int64_t, bool, std::string>;
 
 /// Parameter name -> value.
@@ -44,6 +44,7 @@ struct Parameter {
   std::string unit = {};                                            ///< "degC", "deg", "" ...
   std::vector<std::string> options = {};                            ///< Choice only.
   double exclusive_min = -std::numeric_limits<double>::infinity();  ///< A bound that is itself not allowed (k > 0).
+  bool automatic = false;  ///< Automatic is allowed; of Temperature it always is.
 };
 
 /// Checks type and bounds of one value against its schema; integers are accepted where a number is asked for,

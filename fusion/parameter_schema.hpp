@@ -44,17 +44,25 @@ class ParameterSchema {
     });
   }
 
-  /// A temperature; nullopt = automatic, which is range_minimum + part(params) * (range_maximum - range_minimum).
+  /// What an automatic value is in a scene; the other values are those that are set.
+  template <class Value>
+  using AutomaticValue = std::function<Value(const Params&, const SceneTemperature&)>;
+
+  /// A temperature; nullopt = automatic, as are the next two.
   ParameterSchema& temperature(std::optional<double> Params::*member, Parameter entry,
-                               std::function<double(const Params&)> part) {
+                               AutomaticValue<double> automatic) {
     entry.kind = ParameterKind::Temperature;
     entry.unit = "degC";
-    entry.default_value = Automatic{};
-    automatic_.push_back({entry.name, std::move(part)});
-    return add(std::move(entry), [member](Params& params, const ParameterValue& value) {
-      const auto* number = std::get_if<double>(&value);
-      params.*member = number ? std::optional<double>(*number) : std::nullopt;
-    });
+    return bind_automatic<double>(member, std::move(entry), std::move(automatic));
+  }
+  ParameterSchema& number(std::optional<double> Params::*member, Parameter entry, AutomaticValue<double> automatic) {
+    entry.kind = ParameterKind::Number;
+    return bind_automatic<double>(member, std::move(entry), std::move(automatic));
+  }
+  ParameterSchema& integer(std::optional<std::int64_t> Params::*member, Parameter entry,
+                           AutomaticValue<std::int64_t> automatic) {
+    entry.kind = ParameterKind::Integer;
+    return bind_automatic<std::int64_t>(member, std::move(entry), std::move(automatic));
   }
 
   const std::vector<Parameter>& entries() const { return entries_; }
@@ -69,13 +77,11 @@ class ParameterSchema {
     return params;
   }
 
-  ParameterValues resolve(ParameterValues values, double range_minimum, double range_maximum) const {
+  ParameterValues resolve(ParameterValues values, const SceneTemperature& scene) const {
     const Params params = read(values);
-    for (const auto& [name, part] : automatic_) {
+    for (const auto& [name, automatic] : automatic_) {
       ParameterValue& value = values[name];
-      if (!std::holds_alternative<Automatic>(value)) continue;
-      // The two halves keep the span finite whatever the range.
-      value = range_minimum + 2 * (part(params) * (range_maximum / 2 - range_minimum / 2));
+      if (std::holds_alternative<Automatic>(value)) value = automatic(params, scene);
     }
     return values;
   }
@@ -96,9 +102,24 @@ class ParameterSchema {
                [member](Params& params, const ParameterValue& value) { params.*member = std::get<Value>(value); });
   }
 
+  template <class Value>
+  ParameterSchema& bind_automatic(std::optional<Value> Params::*member, Parameter entry,
+                                  AutomaticValue<Value> automatic) {
+    entry.default_value = Automatic{};
+    entry.automatic = true;
+    automatic_.push_back(
+        {entry.name, [automatic = std::move(automatic)](const Params& params, const SceneTemperature& scene) {
+           return ParameterValue{automatic(params, scene)};
+         }});
+    return add(std::move(entry), [member](Params& params, const ParameterValue& value) {
+      const auto* set = std::get_if<Value>(&value);
+      params.*member = set ? std::optional<Value>(*set) : std::nullopt;
+    });
+  }
+
   std::vector<Parameter> entries_;
   std::vector<Assign> assign_;
-  std::vector<std::pair<std::string, std::function<double(const Params&)>>> automatic_;
+  std::vector<std::pair<std::string, AutomaticValue<ParameterValue>>> automatic_;
 };
 
 /// A method from its description, its schema and the function that makes it ready.
@@ -111,8 +132,8 @@ Method make_method(Method description, const ParameterSchema<Params>& schema,
     if (check) return check(schema.read(values));
     return success();
   };
-  description.resolve = [schema](const ParameterValues& values, double range_minimum, double range_maximum) {
-    return schema.resolve(values, range_minimum, range_maximum);
+  description.resolve = [schema](const ParameterValues& values, const SceneTemperature& scene) {
+    return schema.resolve(values, scene);
   };
   description.prepare = [schema, prepare](const ParameterValues& values, const MethodContext& context) {
     return prepare(schema.read(values), context);

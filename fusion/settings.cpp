@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "fusion/colour/palette.hpp"
 #include "fusion/registry.hpp"
@@ -41,6 +42,37 @@ std::string known_palettes() {
   return text;
 }
 
+/// The range with what its mode does not use at its default. Adding zero turns -0 into 0, so that equal settings are equal
+/// in every bit.
+Result<RangeSetting> validated(const RangeSetting& range) {
+  switch (range.mode) {
+    case RangeMode::Auto:
+      break;
+    case RangeMode::Manual:
+      if (!std::isfinite(range.minimum_celsius) || !std::isfinite(range.maximum_celsius)) {
+        return failure(ErrorCode::OutOfRange, "range must have a finite minimum and maximum in degC", "range");
+      }
+      if (range.minimum_celsius > range.maximum_celsius) {
+        return failure(ErrorCode::Inconsistent, "range must have its minimum at or below its maximum", "range");
+      }
+      return RangeSetting::manual(range.minimum_celsius + 0.0, range.maximum_celsius + 0.0);
+    case RangeMode::Percentile:
+      for (const auto& [percent, field] :
+           {std::pair(range.low_percent, "low"), std::pair(range.high_percent, "high")}) {
+        if (percent >= 0 && percent <= 100) continue;
+        return failure(ErrorCode::OutOfRange,
+                       std::string("range.") + field + " is a percentage and must be of at least 0 and of at most 100",
+                       std::string("range.") + field);
+      }
+      if (range.low_percent >= range.high_percent) {
+        return failure(ErrorCode::Inconsistent,
+                       "range.low must be below range.high; both are percentages from 0 to 100", "range.low");
+      }
+      return RangeSetting::percentile(range.low_percent + 0.0, range.high_percent + 0.0);
+  }
+  return RangeSetting{};
+}
+
 /// A double in hexadecimal: exact and short.
 std::string exact(double value) {
   char buffer[40];
@@ -63,6 +95,14 @@ FusionSettings default_settings() {
   settings.method = "thermal_visible_blend";
   settings.params = defaults_of(*find_method(settings.method));
   settings.palette = "iron";
+  return settings;
+}
+
+FusionSettings first_view_settings(const TemperatureSummary& scene) {
+  FusionSettings settings = default_settings();
+  settings.method = scene.has_temperature() ? "histogram_distribution" : "visible_only";
+  settings.params = defaults_of(*find_method(settings.method));
+  settings.range = RangeSetting::percentile(0.5, 99.5);
   return settings;
 }
 
@@ -101,18 +141,7 @@ Result<FusionSettings> with_change(const FusionSettings& settings, const FusionC
     changed.palette = palette->id;
   }
   if (change.range) {
-    const RangeSetting& range = *change.range;
-    if (range.automatic) {
-      changed.range = RangeSetting{};
-    } else {
-      if (!std::isfinite(range.minimum_celsius) || !std::isfinite(range.maximum_celsius)) {
-        return failure(ErrorCode::OutOfRange, "range must have a finite minimum and maximum in degC", "range");
-      }
-      if (range.minimum_celsius > range.maximum_celsius) {
-        return failure(ErrorCode::Inconsistent, "range must have its minimum at or below its maximum", "range");
-      }
-      changed.range = {false, range.minimum_celsius + 0.0, range.maximum_celsius + 0.0};
-    }
+    BOOST_OUTCOME_TRY(changed.range, validated(*change.range));
   }
   if (change.missing) changed.missing = *change.missing;
   return changed;
@@ -122,10 +151,16 @@ std::string cache_key(const FusionSettings& settings) {
   std::string key = settings.method;
   for (const auto& [name, value] : settings.params) key += ";" + name + "=" + std::visit(KeyText{}, value);
   key += ";palette=" + settings.palette + ";range=";
-  if (settings.range.automatic) {
-    key += "auto";
-  } else {
-    key += exact(settings.range.minimum_celsius) + ":" + exact(settings.range.maximum_celsius);
+  switch (settings.range.mode) {
+    case RangeMode::Auto:
+      key += "auto";
+      break;
+    case RangeMode::Manual:
+      key += exact(settings.range.minimum_celsius) + ":" + exact(settings.range.maximum_celsius);
+      break;
+    case RangeMode::Percentile:
+      key += "percentile:" + exact(settings.range.low_percent) + ":" + exact(settings.range.high_percent);
+      break;
   }
   key += ";missing=";
   if (const MissingDisplay& missing = settings.missing) {

@@ -1,19 +1,40 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
 #include "fusion/error.hpp"
 #include "fusion/parameter.hpp"
+#include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
 
-/// The active temperature range: automatic = extremes of the finite temperatures of the whole scene.
+/// Where the active temperature range comes from.
+enum class RangeMode {
+  Auto,        ///< The extremes of the finite temperatures of the whole scene.
+  Manual,      ///< Set by hand.
+  Percentile,  ///< The temperatures below which two shares of the finite ones lie.
+};
+
+/// Bins of the histogram from which percentiles are read: they are off by at most one bin.
+inline constexpr std::uint32_t kPercentileBins = 4096;
+
+/// The active temperature range. What its mode does not use is at its default.
 struct RangeSetting {
-  bool automatic = true;
-  double minimum_celsius = 0;  ///< Used when not automatic; finite, <= maximum_celsius.
+  RangeMode mode = RangeMode::Auto;
+  double minimum_celsius = 0;  ///< Of Manual; finite, <= maximum_celsius.
   double maximum_celsius = 0;
+  double low_percent = 1;  ///< Of Percentile; 0 <= low_percent < high_percent <= 100.
+  double high_percent = 99;
+
+  static RangeSetting manual(double minimum_celsius, double maximum_celsius) {
+    return {.mode = RangeMode::Manual, .minimum_celsius = minimum_celsius, .maximum_celsius = maximum_celsius};
+  }
+  static RangeSetting percentile(double low_percent = 1, double high_percent = 99) {
+    return {.mode = RangeMode::Percentile, .low_percent = low_percent, .high_percent = high_percent};
+  }
   friend bool operator==(const RangeSetting&, const RangeSetting&) = default;
 };
 
@@ -40,8 +61,13 @@ struct FusionChange {
   std::optional<MissingDisplay> missing;
 };
 
-/// thermal_visible_blend at its defaults, palette iron, automatic range, missing shown as visible.
+/// thermal_visible_blend at its defaults, palette iron, automatic range, missing shown as visible: what a file is fused
+/// with where nothing else is said.
 FusionSettings default_settings();
+
+/// What a person sees first of a scene: the method that shows its outliers, over the range that holds all but the outermost
+/// temperatures, so that one hot pipe does not hide a person. The visible colours of a scene without temperature.
+FusionSettings first_view_settings(const TemperatureSummary& scene);
 
 /// The settings after a change, or an Error that names the field; the given settings are untouched.
 Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change);

@@ -49,6 +49,7 @@ SurfaceMesh surfaces(std::uint64_t vertex_count, std::uint64_t seed) {
   mesh.celsius.reserve(room);
   mesh.dust.reserve(room);
   mesh.glow.reserve(room);
+  mesh.is_skin.reserve(room);
   mesh.triangles.reserve(2 * room);
   demo::Tessellator cut(spacing_for(vertex_count, seed), &mesh);
   add_everything(cut, seed);
@@ -78,6 +79,7 @@ void keep_seen(SurfaceMesh& mesh, const demo::ScanCoverage& coverage) {
     mesh.celsius[next] = mesh.celsius[i];
     mesh.dust[next] = mesh.dust[i];
     mesh.glow[next] = mesh.glow[i];
+    mesh.is_skin[next] = mesh.is_skin[i];
     new_index[i] = next++;
   }
   mesh.positions.resize(next);
@@ -85,6 +87,7 @@ void keep_seen(SurfaceMesh& mesh, const demo::ScanCoverage& coverage) {
   mesh.celsius.resize(next);
   mesh.dust.resize(next);
   mesh.glow.resize(next);
+  mesh.is_skin.resize(next);
   for (Triangle& t : mesh.triangles) {
     for (std::uint32_t& v : t) v = new_index[v];
   }
@@ -120,7 +123,7 @@ std::uint8_t level(double albedo, double light, double glow, double grain) {
 
 }  // namespace
 
-MultispectralMesh demo_scene(const DemoSceneOptions& options) {
+LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options) {
   const std::uint64_t wanted = std::clamp(options.vertex_count, kDemoSceneLeastVertices, kDemoSceneMostVertices);
   const std::uint64_t seed = demo::scramble(options.seed);
   const SurfaceMesh stand_in = surfaces(kStandInVertices, seed);
@@ -153,7 +156,11 @@ MultispectralMesh demo_scene(const DemoSceneOptions& options) {
     visible[i] = {level(c.r, lit.r, glow, grain), level(c.g, lit.g, glow, grain), level(c.b, lit.b, glow, grain)};
   }
   mesh.triangles() = std::move(scene.triangles);
-  return mesh;
+  return {std::move(mesh), std::move(scene.is_skin)};
+}
+
+MultispectralMesh demo_scene(const DemoSceneOptions& options) {
+  return labelled_demo_scene(options).mesh;
 }
 
 std::vector<DemoLandmark> demo_landmarks() {

@@ -27,6 +27,13 @@ struct DemoSceneOptions {
 /// vertical angle of 45 to 50 degrees.
 MultispectralMesh demo_scene(const DemoSceneOptions& options);
 
+/// The demo scene and which of its vertices are the bare skin of the person, for those who ask whether it is found.
+struct LabelledDemoScene {
+  MultispectralMesh mesh;
+  std::vector<std::uint8_t> is_skin;  ///< One a vertex: 1 or 0.
+};
+LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options);
+
 /// A place in the demo scene whose temperature is known, for tests and for trying out the tools.
 struct DemoLandmark {
   std::string_view name;  ///< For example "mug", "face", "exit_sign".

@@ -40,7 +40,7 @@ namespace {
 
 struct ColourMapped {
   std::optional<double> threshold;
-  double alpha = 0.5;
+  double alpha = 0.85;
   bool invert = false;
 };
 
@@ -74,6 +74,8 @@ Method colour_mapped_threshold() {
   method.id = "colour_mapped_threshold";
   method.label = "Colour-mapped threshold";
   method.summary = "What passes a temperature threshold shows palette colours; the rest stays visible.";
+  method.highlights = true;
+  method.invert_complements = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

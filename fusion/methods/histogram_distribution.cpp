@@ -39,7 +39,7 @@ namespace spectra::fusion::methods {
 namespace {
 
 struct Distribution {
-  double k = 1;
+  double k = 1.5;
   double alpha = 1;
   bool invert = false;
 };
@@ -98,6 +98,8 @@ Method histogram_distribution() {
   method.id = "histogram_distribution";
   method.label = "Histogram distribution";
   method.summary = "Temperatures far from the scene's mean show palette colours; the rest stays visible.";
+  method.highlights = true;
+  method.invert_complements = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

@@ -94,6 +94,7 @@ Method intensity_hue() {
   method.label = "Intensity-hue mapping";
   method.summary = "The temperature gives the hue, the visible picture the lightness.";
   method.wants_fusion_safe_palette = true;
+  method.hotter_is_lighter = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

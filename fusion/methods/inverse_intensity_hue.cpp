@@ -92,7 +92,7 @@ namespace {
 enum class Mode { Substitute, Scale };
 
 struct InverseIntensityHue {
-  double k = 1;
+  double k = 0.5;
   Mode mode = Mode::Substitute;
 };
 
@@ -133,6 +133,7 @@ Method inverse_intensity_hue() {
   method.label = "Inverse intensity-hue mapping";
   method.summary = "The visible picture gives the hue, the temperature the brightness.";
   method.uses_palette = false;
+  method.hotter_is_lighter = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

@@ -39,6 +39,7 @@ HWY_AFTER_NAMESPACE();
 #include <array>
 #include <cmath>
 
+#include "fusion/colour/hues.hpp"
 #include "fusion/methods/threshold.hpp"
 #include "fusion/parameter_schema.hpp"
 
@@ -47,8 +48,8 @@ namespace {
 
 struct Monochrome {
   std::optional<double> threshold;
-  double alpha = 0.5;
-  double hue = 0;
+  double alpha = 0.8;
+  std::optional<double> hue;
   bool invert = false;
 };
 
@@ -62,11 +63,16 @@ ParameterSchema<Monochrome> schema() {
                                    .min = 0,
                                    .max = 1,
                                    .step = 0.01})
-      .number(&Monochrome::hue, {.name = "hue",
-                                 .label = "Hue",
-                                 .help = "The one hue of the highlight, an angle on the colour circle; it wraps.",
-                                 .step = 1,
-                                 .unit = "deg"});
+      .number(&Monochrome::hue,
+              {.name = "hue",
+               .label = "Hue",
+               .help = "The one hue of the highlight, an angle on the colour circle; automatic is the one the scene "
+                       "has least of.",
+               .step = 1,
+               .unit = "deg"},
+              [](const Monochrome&, const SceneTemperature& scene) {
+                return scene.hues ? rarest_hue_degrees(scene.hues()) : 0.0;
+              });
   add_invert(entries);
   return entries;
 }
@@ -87,8 +93,9 @@ HWY_EXPORT(fuse_monochrome);
 PreparedMethod prepare(const Monochrome& params, const MethodContext& context) {
   const double low = context.range_minimum;
   const double high = context.range_maximum;
-  const auto fuse = [intensity = params.invert ? Ramp::between(high, low, 1, 0.5) : Ramp::between(low, high, 1, 0.5),
-                     hue = pure_hue(params.hue), threshold = as_stored(*params.threshold), invert = params.invert,
+  const Ramp inverted = low == high ? Ramp::flat(0.5, 1, -1) : Ramp::between(high, low, 1, 0.5);
+  const auto fuse = [intensity = params.invert ? inverted : Ramp::between(low, high, 1, 0.5),
+                     hue = pure_hue(*params.hue), threshold = as_stored(*params.threshold), invert = params.invert,
                      alpha = static_cast<float>(params.alpha)](const VertexSpan& span) {
     HWY_DYNAMIC_DISPATCH(fuse_monochrome)(intensity, hue.data(), threshold, invert, alpha, span);
   };
@@ -103,6 +110,8 @@ Method monochrome_threshold() {
   method.label = "Monochrome threshold";
   method.summary = "What passes a temperature threshold glows in one hue; the rest stays visible.";
   method.uses_palette = false;
+  method.highlights = true;
+  method.invert_complements = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

@@ -1,7 +1,7 @@
 // Thermal highlighting: the palette fades in beyond two thresholds, the further the stronger.
 //
 //   u = (T - high) / (hi - high)   where T > high        u = (low - T) / (low - lo)   where T < low
-//   W = min(1, k u^2), u clamped to [0, 1]; a span that is not positive counts as u = 1
+//   W = min(1, k u^2), u clamped to [0, 1]; a span that is not positive counts as u = 1; W = 1 for an infinite T
 //   F = W M + (1 - W) V            between the thresholds V
 //
 // Source: Eqs. 6-7; the print divides the cold side by Tmax - Tlow, which gives the coldest point next to no weight or
@@ -11,6 +11,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "fusion/methods/thermal_highlighting.cpp"
 #include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include <limits>
 
 #include "fusion/methods/vertex_lanes-inl.hpp"
 
@@ -29,8 +31,10 @@ void fuse_highlighting(const ThermalTable& thermal, double hot_above, const Ramp
     const Doubles way =
         hn::Add(hn::Mul(hn::Sub(temperature, of_side(hot.origin, cold.origin)), of_side(hot.slope, cold.slope)),
                 of_side(hot.offset, cold.offset));
-    const Doubles u = hn::IfThenElseZero(hn::Or(is_hot, is_cold), hn::Min(way, hn::Set(d, 1)));
-    return hn::Min(hn::Set(d, 1), hn::Mul(hn::Set(d, k), hn::Mul(u, u)));
+    const Doubles u = hn::Min(way, hn::Set(d, 1));
+    const Doubles measured = hn::Min(hn::Set(d, 1), hn::Mul(hn::Set(d, k), hn::Mul(u, u)));
+    const auto infinite = hn::Eq(hn::Abs(temperature), hn::Set(d, std::numeric_limits<double>::infinity()));
+    return hn::IfThenElseZero(hn::Or(is_hot, is_cold), hn::IfThenElse(infinite, hn::Set(d, 1), measured));
   };
   const auto fill = [&](const float* temperature, const std::uint8_t*, std::size_t count, float* weight)
                         HWY_ATTR { map_in_double(temperature, count, weight, weight_of); };
@@ -43,8 +47,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 #include <algorithm>
-#include <limits>
 
+#include "fusion/methods/threshold.hpp"
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
@@ -56,7 +60,7 @@ struct Highlighting {
   std::optional<double> low;
   std::optional<double> high;
   Sides sides = Sides::Both;
-  double k = 1;
+  double k = 5;
 };
 
 ParameterSchema<Highlighting> schema() {
@@ -65,13 +69,16 @@ ParameterSchema<Highlighting> schema() {
       .temperature(&Highlighting::low,
                    {.name = "low",
                     .label = "Low threshold",
-                    .help = "Colder than this is highlighted; automatic follows the range."},
-                   [](const Highlighting&) { return 0.15; })
-      .temperature(&Highlighting::high,
-                   {.name = "high",
-                    .label = "High threshold",
-                    .help = "Hotter than this is highlighted; automatic follows the range."},
-                   [](const Highlighting&) { return 0.85; })
+                    .help = "Colder than this is highlighted; automatic follows the scene."},
+                   [](const Highlighting&, const SceneTemperature& scene) {
+                     return beside_mean(scene.summary, -kUnusualSigmas);
+                   })
+      .temperature(
+          &Highlighting::high,
+          {.name = "high",
+           .label = "High threshold",
+           .help = "Hotter than this is highlighted; automatic follows the scene."},
+          [](const Highlighting&, const SceneTemperature& scene) { return beside_mean(scene.summary, kUnusualSigmas); })
       .choice(&Highlighting::sides, {.name = "sides",
                                      .label = "Sides",
                                      .help = "Whether hot, cold or both ends are highlighted.",
@@ -102,8 +109,9 @@ PreparedMethod prepare(const Highlighting& params, const MethodContext& context)
   const bool cold = params.sides != Sides::Hot;
   const double low = *params.low;
   const double high = *params.high;
-  const Ramp up = high < context.range_maximum ? Ramp::between(high, context.range_maximum, 1, 1) : Ramp::constant(1);
-  const Ramp down = low > context.range_minimum ? Ramp::between(low, context.range_minimum, 1, 1) : Ramp::constant(1);
+  const Ramp up = high < context.range_maximum ? Ramp::between(high, context.range_maximum, 1, 1) : Ramp::flat(1, 1, 1);
+  const Ramp down =
+      low > context.range_minimum ? Ramp::between(low, context.range_minimum, 1, 1) : Ramp::flat(1, 1, -1);
   const auto fuse = [thermal = ThermalTable(context), up, down, k = params.k,
                      hot_above = hot ? double{as_stored(high)} : kNever,
                      cold_below = cold ? double{as_stored(low)} : -kNever](const VertexSpan& span) {
@@ -126,6 +134,8 @@ Method thermal_highlighting() {
   method.id = "thermal_highlighting";
   method.label = "Thermal highlighting";
   method.summary = "Palette colours fade in towards the hot and cold ends; the middle stays visible.";
+  method.highlights = true;
+  method.hotter_is_lighter = true;
   return make_method(std::move(method), schema(), &prepare, &check);
 }
 

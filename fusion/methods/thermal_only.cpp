@@ -47,6 +47,7 @@ Method thermal_only() {
   method.id = "thermal_only";
   method.label = "Thermal only";
   method.summary = "The temperature in palette colours, without the visible picture.";
+  method.hotter_is_lighter = true;
   return make_method(std::move(method), ParameterSchema<ThermalOnly>{}, &prepare);
 }
 

@@ -29,7 +29,7 @@ namespace spectra::fusion::methods {
 namespace {
 
 struct Blend {
-  double alpha = 0.5;
+  double alpha = 0.4;
 };
 
 ParameterSchema<Blend> schema() {
@@ -60,6 +60,7 @@ Method thermal_visible_blend() {
   method.id = "thermal_visible_blend";
   method.label = "Thermal-visible blend";
   method.summary = "Both pictures over each other with one opacity.";
+  method.hotter_is_lighter = true;
   return make_method(std::move(method), schema(), &prepare);
 }
 

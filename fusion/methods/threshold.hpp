@@ -1,18 +1,27 @@
 #pragma once
 
+#include <algorithm>
+
 #include "fusion/parameter_schema.hpp"
 
 namespace spectra::fusion::methods {
 
-/// The entry `threshold`, shared by the methods that have one: automatic is a quarter of the range from its hot end,
-/// inverted from its cold end.
+/// The automatic thresholds: so many standard deviations from the mean, within the data's extremes.
+inline constexpr double kUnusualSigmas = 1.5;
+inline double beside_mean(const TemperatureSummary& data, double sigmas) {
+  return std::clamp(data.mean + sigmas * data.sigma, double{data.minimum}, double{data.maximum});
+}
+
+/// The entry `threshold`, shared by the methods that have one.
 template <class Params>
 void add_threshold(ParameterSchema<Params>& entries) {
   entries.temperature(&Params::threshold,
                       {.name = "threshold",
                        .label = "Threshold",
-                       .help = "Hotter than this is highlighted (inverted: colder); automatic follows the range."},
-                      [](const Params& params) { return params.invert ? 0.25 : 0.75; });
+                       .help = "Hotter than this is highlighted (inverted: colder); automatic follows the scene."},
+                      [](const Params& params, const SceneTemperature& scene) {
+                        return beside_mean(scene.summary, params.invert ? -kUnusualSigmas : kUnusualSigmas);
+                      });
 }
 
 /// The entry `invert` of the threshold methods.

@@ -274,10 +274,10 @@ HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible
     const Colours colours = shade(vertices, stage.values(i));
     Colours without = vertices.visible;
     if (missing) without = {all(missing->r), all(missing->g), all(missing->b)};
-    const auto finite = hn::IsFinite(vertices.temperature);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.r, without.r))), quarter, r + i);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.g, without.g))), quarter, g + i);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(finite, colours.b, without.b))), quarter, b + i);
+    const auto missing_here = hn::IsNaN(vertices.temperature);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.r, colours.r))), quarter, r + i);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.g, colours.g))), quarter, g + i);
+    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.b, colours.b))), quarter, b + i);
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(bytes)) {
     hn::StoreInterleaved3(hn::Load(bytes, r + i), hn::Load(bytes, g + i), hn::Load(bytes, b + i), bytes, fused + 3 * i);
@@ -295,16 +295,16 @@ class AlwaysShown : public Weight {
   }
 };
 
-/// Whether every temperature of a block is finite.
-HWY_INLINE bool all_finite(const float* temperature, std::size_t count) {
+/// Whether no temperature of a block is missing.
+HWY_INLINE bool none_missing(const float* temperature, std::size_t count) {
   const FloatTag d;
   const hn::RebindToUnsigned<FloatTag> bits;
   auto largest = hn::Zero(bits);
   for (std::size_t i = 0; i < count; i += kLanes) {
-    // Without its sign bit, what is not finite is at least the pattern of infinity.
+    // Without its sign bit, what is not a number is above the pattern of infinity.
     largest = hn::Max(largest, hn::ShiftLeft<1>(hn::BitCast(bits, hn::LoadU(d, temperature + i))));
   }
-  return hn::AllTrue(bits, hn::Lt(largest, hn::Set(bits, 0xFF000000U)));
+  return hn::AllTrue(bits, hn::Lt(largest, hn::Set(bits, 0xFF000001U)));
 }
 
 #if HWY_TARGET == HWY_SCALAR
@@ -386,7 +386,7 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
     const std::size_t vertex = i / 3;
     const Floats v = all(visible[i]);
     Floats f = combine(weight.values(vertex), all(thermal.channel(vertex, i % 3)), v);
-    if (kSomeMissing && !hn::AllTrue(d, hn::IsFinite(hn::LoadU(d, temperature + vertex)))) {
+    if (kSomeMissing && hn::AllTrue(d, hn::IsNaN(hn::LoadU(d, temperature + vertex)))) {
       const std::uint8_t fixed[3] = {missing ? missing->r : visible[i], missing ? missing->g : visible[i],
                                      missing ? missing->b : visible[i]};
       f = all(fixed[i % 3]);
@@ -398,13 +398,13 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
   for (std::size_t i = 0; i < count; i += kLanes) {
     const auto loaded = padded.load(visible + 3 * i);
     const Floats weights = weight.values(i);
-    Floats finite = all(1);
-    if constexpr (kSomeMissing) finite = hn::IfThenElseZero(hn::IsFinite(hn::LoadU(d, temperature + i)), finite);
+    Floats present = all(1);
+    if constexpr (kSomeMissing) present = hn::IfThenZeroElse(hn::IsNaN(hn::LoadU(d, temperature + i)), present);
     const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) HWY_ATTR {
       const Floats v = padded.channels(loaded, kRegister);
       const Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
       if constexpr (!kSomeMissing) return levels(f);
-      return levels(hn::IfThenElse(hn::Gt(spread<kRegister>(finite), all(0)), f, missing ? fixed : v));
+      return levels(hn::IfThenElse(hn::Gt(spread<kRegister>(present), all(0)), f, missing ? fixed : v));
     };
     padded.store({level(std::integral_constant<int, 0>()), level(std::integral_constant<int, 1>()),
                   level(std::integral_constant<int, 2>()), level(std::integral_constant<int, 3>())},
@@ -430,7 +430,7 @@ struct ThermalBlock {
 
   HWY_INLINE void operator()(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
                              std::size_t count, const MissingDisplay& missing) {
-    const bool complete = all_finite(temperature, count);
+    const bool complete = none_missing(temperature, count);
     if (!weight.prepare(temperature, visible, count) && (complete || !missing)) {
       if (fused != visible) std::memcpy(fused, visible, 3 * count);
       return;

@@ -7,7 +7,7 @@
 namespace spectra::fusion {
 
 Ramp Ramp::between(double from, double to, double top, double degenerate) {
-  if (from == to) return constant(degenerate);
+  if (from == to) return flat(degenerate, top, 1);
   // Halves keep the span finite.
   const double half_span = to / 2 - from / 2;
   const double slope = half_span != 0 ? top / 2 / half_span : std::numeric_limits<double>::infinity();

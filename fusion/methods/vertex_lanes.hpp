@@ -17,11 +17,12 @@ struct Ramp {
   double offset = 0;
   double top = 1;
 
-  /// From 0 at `from` to `top` at `to`, which may be the lower one; where both are equal, `degenerate` for every T.
+  /// From 0 at `from` to `top` at `to`, which may be the lower one; where both are equal, flat at `degenerate`.
   static Ramp between(double from, double to, double top, double degenerate);
 
-  /// The same value everywhere.
-  static Ramp constant(double value) { return {0, 0, value, value}; }
+  /// The same value for every finite T. What is infinite takes the end of the ramp: `top` at +infinity where `direction` is
+  /// 1, at -infinity where it is -1, and 0 at the other.
+  static Ramp flat(double value, double top, double direction) { return {0, direction * 1e-300, value, top}; }
 };
 
 /// The palette over the active range, laid out for the kernels.
@@ -39,7 +40,7 @@ struct ThermalTable {
   alignas(64) std::array<std::array<float, 8>, 256> rows{};
 };
 
-/// T to 0..1 over the active range, 0.5 where the range is one point.
+/// T to 0..1 over the active range, 0.5 for every finite T where the range is one point.
 Ramp normalisation(const MethodContext& context);
 
 /// The nearest float32: how thresholds are compared. Infinite beyond the float32 range.

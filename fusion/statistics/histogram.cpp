@@ -23,7 +23,7 @@ void count_bins(const HistogramBinning& binning, const float* temperature, std::
       std::fill(padded + size, padded + kBlock, 0.0F);
       block = padded;
     }
-    histogram_bins(binning, block, kBlock, bin);
+    histogram_bins<InfiniteBin::None>(binning, block, kBlock, bin);
     std::size_t i = 0;
     for (; i + 4 <= size; i += 4) {
       ++tables[bin[i]];

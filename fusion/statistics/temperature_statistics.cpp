@@ -89,7 +89,7 @@ void TemperatureAccumulator::add(std::span<const float> temperature_celsius) {
 
 void TemperatureAccumulator::add_one(float value) {
   if (!std::isfinite(value)) {
-    ++missing_count_;
+    ++(std::isnan(value) ? missing_count_ : value > 0 ? over_range_count_ : under_range_count_);
     return;
   }
   ++finite_count_;
@@ -114,6 +114,8 @@ void TemperatureAccumulator::merge(const TemperatureAccumulator& other) {
   }
   finite_count_ += other.finite_count_;
   missing_count_ += other.missing_count_;
+  over_range_count_ += other.over_range_count_;
+  under_range_count_ += other.under_range_count_;
   minimum_ = std::min(minimum_, other.minimum_);
   maximum_ = std::max(maximum_, other.maximum_);
 }
@@ -122,6 +124,8 @@ TemperatureSummary TemperatureAccumulator::summary() const {
   TemperatureSummary result;
   result.finite_count = finite_count_;
   result.missing_count = missing_count_;
+  result.over_range_count = over_range_count_;
+  result.under_range_count = under_range_count_;
   if (finite_count_ == 0) return result;
   result.minimum = minimum_;
   result.maximum = maximum_;

@@ -4,17 +4,23 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
+
+#include "fusion/colour/hues.hpp"
 
 namespace spectra::fusion {
 
 /// Facts of the finite temperatures (degC) of a whole scene. Population mean and sigma, from exact sums: the same
-/// for every order and every split of the vertices.
+/// for every order and every split of the vertices. What the sensor could not measure, above or below its range, is
+/// infinite: it is counted apart and enters nothing else here.
 struct TemperatureSummary {
   std::uint64_t finite_count = 0;
-  std::uint64_t missing_count = 0;  ///< NaN or infinite.
-  float minimum = 0;                ///< degC; 0 when finite_count is 0, as are the next three.
+  std::uint64_t missing_count = 0;      ///< NaN.
+  std::uint64_t over_range_count = 0;   ///< +infinity.
+  std::uint64_t under_range_count = 0;  ///< -infinity.
+  float minimum = 0;                    ///< degC; 0 when finite_count is 0, as are the next three.
   float maximum = 0;
   double mean = 0;
   double sigma = 0;
@@ -33,8 +39,8 @@ struct Histogram {
 /// by the formula above, never by comparing edges.
 double histogram_edge(const Histogram& histogram, std::size_t index);
 
-/// Which bin of a histogram a finite temperature belongs to, by the formula of Histogram; temperatures outside the
-/// histogram's extremes count as the nearest.
+/// Which bin of a histogram a temperature belongs to, by the formula of Histogram; temperatures outside the histogram's
+/// extremes count as the nearest, what is infinite belongs to the first or the last bin.
 class HistogramBinning {
  public:
   /// The histogram's extremes and bin number are set; it has at least one bin.
@@ -44,7 +50,7 @@ class HistogramBinning {
         bins_(static_cast<double>(histogram.counts.size())) {}
 
   std::size_t operator()(float temperature_celsius) const {
-    if (!(span_ > 0)) return 0;
+    if (!(span_ > 0)) return double{temperature_celsius} < kInfinity ? 0 : static_cast<std::size_t>(bins_ - 1);
     const double position = (double{temperature_celsius} - minimum_) / span_ * bins_;
     // Truncation is the floor, because what is negative stops at 0.
     return position > 0 ? static_cast<std::size_t>(std::min(position, bins_ - 1)) : 0;
@@ -55,16 +61,18 @@ class HistogramBinning {
   double bins() const { return bins_; }
 
  private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double minimum_;
   double span_;
   double bins_;
 };
 
-/// What a fusion method may know of the scene. `histogram` is called only by a method that needs one; the scene
-/// may compute it then, and keep it.
+/// What a fusion method may know of the scene. `histogram` and `hues`, those of the visible colours, are called only by a
+/// method that needs them; the scene may compute them then, and keep them.
 struct SceneTemperature {
   TemperatureSummary summary;
   std::function<Histogram(std::uint32_t bins)> histogram;
+  std::function<Hues()> hues;
 };
 
 /// Collects a TemperatureSummary; exact, mergeable in any order, and of fixed size, so that one accumulator per tile
@@ -86,6 +94,8 @@ class TemperatureAccumulator {
   std::vector<std::uint64_t> square_high_by_exponent_;
   std::uint64_t finite_count_ = 0;
   std::uint64_t missing_count_ = 0;
+  std::uint64_t over_range_count_ = 0;
+  std::uint64_t under_range_count_ = 0;
   float minimum_;
   float maximum_;
 };

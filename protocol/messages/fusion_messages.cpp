@@ -18,7 +18,8 @@ std::span<const EnumWord<ParameterKind>> words_of() {
 
 template <>
 std::span<const EnumWord<RangeMode>> words_of() {
-  static constexpr EnumWord<RangeMode> kWords[] = {{RangeMode::Auto, "auto"}, {RangeMode::Manual, "manual"}};
+  static constexpr EnumWord<RangeMode> kWords[] = {
+      {RangeMode::Auto, "auto"}, {RangeMode::Manual, "manual"}, {RangeMode::Percentile, "percentile"}};
   return kWords;
 }
 
@@ -83,6 +84,7 @@ static void describe(auto& fields, Is<ParameterDescription> auto& message) {
   fields.require("step", message.step.value_or(1) > 0, "a number above 0");
   fields.unless_empty("unit", message.unit);
   fields.unless_empty("options", message.options);
+  fields.optional("automatic", message.automatic);
 }
 
 static void describe(auto& fields, Is<MethodDescription> auto& message) {
@@ -114,12 +116,16 @@ static void describe(auto& fields, Is<FusionRange> auto& message) {
   fields.field("mode", message.mode);
   fields.nullable("min", message.min);
   fields.nullable("max", message.max);
+  fields.optional("low", message.low);
+  fields.optional("high", message.high);
 }
 
 static void describe(auto& fields, Is<RangeChange> auto& message) {
   fields.field("mode", message.mode);
   fields.optional_or_null("min", message.min);
   fields.optional_or_null("max", message.max);
+  fields.optional("low", message.low);
+  fields.optional("high", message.high);
   const bool is_manual = message.mode == RangeMode::Manual;
   fields.require("min", !is_manual || message.min, "a number (degC) for a manual range");
   fields.require("max", !is_manual || message.max, "a number (degC) for a manual range");

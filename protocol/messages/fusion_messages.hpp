@@ -32,6 +32,7 @@ struct ParameterDescription {
   std::optional<double> step;           ///< Above 0.
   std::string unit;                     ///< Absent when empty.
   std::vector<std::string> options;     ///< Ids of a choice; absent when empty.
+  std::optional<bool> automatic;        ///< null = automatic is allowed; absent: it is not.
 };
 
 /// METHOD.
@@ -53,27 +54,31 @@ struct PaletteDescription {
   std::vector<std::array<double, 3>> colours;
 };
 
-enum class RangeMode { Auto, Manual };
+enum class RangeMode { Auto, Manual, Percentile };
 
-/// The active temperature range, degC; nullopt = null: no thermal data and automatic.
+/// The active temperature range, degC; nullopt = null: no thermal data and not set by hand.
 struct FusionRange {
   RangeMode mode = RangeMode::Auto;
   std::optional<double> min;
   std::optional<double> max;
+  std::optional<double> low;  ///< Percent, as is `high`; of percentile only.
+  std::optional<double> high;
 };
 
-/// A range as it is set. Manual has both bounds, min <= max; automatic ignores them.
+/// A range as it is set. Manual has both bounds, min <= max; percentile has low < high in percent, 1 and 99 where absent.
 struct RangeChange {
   RangeMode mode = RangeMode::Auto;
   std::optional<double> min;
   std::optional<double> max;
+  std::optional<double> low;
+  std::optional<double> high;
 };
 
 /// FUSION: the settings in force.
 struct FusionState {
   std::string method;
   ParameterValues params;           ///< What was set; null = automatic.
-  ParameterValues params_in_force;  ///< Automatic temperatures as numbers; null when the scene has none.
+  ParameterValues params_in_force;  ///< Automatic values as numbers; null when the scene has no temperature.
   std::string palette;
   FusionRange range;
   std::string missing = "visible";  ///< "visible" or "#rrggbb".

@@ -4,6 +4,12 @@
 
 namespace spectra::protocol {
 
+template <>
+std::span<const EnumWord<BeyondRange>> words_of() {
+  static constexpr EnumWord<BeyondRange> kWords[] = {{BeyondRange::Over, "over"}, {BeyondRange::Under, "under"}};
+  return kWords;
+}
+
 static void describe(auto& fields, Is<HistogramRequest> auto& message) {
   fields.field("bins", message.bins);
   fields.require("bins", message.bins >= 1 && message.bins <= 4096, "an integer from 1 to 4096");
@@ -17,6 +23,7 @@ static void describe(auto& fields, Is<HistogramReply> auto& message) {
   fields.nullable("mean", message.mean);
   fields.nullable("sigma", message.sigma);
   fields.field("highlighted", message.highlighted);
+  fields.optional("highlighted_share", message.highlighted_share);
 }
 
 static void describe(auto& fields, Is<ProbeRequest> auto& message) {
@@ -28,6 +35,7 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.field("vertex_index", message.vertex_index);
   fields.field("position", message.position);
   fields.nullable("temperature", message.temperature);
+  fields.optional("temperature_range", message.temperature_range);
   fields.field("visible", message.visible);
   fields.field("fused", message.fused);
   fields.field("distance", message.distance);
@@ -42,6 +50,8 @@ static void describe(auto& fields, Is<Extreme> auto& message) {
 static void describe(auto& fields, Is<ExtremesReply> auto& message) {
   fields.nullable("hottest", message.hottest);
   fields.nullable("coldest", message.coldest);
+  fields.optional("over_range", message.over_range);
+  fields.optional("under_range", message.under_range);
 }
 
 template <>

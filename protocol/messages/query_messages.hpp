@@ -21,6 +21,9 @@ struct HistogramReply {
   std::optional<double> mean;
   std::optional<double> sigma;
   std::vector<std::array<double, 2>> highlighted;  ///< Intervals [low, high] that the current method highlights.
+  /// Share of the surface (of points: of the vertices) that the method highlights, 0..1; absent for a method that shows all
+  /// temperatures alike.
+  std::optional<double> highlighted_share;
 };
 
 /// Params of scene.probe; metres relative to the scene origin, finite as float.
@@ -28,11 +31,15 @@ struct ProbeRequest {
   std::array<double, 3> position{};
 };
 
+/// Which end of the sensor's range a reading lies beyond.
+enum class BeyondRange { Over, Under };
+
 /// Result of scene.probe: the nearest vertex at full accuracy.
 struct ProbeReply {
-  std::uint64_t vertex_index = 0;     ///< In the input's order.
-  std::array<double, 3> position{};   ///< Metres relative to the scene origin.
-  std::optional<double> temperature;  ///< degC; null = missing.
+  std::uint64_t vertex_index = 0;                ///< In the input's order.
+  std::array<double, 3> position{};              ///< Metres relative to the scene origin.
+  std::optional<double> temperature;             ///< degC; null = missing, or beyond the sensor's range.
+  std::optional<BeyondRange> temperature_range;  ///< Absent where the sensor could tell the temperature, or has none.
   std::array<std::uint8_t, 3> visible{};
   std::array<std::uint8_t, 3> fused{};
   double distance = 0;  ///< Metres.
@@ -46,8 +53,10 @@ struct Extreme {
 
 /// Result of scene.extremes; null without thermal data.
 struct ExtremesReply {
-  std::optional<Extreme> hottest;
+  std::optional<Extreme> hottest;  ///< Of what the sensor could tell.
   std::optional<Extreme> coldest;
+  std::optional<std::array<double, 3>> over_range;  ///< A place beyond the sensor's range; absent where there is none.
+  std::optional<std::array<double, 3>> under_range;
 };
 
 nlohmann::json to_json(const HistogramRequest& message);

@@ -107,6 +107,11 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
     fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
     return histogram;
   };
+  scene.hues = [&mesh] {
+    fusion::Hues hues;
+    fusion::add_to_hues(mesh.visible(), hues);
+    return hues;
+  };
   return scene;
 }
 

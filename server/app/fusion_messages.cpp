@@ -49,6 +49,33 @@ protocol::UpAxis to_message(fusion::UpAxis up) {
   return protocol::UpAxis::Z;
 }
 
+protocol::RangeMode to_message(fusion::RangeMode mode) {
+  switch (mode) {
+    case fusion::RangeMode::Auto:
+      return protocol::RangeMode::Auto;
+    case fusion::RangeMode::Manual:
+      return protocol::RangeMode::Manual;
+    case fusion::RangeMode::Percentile:
+      return protocol::RangeMode::Percentile;
+  }
+  return protocol::RangeMode::Auto;
+}
+
+fusion::RangeSetting from_message(const protocol::RangeChange& range) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const fusion::RangeSetting usual;
+  switch (range.mode) {
+    case protocol::RangeMode::Auto:
+      break;
+    case protocol::RangeMode::Manual:
+      return fusion::RangeSetting::manual(range.min.value_or(kNone), range.max.value_or(kNone));
+    case protocol::RangeMode::Percentile:
+      return fusion::RangeSetting::percentile(range.low.value_or(usual.low_percent),
+                                              range.high.value_or(usual.high_percent));
+  }
+  return usual;
+}
+
 protocol::ParameterValue to_message(const fusion::ParameterValue& value) {
   return std::visit(
       [](const auto& held) -> protocol::ParameterValue {
@@ -96,6 +123,7 @@ protocol::ParameterDescription to_message(const fusion::Parameter& parameter) {
   if (parameter.step > 0) message.step = parameter.step;
   message.unit = parameter.unit;
   message.options = parameter.options;
+  if (parameter.automatic) message.automatic = true;
   return message;
 }
 
@@ -153,15 +181,18 @@ protocol::FusionState to_message(const fusion::FusionPlan& plan, const fusion::T
   message.params = to_message(settings.params);
   message.params_in_force = to_message(plan.params_in_force());
   message.palette = settings.palette;
-  message.range.mode = settings.range.automatic ? protocol::RangeMode::Auto : protocol::RangeMode::Manual;
+  message.range.mode = to_message(settings.range.mode);
   message.missing = missing_to_text(settings.missing);
-  const bool is_range_known = scene.has_temperature() || !settings.range.automatic;
-  if (is_range_known) {
+  if (scene.has_temperature() || settings.range.mode == fusion::RangeMode::Manual) {
     message.range.min = plan.range_minimum();
     message.range.max = plan.range_maximum();
   }
+  if (settings.range.mode == fusion::RangeMode::Percentile) {
+    message.range.low = settings.range.low_percent;
+    message.range.high = settings.range.high_percent;
+  }
   for (const auto& [name, value] : settings.params) {
-    if (!is_range_known && std::holds_alternative<fusion::Automatic>(value)) {
+    if (!scene.has_temperature() && std::holds_alternative<fusion::Automatic>(value)) {
       message.params_in_force.insert_or_assign(name, nullptr);
     }
   }
@@ -174,13 +205,7 @@ protocol::Result<fusion::FusionChange> from_message(const protocol::FusionChange
   change.palette = message.palette;
   for (const auto& [name, value] : message.params) change.params.emplace(name, from_message(value));
   if (message.range) {
-    fusion::RangeSetting range;
-    range.automatic = message.range->mode == protocol::RangeMode::Auto;
-    if (!range.automatic) {
-      range.minimum_celsius = message.range->min.value_or(std::numeric_limits<double>::quiet_NaN());
-      range.maximum_celsius = message.range->max.value_or(std::numeric_limits<double>::quiet_NaN());
-    }
-    change.range = range;
+    change.range = from_message(*message.range);
   }
   if (message.missing) {
     auto missing = missing_from_text(*message.missing);
@@ -195,14 +220,23 @@ protocol::RpcError to_rpc_error(const fusion::Error& error) {
   message.code = protocol::RpcErrorCode::InvalidParams;
   message.message = error.message;
   const bool is_own_field = error.field.empty() || error.field == "method" || error.field == "palette" ||
-                            error.field == "range" || error.field == "missing" || error.field.starts_with("params.");
+                            error.field == "range" || error.field.starts_with("range.") || error.field == "missing" ||
+                            error.field.starts_with("params.");
   message.field = is_own_field ? error.field : "params." + error.field;
   return message;
+}
+
+std::optional<std::string> palette_warning(const fusion::Method& method, const fusion::Palette* palette) {
+  if (!method.wants_fusion_safe_palette || palette == nullptr || palette->fusion_safe) return std::nullopt;
+  return "The palette " + palette->label + " does not carry temperature by hue alone, so " + method.label +
+         " hides part of it; choose one that is marked as safe.";
 }
 
 protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary) {
   protocol::SceneTemperature message;
   message.missing_count = summary.missing_count;
+  message.over_range_count = summary.over_range_count;
+  message.under_range_count = summary.under_range_count;
   if (summary.has_temperature()) {
     message.min = double{summary.minimum};
     message.max = double{summary.maximum};
@@ -232,8 +266,10 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
 }
 
 protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fusion::TemperatureSummary& scene,
-                                    const std::vector<fusion::TemperatureInterval>& highlighted) {
+                                    const std::vector<fusion::TemperatureInterval>& highlighted,
+                                    std::optional<double> highlighted_share) {
   protocol::HistogramReply message;
+  message.highlighted_share = highlighted_share;
   if (!scene.has_temperature()) return message;
   message.counts = histogram.counts;
   for (std::size_t i = 0; i <= histogram.counts.size(); ++i) {
@@ -249,7 +285,13 @@ protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
   protocol::ProbeReply message;
   message.vertex_index = probe.vertex_index;
   message.position = to_message(probe.position);
-  if (probe.temperature_celsius) message.temperature = double{*probe.temperature_celsius};
+  if (const auto celsius = probe.temperature_celsius) {
+    if (std::isfinite(*celsius)) {
+      message.temperature = double{*celsius};
+    } else {
+      message.temperature_range = *celsius > 0 ? protocol::BeyondRange::Over : protocol::BeyondRange::Under;
+    }
+  }
   message.visible = to_message(probe.visible);
   message.fused = to_message(fused);
   message.distance = probe.distance_m;
@@ -257,7 +299,12 @@ protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
 }
 
 protocol::ExtremesReply extremes_message(const SceneSnapshot& scene) {
-  return {to_message(scene.hottest()), to_message(scene.coldest())};
+  const auto place_of = [](const std::optional<Extreme>& extreme) -> std::optional<protocol::Vector3> {
+    if (!extreme) return std::nullopt;
+    return to_message(extreme->position);
+  };
+  return {to_message(scene.hottest()), to_message(scene.coldest()), place_of(scene.over_range()),
+          place_of(scene.under_range())};
 }
 
 protocol::QualityState to_message(const StreamQuality& quality) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "fusion/colour/palette.hpp"
@@ -33,13 +35,17 @@ protocol::FusionState to_message(const fusion::FusionPlan& plan, const fusion::T
 /// schema of the method that then holds.
 protocol::Result<fusion::FusionChange> from_message(const protocol::FusionChange& message);
 
+/// Why a palette suits a method badly, in words that say what to do; nothing where it does not.
+std::optional<std::string> palette_warning(const fusion::Method& method, const fusion::Palette* palette);
+
 /// InvalidParams with the field of the error; `is_known_method` tells a parameter's name from the other fields.
 protocol::RpcError to_rpc_error(const fusion::Error& error);
 
 protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary);
 protocol::SceneDescription to_message(const SceneSnapshot& scene);
 protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fusion::TemperatureSummary& scene,
-                                    const std::vector<fusion::TemperatureInterval>& highlighted);
+                                    const std::vector<fusion::TemperatureInterval>& highlighted,
+                                    std::optional<double> highlighted_share);
 protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused);
 protocol::ExtremesReply extremes_message(const SceneSnapshot& scene);
 

@@ -93,6 +93,10 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
   } else {
     fmt::print("temperature  none\n");
   }
+  if (temperature.over_range_count + temperature.under_range_count > 0) {
+    fmt::print("out of range {} vertices above and {} below what the sensor could tell\n", temperature.over_range_count,
+               temperature.under_range_count);
+  }
   if (!mesh.is_point_cloud()) {
     fmt::print(
         "topology     {} pieces, {} boundary edges, {} non-manifold edges, {} flipped edges, "

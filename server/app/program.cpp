@@ -72,7 +72,8 @@ void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& set
   command->add_option("--set", sets, "A parameter of the method, name=value (may be repeated)")
       ->allow_extra_args(false);
   command->add_option("--palette", options.settings.palette, "The palette (see: spectra methods)");
-  command->add_option("--range", options.settings.range, "The temperature range: auto or LO:HI in degC");
+  command->add_option("--range", options.settings.range,
+                      "The temperature range: auto, LO:HI in degC, or percentile[:LO:HI] in percent");
   command->add_option("--missing", options.settings.missing,
                       "Colour of vertices without temperature: visible or #rrggbb");
   command->add_option("--thermal", options.thermal, "A PLY file with the temperatures of the scene");

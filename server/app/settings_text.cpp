@@ -24,16 +24,22 @@ std::optional<double> finite_number(std::string_view text) {
 }  // namespace
 
 fusion::Result<fusion::RangeSetting> range_from_text(std::string_view text) {
+  constexpr std::string_view kPercentile = "percentile";
   if (text == "auto") return fusion::RangeSetting{};
-  const auto colon = text.find(':');
-  const auto low = finite_number(text.substr(0, colon));
-  const auto high = colon == std::string_view::npos ? std::nullopt : finite_number(text.substr(colon + 1));
+  if (text == kPercentile) return fusion::RangeSetting::percentile();
+  const bool is_percentile = text.starts_with(kPercentile) && text.substr(kPercentile.size()).starts_with(':');
+  const auto numbers = is_percentile ? text.substr(kPercentile.size() + 1) : text;
+  const auto colon = numbers.find(':');
+  const auto low = finite_number(numbers.substr(0, colon));
+  const auto high = colon == std::string_view::npos ? std::nullopt : finite_number(numbers.substr(colon + 1));
   if (!low || !high) {
     return failure(ErrorCode::WrongType,
-                   "range is \"" + std::string(text) + "\"; it must be auto or LO:HI with two numbers in degC",
+                   "range is \"" + std::string(text) +
+                       "\"; it must be auto, LO:HI with two numbers in degC, percentile, or percentile:LO:HI with two "
+                       "percentages from 0 to 100",
                    "range");
   }
-  return fusion::RangeSetting{false, *low, *high};
+  return is_percentile ? fusion::RangeSetting::percentile(*low, *high) : fusion::RangeSetting::manual(*low, *high);
 }
 
 fusion::Result<fusion::MissingDisplay> missing_from_text(std::string_view text) {

@@ -17,14 +17,14 @@ struct SettingsText {
   std::optional<std::string> method{};
   std::vector<std::pair<std::string, std::string>> params{};  ///< name, value; a later one of the same name wins.
   std::optional<std::string> palette{};
-  std::optional<std::string> range{};    ///< "auto" or "LO:HI", degC.
+  std::optional<std::string> range{};    ///< As range_from_text() reads it.
   std::optional<std::string> missing{};  ///< "visible" or "#rrggbb".
 };
 
 /// The settings of the text, or an Error that names the field and what would be accepted.
 fusion::Result<fusion::FusionSettings> settings_from_text(const SettingsText& text);
 
-/// "auto" or "LO:HI".
+/// "auto", "LO:HI" in degC, "percentile" or "percentile:LO:HI" in percent.
 fusion::Result<fusion::RangeSetting> range_from_text(std::string_view text);
 
 /// "visible" or "#rrggbb".

@@ -54,6 +54,7 @@ std::optional<double> if_positive(double value) {
 struct ViewerSession::Preparation {
   std::shared_ptr<const SceneSnapshot> scene;
   bool is_new_scene = false;
+  bool is_first_view = false;  ///< The viewer has changed nothing yet.
   fusion::FusionSettings settings;
   std::vector<FusionRequest> requests;
 
@@ -65,10 +66,11 @@ struct ViewerSession::Preparation {
   void run() {
     const auto temperature = temperature_of(scene);
     if (is_new_scene) {
+      if (is_first_view) settings = fusion::first_view_settings(temperature.summary);
       auto prepared = fusion::FusionPlan::prepare(settings, temperature);
       if (!prepared) {
         reset_reason = prepared.error().message;
-        settings = fusion::default_settings();
+        settings = fusion::first_view_settings(temperature.summary);
         prepared = fusion::FusionPlan::prepare(settings, temperature);
       }
       if (prepared) plan = std::move(prepared).value();
@@ -85,6 +87,7 @@ struct ViewerSession::Preparation {
     if (!prepared) return refused(to_rpc_error(prepared.error()));
     settings = std::move(changed).value();
     plan = std::move(prepared).value();
+    is_first_view = false;
     return to_message(*plan, temperature.summary);
   }
 };
@@ -114,8 +117,9 @@ void ViewerSession::opened() {
   });
 
   scene_ = served_.scenes.current();
-  // The default method looks at no histogram, so this takes microseconds.
-  plan_ = fusion::FusionPlan::prepare(fusion::default_settings(), temperature_of(scene_)).value();
+  // The scene has the histogram of percentiles already, so this takes microseconds.
+  const auto temperature = temperature_of(scene_);
+  plan_ = fusion::FusionPlan::prepare(fusion::first_view_settings(temperature.summary), temperature).value();
   if (scene_) begin_stream();
 
   protocol::Hello hello;
@@ -314,7 +318,9 @@ void ViewerSession::histogram(const Id& id, const json& params) {
   answer_from_pool(id, [scene = scene_, plan = *plan_, bins = request.value().bins]() -> Answer {
     const auto& temperature = scene->temperature();
     const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
-    return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted()));
+    const bool highlights = fusion::find_method(plan.settings().method)->highlights;
+    const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
+    return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
   });
 }
 
@@ -352,6 +358,7 @@ void ViewerSession::start_preparation() {
   const auto preparation = std::make_shared<Preparation>();
   preparation->is_new_scene = coming_scene_ != nullptr;
   preparation->scene = coming_scene_ ? std::exchange(coming_scene_, nullptr) : scene_;
+  preparation->is_first_view = is_first_view_;
   preparation->settings = plan_->settings();
   preparation->requests = std::exchange(waiting_, {});
   served_.pool.post(
@@ -375,6 +382,7 @@ void ViewerSession::start_preparation() {
 
 void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
   is_preparing_ = false;
+  is_first_view_ = preparation->is_first_view;
   if (preparation->is_new_scene && preparation->plan) {
     scene_ = preparation->scene;
     plan_ = preparation->plan;
@@ -444,13 +452,8 @@ void ViewerSession::set_plan(fusion::FusionPlan plan) {
              lacks_temperature
                  ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
                  : std::nullopt);
-  const fusion::Palette* palette = fusion::find_palette(settings.palette);
-  const bool is_unsafe = settings.method == "intensity_hue" && palette != nullptr && !palette->fusion_safe;
   set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
-             is_unsafe
-                 ? std::optional("The palette " + palette->label + " does not carry temperature by hue alone, so " +
-                                 method->label + " hides part of it; choose one that is marked as safe.")
-                 : std::nullopt);
+             palette_warning(*method, fusion::find_palette(settings.palette)));
 }
 
 protocol::FusionReply ViewerSession::fusion_reply() const {

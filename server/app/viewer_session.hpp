@@ -93,6 +93,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   std::optional<fusion::FusionPlan> plan_;
   std::vector<FusionRequest> waiting_;
   bool is_preparing_ = false;
+  bool is_first_view_ = true;  ///< The viewer has changed nothing yet: a new scene brings its own first view.
   std::size_t computing_count_ = 0;
 
   bool is_subscribed_ = false;

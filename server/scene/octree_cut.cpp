@@ -365,7 +365,7 @@ TemperatureRange TemperatureRange::joined(const TemperatureRange& other) const {
 TemperatureRange temperature_range(std::span<const float> temperature_celsius) {
   TemperatureRange range;
   for (const float t : temperature_celsius) {
-    if (!std::isfinite(t)) continue;
+    if (std::isnan(t)) continue;
     if (!(t >= range.lowest_celsius)) range.lowest_celsius = t;
     if (!(t <= range.highest_celsius)) range.highest_celsius = t;
   }

@@ -63,7 +63,7 @@ struct TemperatureRange {
   TemperatureRange joined(const TemperatureRange& other) const;
 };
 
-/// The range of those that are finite.
+/// The range of those that are not missing.
 TemperatureRange temperature_range(std::span<const float> temperature_celsius);
 
 /// Smallest box of some positions; of none: min above max.

@@ -1,6 +1,7 @@
 #include "server/scene/scene_snapshot.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <list>
@@ -24,14 +25,25 @@ std::span<const float> owned_temperature(const Tile& tile) {
   return std::span(tile.temperature_celsius).first(tile.owned_count);
 }
 
-/// Histograms of a scene by number of bins, each made when first asked for. Keeps the last few, because a slider may
-/// visit thousands.
-class HistogramSource {
+/// What is computed of all vertices of a scene: the histogram of percentiles at once, because a greeting must not wait for
+/// it; when first asked for histograms by number of bins, of which the last few are kept, because a slider may visit
+/// thousands, and the hues.
+class FactSource {
  public:
-  HistogramSource(std::vector<std::shared_ptr<const Tile>> leaves, const fusion::TemperatureSummary& summary)
-      : leaves_(std::move(leaves)), summary_(summary) {}
+  FactSource(std::vector<std::shared_ptr<const Tile>> leaves, const fusion::TemperatureSummary& summary)
+      : leaves_(std::move(leaves)), summary_(summary), percentiles_(counted(fusion::kPercentileBins)) {}
+
+  fusion::Hues hues() {
+    const std::lock_guard lock(mutex_);
+    if (!hues_) {
+      hues_.emplace();
+      for (const auto& leaf : leaves_) fusion::add_to_hues(std::span(leaf->visible).first(leaf->owned_count), *hues_);
+    }
+    return *hues_;
+  }
 
   fusion::Histogram histogram(std::uint32_t bins) {
+    if (bins == fusion::kPercentileBins) return percentiles_;
     const std::lock_guard lock(mutex_);
     const auto found = std::find_if(recent_.begin(), recent_.end(),
                                     [&](const fusion::Histogram& h) { return h.counts.size() == bins; });
@@ -39,9 +51,7 @@ class HistogramSource {
       recent_.splice(recent_.begin(), recent_, found);
       return recent_.front();
     }
-    fusion::Histogram made{summary_.minimum, summary_.maximum, std::vector<std::uint64_t>(bins)};
-    for (const auto& leaf : leaves_) fusion::add_to_histogram(owned_temperature(*leaf), made);
-    recent_.push_front(std::move(made));
+    recent_.push_front(counted(bins));
     if (recent_.size() > kKeptCount) recent_.pop_back();
     return recent_.front();
   }
@@ -49,10 +59,82 @@ class HistogramSource {
  private:
   static constexpr std::size_t kKeptCount = 16;
 
+  fusion::Histogram counted(std::uint32_t bins) const {
+    fusion::Histogram made{summary_.minimum, summary_.maximum, std::vector<std::uint64_t>(bins)};
+    for (const auto& leaf : leaves_) fusion::add_to_histogram(owned_temperature(*leaf), made);
+    return made;
+  }
+
   const std::vector<std::shared_ptr<const Tile>> leaves_;
   const fusion::TemperatureSummary summary_;
+  const fusion::Histogram percentiles_;
   std::mutex mutex_;
   std::list<fusion::Histogram> recent_;
+  std::optional<fusion::Hues> hues_;
+};
+
+double triangle_area(Vec3f a, Vec3f b, Vec3f c) {
+  const auto edge = [a](Vec3f to) {
+    return std::array{double{to.x} - double{a.x}, double{to.y} - double{a.y}, double{to.z} - double{a.z}};
+  };
+  const auto u = edge(b);
+  const auto v = edge(c);
+  return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+}
+
+/// The surface that each vertex of a leaf stands for: a third of its triangles.
+std::vector<float> vertex_areas(const Tile& leaf) {
+  std::vector<float> areas(leaf.positions.size());
+  for (const fusion::Triangle& triangle : leaf.triangles) {
+    const double area =
+        triangle_area(leaf.positions[triangle[0]], leaf.positions[triangle[1]], leaf.positions[triangle[2]]);
+    for (const std::uint32_t v : triangle) areas[v] += static_cast<float>(area / 3);
+  }
+  return areas;
+}
+
+/// Which share of a scene's surface a plan highlights. The surface of each vertex is found when first asked for, and kept.
+class SurfaceShare {
+ public:
+  SurfaceShare(std::span<const std::shared_ptr<const Tile>> leaves, bool is_point_cloud)
+      : leaves_(leaves), is_point_cloud_(is_point_cloud) {}
+
+  double highlighted(const fusion::FusionPlan& plan) {
+    if (!is_point_cloud_) std::call_once(once_, [this] { find_areas(); });
+    double marked_area = 0;
+    std::uint64_t marked_count = 0;
+    std::uint64_t count = 0;
+    std::vector<std::uint8_t> marked;
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+      const Tile& leaf = *leaves_[i];
+      marked.resize(leaf.temperature_celsius.size());
+      plan.mark(leaf.temperature_celsius, marked);
+      for (std::size_t v = 0; v < leaf.owned_count; ++v) marked_count += marked[v];
+      count += leaf.owned_count;
+      if (total_area_ > 0) {
+        for (std::size_t v = 0; v < marked.size(); ++v) marked_area += marked[v] != 0 ? double{areas_[i][v]} : 0;
+      }
+    }
+    if (total_area_ > 0) return std::min(1.0, marked_area / total_area_);
+    return count > 0 ? static_cast<double>(marked_count) / static_cast<double>(count) : 0;
+  }
+
+ private:
+  void find_areas() {
+    double total = 0;
+    for (const auto& leaf : leaves_) {
+      areas_.push_back(vertex_areas(*leaf));
+      for (const float area : areas_.back()) total += double{area};
+    }
+    // Beyond what floats hold, and without any extent, vertices are counted instead.
+    if (std::isfinite(total)) total_area_ = total;
+  }
+
+  const std::span<const std::shared_ptr<const Tile>> leaves_;
+  const bool is_point_cloud_;
+  std::once_flag once_;
+  std::vector<std::vector<float>> areas_;  ///< By leaf.
+  double total_area_ = 0;
 };
 
 /// Up to `kSampleCount` lengths of what neighbours in a leaf: edges, or in a point cloud nearest vertices.
@@ -108,7 +190,8 @@ float position_step_m(std::vector<double> distances, const Bounds& bounds) {
 struct LeafFacts {
   fusion::TemperatureAccumulator temperature;
   std::vector<double> distances;
-  std::optional<std::uint32_t> hottest, coldest;  ///< Indices into the leaf.
+  std::optional<std::uint32_t> hottest, coldest;         ///< Of the finite ones; indices into the leaf.
+  std::optional<std::uint32_t> over_range, under_range;  ///< The first of the input.
 };
 
 LeafFacts leaf_facts(const Tile& leaf) {
@@ -120,7 +203,12 @@ LeafFacts leaf_facts(const Tile& leaf) {
   };
   for (std::uint32_t v = 0; v < leaf.owned_count; ++v) {
     const float t = leaf.temperature_celsius[v];
-    if (!std::isfinite(t)) continue;
+    if (std::isnan(t)) continue;
+    if (std::isinf(t)) {
+      std::optional<std::uint32_t>& first = t > 0 ? facts.over_range : facts.under_range;
+      if (!first || is_before(v, *first)) first = v;
+      continue;
+    }
     const auto better = [&](std::optional<std::uint32_t>& best, bool is_beyond, bool is_equal) {
       if (is_beyond || (is_equal && is_before(v, *best))) best = v;
     };
@@ -194,7 +282,10 @@ class TiledSnapshot final : public SceneSnapshot {
   const fusion::SceneTemperature& temperature() const override { return temperature_; }
   std::optional<Extreme> hottest() const override { return hottest_; }
   std::optional<Extreme> coldest() const override { return coldest_; }
+  std::optional<Extreme> over_range() const override { return over_range_; }
+  std::optional<Extreme> under_range() const override { return under_range_; }
   float suggested_position_step_m() const override { return position_step_m_; }
+  double highlighted_share(const fusion::FusionPlan& plan) const override { return share_->highlighted(plan); }
 
   std::optional<Probe> probe(Vec3f position) const override {
     if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) return {};
@@ -224,7 +315,7 @@ class TiledSnapshot final : public SceneSnapshot {
     result.position = best_tile->positions[best_vertex];
     result.visible = best_tile->visible[best_vertex];
     const float temperature = best_tile->temperature_celsius[best_vertex];
-    if (std::isfinite(temperature)) result.temperature_celsius = temperature;
+    if (!std::isnan(temperature)) result.temperature_celsius = temperature;
     result.distance_m = std::sqrt(best_squared);
     return result;
   }
@@ -297,7 +388,7 @@ class TiledSnapshot final : public SceneSnapshot {
   void gather(std::vector<LeafFacts> facts) {
     fusion::TemperatureAccumulator accumulator;
     std::vector<double> distances;
-    std::uint32_t hottest_source = 0, coldest_source = 0;
+    std::uint32_t hottest_source = 0, coldest_source = 0, over_source = 0, under_source = 0;
     const auto take = [](std::optional<Extreme>& best, std::uint32_t& best_source, const Tile& leaf,
                          std::optional<std::uint32_t> vertex, float sign) {
       if (!vertex) return;
@@ -316,14 +407,18 @@ class TiledSnapshot final : public SceneSnapshot {
       distances.insert(distances.end(), facts[i].distances.begin(), facts[i].distances.end());
       take(hottest_, hottest_source, leaf, facts[i].hottest, 1.0f);
       take(coldest_, coldest_source, leaf, facts[i].coldest, -1.0f);
+      take(over_range_, over_source, leaf, facts[i].over_range, 1.0f);
+      take(under_range_, under_source, leaf, facts[i].under_range, -1.0f);
       corners.push_back(leaf.bounds.min);
       corners.push_back(leaf.bounds.max);
     }
     if (!corners.empty()) bounds_ = bounds_of(corners);
     position_step_m_ = position_step_m(std::move(distances), bounds_);
     temperature_.summary = accumulator.summary();
-    const auto source = std::make_shared<HistogramSource>(leaves_, temperature_.summary);
+    const auto source = std::make_shared<FactSource>(leaves_, temperature_.summary);
     temperature_.histogram = [source](std::uint32_t bins) { return source->histogram(bins); };
+    temperature_.hues = [source] { return source->hues(); };
+    share_ = std::make_unique<SurfaceShare>(leaves_, is_point_cloud_);
   }
 
   std::string name_;
@@ -340,7 +435,8 @@ class TiledSnapshot final : public SceneSnapshot {
   std::vector<std::shared_ptr<const Tile>> tiles_;
   std::vector<std::shared_ptr<const Tile>> leaves_;
   fusion::SceneTemperature temperature_;
-  std::optional<Extreme> hottest_, coldest_;
+  std::unique_ptr<SurfaceShare> share_;
+  std::optional<Extreme> hottest_, coldest_, over_range_, under_range_;
   float position_step_m_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "fusion/fusion_plan.hpp"
 #include "fusion/mesh/bounds.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 #include "fusion/mesh/ply_reader.hpp"
@@ -29,7 +30,8 @@ struct Tile {
   std::uint8_t child_mask = 0;
   float geometric_error_m = 0;  ///< Against the full mesh; 0 at leaves.
   Bounds bounds;
-  float lowest_celsius = 0;  ///< Of the geometry under this tile in the full mesh; NaN = no temperature.
+  /// Of the geometry under this tile in the full mesh; NaN = no temperature, infinite = beyond the sensor's range.
+  float lowest_celsius = 0;
   float highest_celsius = 0;
   std::uint32_t owned_count = 0;
   std::vector<fusion::Vec3f> positions;
@@ -42,9 +44,9 @@ struct Tile {
 
 /// The vertex nearest to a place, at full accuracy.
 struct Probe {
-  std::uint32_t vertex_index = 0;  ///< In the input's order.
-  fusion::Vec3f position;          ///< Metres relative to the scene origin.
-  std::optional<float> temperature_celsius;
+  std::uint32_t vertex_index = 0;            ///< In the input's order.
+  fusion::Vec3f position;                    ///< Metres relative to the scene origin.
+  std::optional<float> temperature_celsius;  ///< Infinite where the sensor was beyond its range.
   fusion::Rgb8 visible;
   double distance_m = 0;
 };
@@ -103,12 +105,18 @@ class SceneSnapshot {
   /// Of several equally near vertices the first of the input; nothing in an empty scene or at a position that is not
   /// finite.
   virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
-  /// Of several the first of the input; nothing without thermal data.
+  /// Of the finite temperatures; of several the first of the input; nothing without thermal data.
   virtual std::optional<Extreme> hottest() const = 0;
   virtual std::optional<Extreme> coldest() const = 0;
+  /// The first vertex of the input that is hotter or colder than the sensor could tell; its temperature is infinite.
+  virtual std::optional<Extreme> over_range() const = 0;
+  virtual std::optional<Extreme> under_range() const = 0;
   /// A position step (metres) that loses nothing the eye can see: about a quarter of the median edge length (of a point
   /// cloud: of the distance to the nearest neighbour). Positive and finite whatever the scene.
   virtual float suggested_position_step_m() const = 0;
+  /// Which share of the surface, 0 to 1, a plan made for this scene highlights; of a point cloud, or of a mesh without any
+  /// area, which share of the vertices. Thread-safe.
+  virtual double highlighted_share(const fusion::FusionPlan& plan) const = 0;
   /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
   virtual fusion::MultispectralMesh whole_mesh() const = 0;
 };

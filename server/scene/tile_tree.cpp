@@ -55,12 +55,18 @@ struct Node {
   std::vector<Node*> children;
 };
 
+/// How far a temperature that is not missing stands out; what is over or under range stands out most, whatever the median.
+double distance_from(float median_celsius, float celsius) {
+  if (std::isinf(celsius)) return std::numeric_limits<double>::infinity();
+  return std::fabs(static_cast<double>(celsius) - static_cast<double>(median_celsius));
+}
+
 /// Of two temperatures the one that is farther from the median; a missing one never; the higher of equals.
 float further_from(float median_celsius, float a, float b) {
-  if (!std::isfinite(a)) return b;
-  if (!std::isfinite(b)) return a;
-  const double from_a = std::fabs(static_cast<double>(a) - static_cast<double>(median_celsius));
-  const double from_b = std::fabs(static_cast<double>(b) - static_cast<double>(median_celsius));
+  if (std::isnan(a)) return b;
+  if (std::isnan(b)) return a;
+  const double from_a = distance_from(median_celsius, a);
+  const double from_b = distance_from(median_celsius, b);
   if (from_a == from_b) return std::max(a, b);
   return from_a > from_b ? a : b;
 }
@@ -370,8 +376,7 @@ void show_extreme(Tile& tile, std::uint32_t k, float celsius, float median_celsi
   const auto cost = [&](std::uint32_t v) {
     const float t = shown[v];
     const bool is_other = t == tile.lowest_celsius || t == tile.highest_celsius;
-    const double deviation =
-        std::isfinite(t) ? std::fabs(static_cast<double>(t) - static_cast<double>(median_celsius)) : -1;
+    const double deviation = std::isnan(t) ? -1 : distance_from(median_celsius, t);
     return std::tuple(is_other, is_kept_locked[v], deviation, v);
   };
   const auto is_cheaper = [&](std::uint32_t a, std::uint32_t b) { return cost(a) < cost(b); };

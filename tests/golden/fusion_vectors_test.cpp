@@ -74,7 +74,7 @@ TEST(FusionVectors, EveryChannelEqualsTheGoldenAnswer) {
     change.method = one["method"].get<std::string>();
     for (const auto& [name, value] : one["params"].items()) change.params[name] = parameter_value(value);
     if (!one["range"].is_null()) {
-      change.range = RangeSetting{false, one["range"][0].get<double>(), one["range"][1].get<double>()};
+      change.range = RangeSetting::manual(one["range"][0].get<double>(), one["range"][1].get<double>());
     }
     const auto settings = with_change(default_settings(), change);
     ASSERT_TRUE(settings.has_value()) << settings.error().message;

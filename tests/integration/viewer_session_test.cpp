@@ -172,7 +172,10 @@ TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
   EXPECT_EQ(hello["scene"]["temperature"]["missing_count"], 72);
   EXPECT_GE(hello["methods"].size(), 10U);
   EXPECT_GE(hello["palettes"].size(), 15U);
-  EXPECT_EQ(hello["fusion"]["method"], "thermal_visible_blend");
+  EXPECT_EQ(hello["fusion"]["method"], "histogram_distribution");
+  EXPECT_EQ(hello["fusion"]["range"]["mode"], "percentile");
+  EXPECT_EQ(hello["fusion"]["range"]["low"], 0.5);
+  EXPECT_EQ(hello["fusion"]["range"]["high"], 99.5);
   EXPECT_EQ(hello["limits"]["max_message_bytes"], 65536);
 }
 
@@ -199,9 +202,37 @@ TEST_F(ViewerSessionTest, ServesBeforeThereIsAScene) {
   const auto changed = viewer.wait_for("fusion.changed");
   ASSERT_TRUE(changed);
   EXPECT_EQ((*changed)["fusion"]["method"], "thermal_only") << "what was chosen before holds";
-  EXPECT_EQ((*changed)["fusion"]["range"]["min"], 15);
+  EXPECT_GE((*changed)["fusion"]["range"]["min"], 15);
+  EXPECT_LT((*changed)["fusion"]["range"]["min"], 16);
   EXPECT_TRUE(viewer.wait_for("stream.complete"));
   EXPECT_EQ(status_of(get("/readyz")), 200);
+}
+
+TEST_F(ViewerSessionTest, ASceneBringsItsFirstViewToThoseWhoHaveChangedNothing) {
+  Viewer changed(server_->port());
+  Viewer unchanged(server_->port());
+  EXPECT_EQ((*unchanged.wait_for("hello"))["fusion"]["method"], "visible_only");
+  ASSERT_TRUE(changed.wait_for("hello"));
+  ASSERT_TRUE(changed.call("fusion.set", {{"palette", "turbo"}}).contains("result"));
+  serve(sheet(60));
+  EXPECT_EQ((*unchanged.wait_for("fusion.changed"))["fusion"]["method"], "histogram_distribution");
+  EXPECT_EQ((*changed.wait_for("fusion.changed"))["fusion"]["method"], "visible_only");
+  serve(sheet(60, false));
+  EXPECT_EQ((*unchanged.wait_for("fusion.changed"))["fusion"]["method"], "visible_only");
+}
+
+TEST_F(ViewerSessionTest, SaysHowMuchIsHighlighted) {
+  serve(sheet(60));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  const auto share_of = [&](const json& change) {
+    EXPECT_TRUE(viewer.call("fusion.set", change).contains("result")) << change;
+    return viewer.call("scene.histogram", {{"bins", 8}})["result"].value("highlighted_share", -1.0);
+  };
+  EXPECT_EQ(share_of({{"method", "colour_mapped_threshold"}, {"params", {{"threshold", 1000}}}}), 0)
+      << "a threshold beyond the data is taken";
+  EXPECT_GT(share_of({{"params", {{"threshold", -1000}}}}), 0.9);
+  EXPECT_EQ(share_of({{"method", "thermal_only"}}), -1) << "it shows all temperatures alike";
 }
 
 TEST_F(ViewerSessionTest, SendsGeometryOnceAndColoursAfterEachChange) {
@@ -232,7 +263,7 @@ TEST_F(ViewerSessionTest, GivesEachViewerItsOwnSettings) {
   ASSERT_TRUE(one.call("fusion.set", {{"method", "thermal_only"}}).contains("result"));
   ASSERT_TRUE(one.wait_for("stream.complete"));
   EXPECT_NE(one.colours(), before);
-  EXPECT_EQ(two.call("fusion.get")["result"]["fusion"]["method"], "thermal_visible_blend");
+  EXPECT_EQ(two.call("fusion.get")["result"]["fusion"]["method"], "histogram_distribution");
   EXPECT_EQ(two.colours(), before);
 }
 
@@ -264,7 +295,7 @@ TEST_F(ViewerSessionTest, ARefusedChangeAmongOthersChangesNothing) {
   EXPECT_TRUE(viewer.response(good).contains("result"));
   EXPECT_EQ(viewer.response(bad)["error"]["data"]["field"], "palette");
   const auto fusion = viewer.response(last)["result"]["fusion"];
-  EXPECT_EQ(fusion["method"], "thermal_visible_blend");
+  EXPECT_EQ(fusion["method"], "histogram_distribution");
   EXPECT_EQ(fusion["params"]["alpha"], 0.25);
   EXPECT_EQ(fusion["palette"], "turbo");
 }
@@ -286,6 +317,9 @@ TEST_F(ViewerSessionTest, NamesTheFieldThatIsWrong) {
       {"fusion.set", {{"params", {{"gamma", 1}}}}, "params.gamma"},
       {"fusion.set", {{"palette", "no_such"}}, "palette"},
       {"fusion.set", {{"range", {{"mode", "manual"}, {"min", 3}, {"max", 1}}}}, "range"},
+      {"fusion.set", {{"range", {{"mode", "percentile"}, {"low", 60}, {"high", 40}}}}, "range.low"},
+      {"fusion.set", {{"range", {{"mode", "percentile"}, {"high", 101}}}}, "range.high"},
+      {"fusion.set", {{"range", {{"mode", "percentile"}, {"low", "few"}}}}, "range.low"},
       {"fusion.set", {{"missing", "red"}}, "missing"},
       {"scene.subscribe", {{"channels", {"temperature"}}}, "channels"},
       {"scene.histogram", {{"bins", 0}}, "bins"},
@@ -301,7 +335,7 @@ TEST_F(ViewerSessionTest, NamesTheFieldThatIsWrong) {
     EXPECT_TRUE(response["error"]["data"]["field"].get<std::string>().starts_with(field)) << response;
     EXPECT_FALSE(response["error"]["data"]["reason"].get<std::string>().empty());
   }
-  EXPECT_EQ(viewer.call("fusion.get")["result"]["fusion"]["params"]["alpha"], 0.5);
+  EXPECT_EQ(viewer.call("fusion.get")["result"]["fusion"]["params"]["alpha"], 1);
 }
 
 TEST_F(ViewerSessionTest, RefusesBadMessagesAndLivesOn) {
@@ -380,6 +414,8 @@ TEST_F(ViewerSessionTest, AnswersQuestionsAboutTheScene) {
 TEST_F(ViewerSessionTest, WarnsWhenAMethodCannotShowWhatItShould) {
   serve(sheet(40, false));
   Viewer viewer(server_->port());
+  EXPECT_EQ((*viewer.wait_for("hello"))["fusion"]["method"], "visible_only");
+  viewer.request("fusion.set", {{"method", "thermal_only"}});
   const auto status = viewer.wait_for("status");
   ASSERT_TRUE(status);
   EXPECT_EQ((*status)["id"], "no_temperature");

@@ -21,9 +21,22 @@ using test::FusionReference;
 /// Every property holds for every registered method.
 class EveryMethod : public testing::TestWithParam<const Method*> {};
 
+/// The registered methods that make a promise.
+std::vector<const Method*> methods_that(bool Method::*promise) {
+  std::vector<const Method*> methods;
+  for (const Method* method : all_methods()) {
+    if (method->*promise) methods.push_back(method);
+  }
+  return methods;
+}
+
+std::string id_of(const testing::TestParamInfo<const Method*>& one) {
+  return one.param->id;
+}
+
 INSTANTIATE_TEST_SUITE_P(Fusion, EveryMethod,
                          testing::ValuesIn(std::vector<const Method*>(all_methods().begin(), all_methods().end())),
-                         [](const testing::TestParamInfo<const Method*>& one) { return one.param->id; });
+                         id_of);
 
 /// The plan of a case, or nothing when low and high contradict each other.
 std::optional<FusionPlan> plan_of(const Case& one) {
@@ -31,6 +44,16 @@ std::optional<FusionPlan> plan_of(const Case& one) {
   if (plan.has_value()) return plan.value();
   RC_ASSERT(plan.error().code == ErrorCode::Inconsistent);
   return std::nullopt;
+}
+
+/// The exact answer for a case; a hue that follows the scene and percentiles are those of the plan.
+FusionReference reference_of(const Case& one, const FusionPlan& plan) {
+  FusionSettings settings = one.settings;
+  if (settings.params.contains("hue")) settings.params["hue"] = plan.params_in_force().at("hue");
+  if (settings.range.mode == RangeMode::Percentile) {
+    settings.range = RangeSetting::manual(plan.range_minimum(), plan.range_maximum());
+  }
+  return {settings, one.palette, one.facts().summary, one.temperature};
 }
 
 std::vector<Rgb8> fused(const FusionPlan& plan, std::span<const float> temperature, std::span<const Rgb8> visible) {
@@ -49,7 +72,7 @@ TEST_P(EveryMethod, EqualsTheExactAnswer) {
     const auto plan = plan_of(one);
     if (!plan) return;
     const auto answer = fused(*plan, one.temperature, one.visible);
-    const FusionReference reference(one.settings, one.palette, one.facts().summary, one.temperature);
+    const FusionReference reference = reference_of(one, *plan);
     for (std::size_t i = 0; i < answer.size(); ++i) {
       const auto exact = reference.fused(one.temperature[i], one.visible[i]);
       for (std::size_t c = 0; c < 3; ++c) {
@@ -176,7 +199,7 @@ TEST_P(EveryMethod, AnyBitsAsTemperatureAreAllowedBesideTheScene) {
     const auto visible = *test::colours(temperature.size());
     const auto answer = fused(*plan, temperature, visible);
     for (std::size_t i = 0; i < answer.size(); ++i) {
-      if (std::isfinite(temperature[i]) || one.settings.method == "visible_only") continue;
+      if (!std::isnan(temperature[i]) || !GetParam()->needs_temperature) continue;
       RC_ASSERT(answer[i] == one.settings.missing.value_or(visible[i]));
     }
   }));
@@ -232,8 +255,9 @@ TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
     if (GetParam()->id == "histogram_distribution") return;
     Case shifted = celsius;
     for (float& value : shifted.temperature) value += 256;
-    const FusionReference reference(shifted.settings, shifted.palette, shifted.facts().summary, shifted.temperature);
-    const auto moved = fused(plan_of(shifted).value(), shifted.temperature, shifted.visible);
+    const FusionPlan shifted_plan = plan_of(shifted).value();
+    const FusionReference reference = reference_of(shifted, shifted_plan);
+    const auto moved = fused(shifted_plan, shifted.temperature, shifted.visible);
     for (std::size_t i = 0; i < answer.size(); ++i) {
       const auto exact = reference.fused(shifted.temperature[i], shifted.visible[i]);
       for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(test::within_accuracy(channels(answer[i])[c], exact[c]));
@@ -259,34 +283,55 @@ std::vector<bool> highlighted(const Case& one) {
   return flags;
 }
 
-class InvertibleMethod : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Fusion, InvertibleMethod,
-                         testing::Values("colour_mapped_threshold", "monochrome_threshold", "histogram_distribution"));
+class InvertibleMethod : public testing::TestWithParam<const Method*> {};
+INSTANTIATE_TEST_SUITE_P(Fusion, InvertibleMethod, testing::ValuesIn(methods_that(&Method::invert_complements)), id_of);
 
 TEST_P(InvertibleMethod, InvertComplementsExceptOnTheThreshold) {
   EXPECT_TRUE(rc::check([this] {
-    Case one = telling_case(*find_method(GetParam()));
-    const bool distribution = std::string(GetParam()) == "histogram_distribution";
-    const double threshold = *rc::gen::map(rc::gen::inRange(-50, 500), [](int t) { return double(t); });
-    if (!distribution) one.settings.params["threshold"] = threshold;
+    Case one = telling_case(*GetParam());
+    // Automatic thresholds are others when inverted.
+    std::vector<float> thresholds;
+    for (const Parameter& parameter : GetParam()->parameters) {
+      if (parameter.kind != ParameterKind::Temperature) continue;
+      const int threshold = *rc::gen::inRange(-50, 500);
+      one.settings.params[parameter.name] = double(threshold);
+      thresholds.push_back(static_cast<float>(threshold));
+    }
     one.settings.params["invert"] = false;
     const auto plain = highlighted(one);
     one.settings.params["invert"] = true;
     const auto inverted = highlighted(one);
-    const bool spread = one.facts().summary.sigma > 0;
+    // Where nothing is unusual a method that knows no threshold highlights neither.
+    const bool nothing_is_unusual = thresholds.empty() && !(one.facts().summary.sigma > 0);
     for (std::size_t i = 0; i < plain.size(); ++i) {
       const float t = one.temperature[i];
-      const bool either = std::isfinite(t) && (distribution ? spread : t != static_cast<float>(threshold));
+      const bool on_threshold = std::ranges::find(thresholds, t) != thresholds.end();
+      const bool either = !std::isnan(t) && !on_threshold && !nothing_is_unusual;
       RC_ASSERT(plain[i] + inverted[i] == (either ? 1 : 0));
     }
   }));
 }
 
+TEST(Promises, AMethodWithoutHighlightsHasNoIntervals) {
+  for (const Method* method : all_methods()) {
+    if (method->highlights) continue;
+    EXPECT_TRUE(rc::check([method] {
+      const auto plan = plan_of(*test::cases(*method));
+      RC_ASSERT(!plan || plan->highlighted().empty());
+    })) << method->id;
+  }
+}
+
+TEST(Promises, EveryMethodThatMakesAPromiseIsTried) {
+  EXPECT_GE(methods_that(&Method::highlights).size(), 5U);
+  EXPECT_GE(methods_that(&Method::invert_complements).size(), 3U);
+  EXPECT_GE(methods_that(&Method::hotter_is_lighter).size(), 5U);
+}
+
 TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
-  for (const char* id : {"colour_mapped_threshold", "monochrome_threshold", "histogram_distribution", "histogram_bin",
-                         "thermal_highlighting"}) {
-    EXPECT_TRUE(rc::check([id] {
-      const Case one = telling_case(*find_method(id));
+  for (const Method* method : methods_that(&Method::highlights)) {
+    EXPECT_TRUE(rc::check([method] {
+      const Case one = telling_case(*method);
       const auto plan = plan_of(one);
       if (!plan) return;
       const auto answer = fused(*plan, one.temperature, one.visible);
@@ -301,13 +346,14 @@ TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
         RC_ASSERT(interval.low >= double{data.minimum} && interval.high <= double{data.maximum});
       }
       for (std::size_t i = 0; i < answer.size(); ++i) {
-        if (answer[i] == one.visible[i]) continue;
+        // The axis has no place for what is infinite.
+        if (answer[i] == one.visible[i] || std::isinf(one.temperature[i])) continue;
         const double t = double{one.temperature[i]};
         RC_ASSERT(std::any_of(intervals.begin(), intervals.end(), [&](const TemperatureInterval& interval) {
           return t >= interval.low - tolerance && t <= interval.high + tolerance;
         }));
       }
-    })) << id;
+    })) << method->id;
   }
 }
 
@@ -315,7 +361,7 @@ TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
 std::vector<std::size_t> by_temperature(const Case& one) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < one.temperature.size(); ++i) {
-    if (std::isfinite(one.temperature[i])) order.push_back(i);
+    if (!std::isnan(one.temperature[i])) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return one.temperature[a] < one.temperature[b]; });
@@ -323,10 +369,9 @@ std::vector<std::size_t> by_temperature(const Case& one) {
 }
 
 TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
-  for (const char* id :
-       {"thermal_only", "thermal_visible_blend", "inverse_intensity_hue", "intensity_hue", "thermal_highlighting"}) {
-    EXPECT_TRUE(rc::check([id] {
-      Case one = *test::cases(*find_method(id));
+  for (const Method* method : methods_that(&Method::hotter_is_lighter)) {
+    EXPECT_TRUE(rc::check([method] {
+      Case one = *test::cases(*method);
       one.palette = find_palette("white_hot")->table;
       one.visible.assign(one.temperature.size(), (*test::colours(1))[0]);
       if (one.settings.params.contains("sides")) {
@@ -341,7 +386,7 @@ TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
         const auto hotter = channels(answer[order[i]]);
         for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(hotter[c] >= colder[c]);
       }
-    })) << id;
+    })) << method->id;
   }
 }
 
@@ -350,11 +395,13 @@ TEST(IntensityHue, KeepsTheHueOfThePalette) {
     const Case one = *test::cases(*find_method("intensity_hue"));
     FusionChange change;
     change.method = "thermal_only";
-    const FusionSettings thermal = with_change(one.settings, change).value();
-    const FusionReference reference(thermal, one.palette, one.facts().summary, one.temperature);
-    const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+    const FusionPlan plan = plan_of(one).value();
+    Case thermal = one;
+    thermal.settings = with_change(one.settings, change).value();
+    const FusionReference reference = reference_of(thermal, plan);
+    const auto answer = fused(plan, one.temperature, one.visible);
     for (std::size_t i = 0; i < answer.size(); ++i) {
-      if (!std::isfinite(one.temperature[i])) continue;
+      if (std::isnan(one.temperature[i])) continue;
       // HSV hue is where the middle channel lies between the others; F = M + L (255 - M) and M + L M keep that.
       const auto m = reference.fused(one.temperature[i], one.visible[i]);
       const auto f = channels(answer[i]);
@@ -390,7 +437,12 @@ TEST(Statistics, MatchExtendedPrecisionForAnyOrderAndSplit) {
     const TemperatureSummary b = merged.summary();
     RC_ASSERT(a.mean == b.mean && a.sigma == b.sigma && a.minimum == b.minimum && a.maximum == b.maximum);
     RC_ASSERT(a.finite_count == b.finite_count && a.missing_count == b.missing_count);
-    RC_ASSERT(a.finite_count + a.missing_count == values.size());
+    RC_ASSERT(a.over_range_count == b.over_range_count && a.under_range_count == b.under_range_count);
+    const auto count_of = [&](auto is) { return static_cast<std::uint64_t>(std::ranges::count_if(values, is)); };
+    RC_ASSERT(a.missing_count == count_of([](float v) { return std::isnan(v); }));
+    RC_ASSERT(a.over_range_count == count_of([](float v) { return std::isinf(v) && v > 0; }));
+    RC_ASSERT(a.under_range_count == count_of([](float v) { return std::isinf(v) && v < 0; }));
+    RC_ASSERT(a.finite_count + a.missing_count + a.over_range_count + a.under_range_count == values.size());
     if (!a.has_temperature()) return;
     long double largest = 0;
     long double sum = 0;
@@ -434,6 +486,55 @@ TEST(Statistics, HistogramFollowsTheFormulaOnEveryInstructionSet) {
   }));
 }
 
+TEST(Range, APercentileIsWithinA4096thOfTheSpan) {
+  EXPECT_TRUE(rc::check([] {
+    Case one = *test::cases(*find_method("thermal_only"));
+    const double low = *rc::gen::map(rc::gen::inRange(0, 500), [](int tenths) { return tenths / 10.0; });
+    const double high = *rc::gen::map(rc::gen::inRange(501, 1001), [](int tenths) { return tenths / 10.0; });
+    one.settings.range = RangeSetting::percentile(low, high);
+    const FusionPlan plan = plan_of(one).value();
+    std::vector<double> sorted;
+    for (const float t : one.temperature) {
+      if (std::isfinite(t)) sorted.push_back(double{t});
+    }
+    if (sorted.empty()) {
+      RC_ASSERT(plan.range_minimum() == 0 && plan.range_maximum() == 0);
+      return;
+    }
+    std::ranges::sort(sorted);
+    const double tolerance = (sorted.back() - sorted.front()) / 4096 * 1.000001;
+    // Any temperature with so many below it, and so many at or below it, will do.
+    const auto holds = [&](double told, double percent) {
+      const double wanted = percent / 100 * static_cast<double>(sorted.size());
+      const auto below = static_cast<double>(std::ranges::lower_bound(sorted, told - tolerance) - sorted.begin());
+      const auto up_to = static_cast<double>(std::ranges::upper_bound(sorted, told + tolerance) - sorted.begin());
+      return below <= wanted && wanted <= up_to && told >= sorted.front() && told <= sorted.back();
+    };
+    RC_ASSERT(holds(plan.range_minimum(), low));
+    RC_ASSERT(holds(plan.range_maximum(), high));
+    RC_ASSERT(plan.range_minimum() <= plan.range_maximum());
+    one.settings.range = RangeSetting::percentile(0, 100);
+    const FusionPlan whole = plan_of(one).value();
+    RC_ASSERT(whole.range_minimum() == sorted.front() && whole.range_maximum() == sorted.back());
+  }));
+}
+
+TEST(Marks, AreWhereThePictureIsAnother) {
+  for (const Method* method : all_methods()) {
+    EXPECT_TRUE(rc::check([method] {
+      const Case one = telling_case(*method);
+      const auto plan = plan_of(one);
+      if (!plan) return;
+      const auto answer = fused(*plan, one.temperature, one.visible);
+      std::vector<std::uint8_t> marked(answer.size(), 7);
+      plan->mark(one.temperature, marked);
+      for (std::size_t i = 0; i < answer.size(); ++i) {
+        RC_ASSERT(marked[i] == (method->highlights && answer[i] != one.visible[i] ? 1 : 0));
+      }
+    })) << method->id;
+  }
+}
+
 TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
   Case one;
   one.temperature.assign(1'000'000, 21.5F);
@@ -447,7 +548,7 @@ TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
     const SceneTemperature facts = one.facts();
     const auto plan = FusionPlan::prepare(one.settings, facts, one.palette).value();
     const auto answer = fused(plan, one.temperature, one.visible);
-    const FusionReference reference(one.settings, one.palette, facts.summary, one.temperature);
+    const FusionReference reference = reference_of(one, plan);
     const auto ordinary = reference.fused(21.5F, one.visible[0]);
     const auto outlier = reference.fused(90.0F, one.visible[0]);
     for (std::size_t i = 0; i < answer.size(); ++i) {

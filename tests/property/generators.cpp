@@ -99,6 +99,11 @@ SceneTemperature Case::facts() const {
     add_to_histogram(values, histogram);
     return histogram;
   };
+  facts.hues = [colours = visible] {
+    Hues hues;
+    add_to_hues(colours, hues);
+    return hues;
+  };
   return facts;
 }
 
@@ -141,7 +146,9 @@ rc::Gen<std::vector<Rgb8>> colours(std::size_t count) {
   });
 }
 
-rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::vector<float>& temperature) {
+namespace {
+
+rc::Gen<ParameterValue> value_that_is_set(const Parameter& parameter, const std::vector<float>& temperature) {
   const auto boxed = [](auto value) { return ParameterValue{value}; };
   switch (parameter.kind) {
     case ParameterKind::Toggle:
@@ -161,7 +168,7 @@ rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::v
       for (std::size_t i = 0; i < temperature.size() && i < 20; ++i) {
         if (std::isfinite(temperature[i])) of_data.push_back(double{temperature[i]});
       }
-      return rc::gen::oneOf(rc::gen::just(ParameterValue{Automatic{}}), rc::gen::map(number_within(-50, 500), boxed),
+      return rc::gen::oneOf(rc::gen::map(number_within(-50, 500), boxed),
                             rc::gen::map(rc::gen::elementOf(of_data), boxed));
     }
     case ParameterKind::Number:
@@ -180,6 +187,13 @@ rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::v
                       boxed);
 }
 
+}  // namespace
+
+rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::vector<float>& temperature) {
+  if (!parameter.automatic) return value_that_is_set(parameter, temperature);
+  return rc::gen::oneOf(rc::gen::just(ParameterValue{Automatic{}}), value_that_is_set(parameter, temperature));
+}
+
 rc::Gen<FusionSettings> settings_of(const Method& method, const std::vector<float>& temperature) {
   return rc::gen::exec([&method, temperature] {
     FusionChange change;
@@ -190,14 +204,16 @@ rc::Gen<FusionSettings> settings_of(const Method& method, const std::vector<floa
     const auto* low = change.params.contains("low") ? std::get_if<double>(&change.params["low"]) : nullptr;
     const auto* high = change.params.contains("high") ? std::get_if<double>(&change.params["high"]) : nullptr;
     if (low && high && *low > *high) std::swap(change.params["low"], change.params["high"]);
-    const int range = *rc::gen::inRange(0, 8);
+    const int range = *rc::gen::inRange(0, 10);
     const double a = *number_within(-50, 500);
     const double b = *number_within(-50, 500);
-    if (range == 0) change.range = RangeSetting{false, std::min(a, b), std::max(a, b)};
-    if (range == 1) change.range = RangeSetting{false, a, a};
-    if (range == 2) change.range = RangeSetting{false, -1e308, 1e308};
-    if (range == 3) change.range = RangeSetting{false, -1e-310, 2e-310};
-    if (range == 4) change.range = RangeSetting{false, a, std::nextafter(a, 1e9)};
+    if (range == 0) change.range = RangeSetting::manual(std::min(a, b), std::max(a, b));
+    if (range == 1) change.range = RangeSetting::manual(a, a);
+    if (range == 2) change.range = RangeSetting::manual(-1e308, 1e308);
+    if (range == 3) change.range = RangeSetting::manual(-1e-310, 2e-310);
+    if (range == 4) change.range = RangeSetting::manual(a, std::nextafter(a, 1e9));
+    if (range == 5) change.range = RangeSetting::percentile();
+    if (range == 6) change.range = RangeSetting::percentile(*number_within(0, 50), *number_within(50.001, 100));
     if (*rc::gen::inRange(0, 4) == 0) change.missing = MissingDisplay{Rgb8{255, 0, 200}};
     const auto settings = with_change(default_settings(), change);
     RC_ASSERT(settings.has_value());

@@ -54,7 +54,7 @@ Colour from_hsv(Real hue, Real saturation, Real value) {
 FusionReference::FusionReference(const FusionSettings& settings, const PaletteTable& palette,
                                  const TemperatureSummary& summary, std::span<const float> temperature)
     : settings_(settings), palette_(palette), summary_(summary) {
-  if (!settings.range.automatic) {
+  if (settings.range.mode == RangeMode::Manual) {
     lo_ = settings.range.minimum_celsius;
     hi_ = settings.range.maximum_celsius;
   } else if (summary.has_temperature()) {
@@ -70,11 +70,10 @@ double FusionReference::number(const char* name) const {
   return std::get<double>(value);
 }
 
-double FusionReference::temperature_or(const char* name, double part) const {
+double FusionReference::temperature_or(const char* name, double sigmas) const {
   if (const auto* set = std::get_if<double>(&settings_.params.at(name))) return *set;
-  const double span = hi_ - lo_;
-  if (std::isfinite(span)) return lo_ + part * span;
-  return static_cast<double>(Real(lo_) + Real(part) * (Real(hi_) - Real(lo_)));
+  return std::min(std::max(summary_.mean + sigmas * summary_.sigma, double{summary_.minimum}),
+                  double{summary_.maximum});
 }
 
 bool FusionReference::toggle(const char* name) const {
@@ -86,6 +85,7 @@ const std::string& FusionReference::choice(const char* name) const {
 }
 
 Real FusionReference::normalised(float temperature) const {
+  if (std::isinf(temperature)) return temperature > 0 ? 1 : 0;
   if (lo_ == hi_) return 0.5L;
   const Real t =
       (static_cast<Real>(temperature) - static_cast<Real>(lo_)) / (static_cast<Real>(hi_) - static_cast<Real>(lo_));
@@ -108,6 +108,7 @@ std::size_t FusionReference::bin_of(float temperature) const {
   const double low = double{summary_.minimum};
   const double high = double{summary_.maximum};
   const double bins = number("bins");
+  if (std::isinf(temperature)) return temperature > 0 ? static_cast<std::size_t>(bins) - 1 : 0;
   if (low == high) return 0;
   const double position = std::floor((double{temperature} - low) / (high - low) * bins);
   return static_cast<std::size_t>(std::clamp(position, 0.0, bins - 1));
@@ -122,18 +123,31 @@ void FusionReference::choose_bins(std::span<const float> temperature) {
   std::vector<std::pair<long, std::size_t>> ranked;
   for (const auto& [bin, count] : counts) ranked.emplace_back(toggle("invert") ? -count : count, bin);
   std::sort(ranked.begin(), ranked.end());
-  const auto n = static_cast<std::size_t>(number("n"));
-  for (std::size_t i = 0; i < ranked.size(); ++i) {
-    const bool tied = choice("ties") == "all" && n > 0 && i >= n && ranked[i].first == ranked[n - 1].first;
-    if (i < n || tied) chosen_bins_[ranked[i].second] = true;
+  // How many of the ranked bins show where n is asked for, and how many temperatures are in them.
+  const auto shown = [&](std::size_t n) {
+    std::pair<std::size_t, double> result{0, 0};
+    for (std::size_t i = 0; i < ranked.size(); ++i) {
+      const bool tied = choice("ties") == "all" && n > 0 && i >= n && ranked[i].first == ranked[n - 1].first;
+      if (i >= n && !tied) break;
+      result = {i + 1, result.second + std::abs(static_cast<double>(ranked[i].first))};
+    }
+    return result;
+  };
+  std::size_t n = 0;
+  if (std::holds_alternative<Automatic>(settings_.params.at("n"))) {
+    const std::uint64_t allowed = summary_.finite_count / 10;
+    while (n < ranked.size() && shown(n + 1).second <= static_cast<double>(allowed)) ++n;
+  } else {
+    n = static_cast<std::size_t>(number("n"));
   }
+  for (std::size_t i = 0; i < shown(n).first; ++i) chosen_bins_[ranked[i].second] = true;
 }
 
 Colour FusionReference::fused(float temperature, Rgb8 visible) const {
   const std::string& method = settings_.method;
   const Colour v = {Real(visible.r), Real(visible.g), Real(visible.b)};
   if (method == "visible_only") return v;
-  if (!std::isfinite(temperature)) {
+  if (std::isnan(temperature)) {
     if (settings_.missing) {
       return {Real(settings_.missing->r), Real(settings_.missing->g), Real(settings_.missing->b)};
     }
@@ -143,17 +157,17 @@ Colour FusionReference::fused(float temperature, Rgb8 visible) const {
   if (method == "thermal_visible_blend") return blend(Real(number("alpha")), thermal(temperature), v);
   if (method == "monochrome_threshold" || method == "colour_mapped_threshold") {
     const bool invert = toggle("invert");
-    const auto threshold = static_cast<float>(temperature_or("threshold", invert ? 0.25 : 0.75));
+    const auto threshold = static_cast<float>(temperature_or("threshold", invert ? -1.5 : 1.5));
     if (!(invert ? temperature < threshold : temperature > threshold)) return v;
     if (method == "colour_mapped_threshold") return blend(Real(number("alpha")), thermal(temperature), v);
     const Real t = normalised(temperature);
-    // At a range of one point both t and 1 - t are one half.
+    // At a range of one point both t and 1 - t are one half for what is finite.
     const Real intensity = invert ? 1 - t : t;
     return blend(Real(number("alpha")), from_hsv(Real(number("hue")), intensity, intensity), v);
   }
   if (method == "thermal_highlighting") {
-    const double low = temperature_or("low", 0.15);
-    const double high = temperature_or("high", 0.85);
+    const double low = temperature_or("low", -1.5);
+    const double high = temperature_or("high", 1.5);
     const std::string& sides = choice("sides");
     Real u = 0;
     if (sides != "cold" && temperature > static_cast<float>(high)) {
@@ -164,7 +178,8 @@ Colour FusionReference::fused(float temperature, Rgb8 visible) const {
       return v;
     }
     u = std::clamp(u, 0.0L, 1.0L);
-    return blend(std::min(1.0L, Real(number("k")) * u * u), thermal(temperature), v);
+    const Real weight = std::isinf(temperature) ? 1 : std::min(1.0L, Real(number("k")) * u * u);
+    return blend(weight, thermal(temperature), v);
   }
   if (method == "intensity_hue") {
     const Real grey = (299 * v[0] + 587 * v[1] + 114 * v[2]) / 1000;

@@ -15,7 +15,8 @@ class FusionReference {
   using Real = long double;
   using Colour = std::array<Real, 3>;
 
-  /// `temperature` are all temperatures of the scene.
+  /// `temperature` are all temperatures of the scene. The range is not a percentile and the hue is a number: those of a plan
+  /// are held to their meaning elsewhere.
   FusionReference(const FusionSettings& settings, const PaletteTable& palette, const TemperatureSummary& summary,
                   std::span<const float> temperature);
 
@@ -23,7 +24,7 @@ class FusionReference {
 
  private:
   double number(const char* name) const;
-  double temperature_or(const char* name, double part) const;
+  double temperature_or(const char* name, double sigmas) const;
   bool toggle(const char* name) const;
   const std::string& choice(const char* name) const;
   Real normalised(float temperature) const;

@@ -115,7 +115,7 @@ test('Visible and fused are one key away', async () => {
   assert.equal((await state()).fusion.method, 'visible_only');
   await page.keyboard.press('3');
   await settled(page);
-  assert.equal((await state()).fusion.method, 'thermal_visible_blend');
+  assert.equal((await state()).fusion.method, 'histogram_distribution', 'the first view shows what is unusual');
 });
 
 test('A threshold handle on the axis turns the hot place from palette to visible colour', async () => {
@@ -123,8 +123,8 @@ test('A threshold handle on the axis turns the hot place from palette to visible
   await settled(page);
   const handle = page.locator('[data-handle="params.threshold"]');
   const { scene, fusion } = await state();
-  const { min, max } = fusion.range;
-  const automatic = min + 0.75 * (max - min);
+  const { min, max, mean, sigma } = scene.temperature;
+  const automatic = Math.min(max, mean + 1.5 * sigma);
   assert.ok(Math.abs(Number(await handle.getAttribute('aria-valuenow')) - automatic) < 0.01, 'automatic threshold');
   assert.equal(fusion.params.threshold, null);
 
@@ -151,12 +151,15 @@ test('A threshold handle on the axis turns the hot place from palette to visible
     Math.abs(low.histogram.highlighted[0][0] - low.fusion.params.threshold) < 0.01,
     'the axis highlights what the method does',
   );
+  const says = (words) => page.locator('[data-highlight]', { hasText: words }).waitFor({ timeout: 5000 });
+  await says(/% of the surface, above/);
   const hot = (await screenshot(page, 'threshold-low')).at(place.x, place.y);
 
   // By keyboard to the very top: nothing is.
   await page.locator('[data-parameter="threshold"] input[type=number]').fill(String(scene.temperature.max + 1));
   await page.keyboard.press('Enter');
   await settled(page);
+  await says(/^Nothing is highlighted\. Threshold .* is above the hottest/);
   await page.locator('canvas').first().focus();
   const plain = (await screenshot(page, 'threshold-high')).at(place.x, place.y);
 
@@ -204,6 +207,17 @@ test('A refused value snaps back and says why', async () => {
 test('Palette and range move the axis with them', async () => {
   await page.locator('[data-palette="viridis"]').click();
   await settled(page);
+  const first = await state();
+  assert.equal(first.fusion.range.mode, 'percentile', 'the outermost temperatures are left out at first');
+  assert.ok(first.fusion.range.max < first.scene.temperature.max);
+  assert.match(await page.locator('section.axis text.flag.beyond').first().textContent(), /% above/);
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('e');
+  await settled(page);
+  const extremes = await state();
+  assert.equal(extremes.fusion.range.mode, 'auto', 'one key to the extremes');
+  assert.equal(extremes.fusion.range.max, extremes.scene.temperature.max);
+  assert.equal(await page.locator('section.axis text.flag.beyond').count(), 0);
   const { palette, fusion } = await state();
   assert.equal(palette.id, 'viridis');
   const strip = await page.locator('section.axis .strip').boundingBox();
@@ -227,6 +241,9 @@ test('Palette and range move the axis with them', async () => {
   await page.keyboard.press('l');
   await settled(page);
   assert.deepEqual((await state()).fusion.range, fusion.range);
+  await page.keyboard.press('e');
+  await settled(page);
+  assert.deepEqual((await state()).fusion.range, first.fusion.range, 'and back');
 });
 
 test('The background has exactly the colour that was chosen', async () => {

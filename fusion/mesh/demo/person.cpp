@@ -58,6 +58,7 @@ void add_head(Tessellator& out, const Frame& head, std::uint64_t seed) {
     const double dusty = clamp01(0.5 + 1.2 * patch);
     s.celsius = mix(28.5, 35.9 - 0.9 * dusty - 1.4 * nose_tip + 0.4 * clamp01(cavity) - 1.2 * ear, skin);
     s.dust = 0.55 + 0.35 * patch;
+    s.is_skin = skin > 0.5;
     return s;
   });
 }
@@ -109,6 +110,7 @@ void add_finger(Tessellator& out, Vec a, Vec b, Vec c, double start_radius, doub
     s.colour = s.colour * (1 - 0.18 * bell((v - 0.40) / 0.03));
     s.celsius = mix(start_celsius, end_celsius, v) - 0.7 * clamp01(0.5 + patch);
     s.dust = 0.6 + 0.3 * patch;
+    s.is_skin = true;
     return s;
   });
 }
@@ -127,6 +129,7 @@ void add_hand(Tessellator& out, const Frame& hand, std::uint64_t seed) {
     s.colour = mix(kDustySkin, Colour{138, 110, 96}, clamp01(0.35 + 0.9 * patch - 0.25 * ridge));
     s.celsius = 35.7 - 0.8 * clamp01(0.5 + patch);
     s.dust = 0.6 + 0.3 * patch;
+    s.is_skin = true;
     return s;
   });
   for (int i = 0; i < 4; ++i) {

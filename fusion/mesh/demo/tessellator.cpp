@@ -33,6 +33,7 @@ std::uint32_t Tessellator::add(const SurfacePoint& point) {
                               static_cast<float>(point.position.z)});
   mesh_->colours.push_back({byte_of(point.colour.r), byte_of(point.colour.g), byte_of(point.colour.b)});
   mesh_->celsius.push_back(static_cast<float>(point.celsius));
+  mesh_->is_skin.push_back(point.is_skin ? 1 : 0);
   mesh_->dust.push_back(byte_of(point.dust * 255));
   mesh_->glow.push_back(byte_of(point.glow * 255));
   return static_cast<std::uint32_t>(mesh_->positions.size() - 1);

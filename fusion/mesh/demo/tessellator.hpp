@@ -16,6 +16,7 @@ struct SurfacePoint {
   double celsius = 18;  ///< True surface temperature.
   double dust = 0.5;    ///< 0 clean .. 1 where up-facing parts are covered.
   double glow = 0;      ///< Share of the colour that shines by itself, 0..1.
+  bool is_skin = false;
 };
 
 /// The surfaces of the scene before light and camera: flat arrays over all vertices.
@@ -24,6 +25,7 @@ struct SurfaceMesh {
   std::vector<Rgb8> colours;
   std::vector<float> celsius;
   std::vector<std::uint8_t> dust, glow;  ///< Of 255.
+  std::vector<std::uint8_t> is_skin;     ///< 1 where the person is bare.
   std::vector<Triangle> triangles;
 };
 

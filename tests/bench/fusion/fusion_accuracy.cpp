@@ -96,9 +96,11 @@ std::vector<Run> runs() {
       {"alpha 0.5", "thermal_visible_blend", {{"alpha", 0.5}}},
       {"alpha 0.3", "thermal_visible_blend", {{"alpha", 0.3}}, "viridis"},
       {"hue 200, alpha 0.7", "monochrome_threshold", {{"hue", 200.0}, {"alpha", 0.7}, {"threshold", 20.0}}},
-      {"inverted, alpha 0.5", "monochrome_threshold", {{"invert", true}, {"threshold", 35.0}}},
+      {"inverted, alpha 0.5",
+       "monochrome_threshold",
+       {{"invert", true}, {"threshold", 35.0}, {"alpha", 0.5}, {"hue", 0.0}}},
       {"alpha 0.6", "colour_mapped_threshold", {{"alpha", 0.6}, {"threshold", 20.0}}},
-      {"both sides, k 1", "thermal_highlighting", {{"low", 25.0}, {"high", 30.0}}},
+      {"both sides, k 1", "thermal_highlighting", {{"low", 25.0}, {"high", 30.0}, {"k", 1.0}}},
       {"both sides, k 1e6", "thermal_highlighting", {{"low", 25.0}, {"high", 30.0}, {"k", 1e6}}},
       {"k 0.6", "intensity_hue", {{"k", 0.6}}, "iron_safe"},
       {"k 4", "intensity_hue", {{"k", 4.0}}, "rainbow_safe"},
@@ -107,7 +109,7 @@ std::vector<Run> runs() {
       {"scale, k 100", "inverse_intensity_hue", {{"k", 100.0}, {"mode", std::string("scale")}}},
       {"64 bins, 32 shown, alpha 0.8", "histogram_bin", {{"n", Integer{32}}, {"alpha", 0.8}}},
       {"4096 bins, 2000 shown", "histogram_bin", {{"bins", Integer{4096}}, {"n", Integer{2000}}}},
-      {"k 1, alpha 0.9", "histogram_distribution", {{"alpha", 0.9}}},
+      {"k 1, alpha 0.9", "histogram_distribution", {{"alpha", 0.9}, {"k", 1.0}}},
   };
 }
 

@@ -49,10 +49,12 @@ FusionSettings working_settings(const std::string& method) {
   change.method = method;
   change.palette = "inferno";
   if (method == "thermal_visible_blend") change.params["alpha"] = 0.3;
-  if (method.ends_with("threshold")) change.params["threshold"] = 27.5;
-  if (method == "thermal_highlighting") change.params = {{"low", 24.0}, {"high", 31.0}};
+  if (method.ends_with("threshold")) change.params = {{"threshold", 27.5}, {"alpha", 0.5}};
+  if (method == "monochrome_threshold") change.params["hue"] = 0.0;
+  if (method == "thermal_highlighting") change.params = {{"low", 24.0}, {"high", 31.0}, {"k", 1.0}};
   if (method == "inverse_intensity_hue") change.params["k"] = 2.5;
   if (method == "histogram_bin") change.params["n"] = std::int64_t{32};
+  if (method == "histogram_distribution") change.params["k"] = 1.0;
   return with_change(default_settings(), change).value();
 }
 

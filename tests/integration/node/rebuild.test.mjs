@@ -13,6 +13,8 @@ import { run, serve } from "./spectra_server.mjs";
 const folder = mkdtempSync(path.join(tmpdir(), "spectra-rebuild-"));
 after(() => rmSync(folder, { recursive: true }));
 
+/** What a viewer has who sets no range. */
+const FIRST_RANGE = "percentile:0.5:99.5";
 const settingsOf = (method, params = {}) => ({ method, params });
 
 function fused(scene, { method, params, palette, range }) {
@@ -21,7 +23,7 @@ function fused(scene, { method, params, palette, range }) {
   run(
     "fuse", scene, output, "--method", method, ...set,
     ...(palette ? ["--palette", palette] : []),
-    ...(range ? ["--range", `${range.min}:${range.max}`] : []),
+    "--range", range ? `${range.min}:${range.max}` : FIRST_RANGE,
   );
   return readPly(output);
 }

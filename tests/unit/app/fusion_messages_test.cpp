@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "fusion/registry.hpp"
@@ -55,7 +57,8 @@ protocol::FusionChange change_to(const protocol::FusionState& state) {
   change.method = state.method;
   change.params = state.params;
   change.palette = state.palette;
-  change.range = protocol::RangeChange{state.range.mode, state.range.min, state.range.max};
+  change.range =
+      protocol::RangeChange{state.range.mode, state.range.min, state.range.max, state.range.low, state.range.high};
   change.missing = state.missing;
   return change;
 }
@@ -66,7 +69,7 @@ TEST(FusionMessages, BringEverySettingOfEveryMethodThroughTheWire) {
     fusion::FusionChange wanted;
     wanted.method = method->id;
     wanted.palette = "turbo";
-    wanted.range = fusion::RangeSetting{false, 14.5, 26.25};
+    wanted.range = fusion::RangeSetting::manual(14.5, 26.25);
     wanted.missing = fusion::MissingDisplay{fusion::Rgb8{1, 2, 255}};
     for (const auto& parameter : method->parameters) wanted.params.emplace(parameter.name, other_value(parameter));
     const auto settings = fusion::with_change(fusion::default_settings(), wanted);
@@ -88,11 +91,74 @@ TEST(FusionMessages, TellAutomaticTemperaturesAndWhatTheyAmountTo) {
   const auto plan = fusion::FusionPlan::prepare(settings, scene).value();
   const auto state = to_message(plan, scene.summary);
   EXPECT_TRUE(std::holds_alternative<std::nullptr_t>(state.params.at("threshold")));
-  EXPECT_EQ(std::get<double>(state.params_in_force.at("threshold")), 25);
+  EXPECT_EQ(std::get<double>(state.params_in_force.at("threshold")), 30)
+      << "mean 20 and 1.5 sigma of 10, within the data";
   EXPECT_EQ(state.range.mode, protocol::RangeMode::Auto);
   EXPECT_EQ(state.range.min, 10);
   EXPECT_EQ(state.range.max, 30);
   EXPECT_EQ(state.missing, "visible");
+}
+
+TEST(FusionMessages, BringPercentilesThroughTheWireWithWhatTheyAmountTo) {
+  const auto scene = scene_from(10, 30);
+  auto settings = settings_of("thermal_only");
+  settings.range = fusion::RangeSetting::percentile(0.5, 100);
+  const auto state = to_message(fusion::FusionPlan::prepare(settings, scene).value(), scene.summary);
+  EXPECT_EQ(state.range.mode, protocol::RangeMode::Percentile);
+  EXPECT_EQ(state.range.low, 0.5);
+  EXPECT_EQ(state.range.high, 100);
+  EXPECT_NEAR(*state.range.min, 10, 20.0 / 4096);
+  EXPECT_EQ(state.range.max, 30);
+  const auto change = from_message(change_to(state)).value();
+  EXPECT_EQ(change.range, settings.range);
+  const auto usual = protocol::from_json<protocol::RangeChange>(nlohmann::json{{"mode", "percentile"}}).value();
+  protocol::FusionChange wish;
+  wish.range = usual;
+  EXPECT_EQ(from_message(wish).value().range, fusion::RangeSetting::percentile(1, 99));
+}
+
+TEST(FusionMessages, TellAReadingBeyondTheSensorsRange) {
+  Probe probe;
+  const auto told = [&] { return protocol::to_json(to_message(probe, {})); };
+  EXPECT_TRUE(told()["temperature"].is_null());
+  EXPECT_FALSE(told().contains("temperature_range"));
+  probe.temperature_celsius = std::numeric_limits<float>::infinity();
+  EXPECT_TRUE(told()["temperature"].is_null());
+  EXPECT_EQ(told()["temperature_range"], "over");
+  probe.temperature_celsius = -std::numeric_limits<float>::infinity();
+  EXPECT_EQ(told()["temperature_range"], "under");
+  probe.temperature_celsius = 21.5F;
+  EXPECT_EQ(told()["temperature"], 21.5);
+  EXPECT_FALSE(told().contains("temperature_range"));
+  fusion::TemperatureSummary summary;
+  summary.over_range_count = 3;
+  summary.under_range_count = 2;
+  EXPECT_EQ(to_message(summary).over_range_count, 3U);
+  EXPECT_EQ(to_message(summary).under_range_count, 2U);
+}
+
+TEST(FusionMessages, TellWhatIsHighlightedWhereAMethodHighlights) {
+  const auto scene = scene_from(10, 30);
+  EXPECT_EQ(to_message({}, scene.summary, {{20, 30}}, 0.25).highlighted_share, 0.25);
+  EXPECT_FALSE(protocol::to_json(to_message({}, scene.summary, {}, std::nullopt)).contains("highlighted_share"));
+}
+
+TEST(FusionMessages, WarnOfAPaletteByWhatMethodAndPaletteSayOfThemselves) {
+  fusion::Method method;
+  method.id = "of_this_test";
+  method.label = "A method of this test";
+  const auto& palettes = fusion::all_palettes();
+  const auto safe = std::ranges::find_if(palettes, [](const auto& p) { return p.fusion_safe; });
+  const auto unsafe = std::ranges::find_if(palettes, [](const auto& p) { return !p.fusion_safe; });
+  EXPECT_FALSE(palette_warning(method, &*unsafe));
+  method.wants_fusion_safe_palette = true;
+  const auto warning = palette_warning(method, &*unsafe);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->find(method.label), std::string::npos) << *warning;
+  EXPECT_NE(warning->find(unsafe->label), std::string::npos) << *warning;
+  EXPECT_FALSE(palette_warning(method, &*safe));
+  EXPECT_FALSE(palette_warning(method, nullptr));
+  EXPECT_TRUE(to_message(method).wants_fusion_safe_palette);
 }
 
 TEST(FusionMessages, TellNothingOfTemperaturesThatAreNotThere) {
@@ -121,6 +187,7 @@ TEST(FusionMessages, DescribeEveryMethodByItsSchema) {
       EXPECT_EQ(told.min.has_value(), std::isfinite(parameter.min));
       EXPECT_EQ(told.max.has_value(), std::isfinite(parameter.max));
       EXPECT_EQ(told.options, parameter.options);
+      EXPECT_EQ(told.automatic.value_or(false), parameter.automatic);
     }
     const auto json = protocol::to_json(messages[m]);
     EXPECT_TRUE(protocol::from_json<protocol::MethodDescription>(json)) << json;
@@ -150,7 +217,8 @@ TEST(RpcErrors, NameTheFieldWithinTheRequest) {
   EXPECT_EQ(field_of([](auto& change) { change.params["nothing"] = 7.0; }), "params.nothing");
   EXPECT_EQ(field_of([](auto& change) { change.method = "nothing"; }), "method");
   EXPECT_EQ(field_of([](auto& change) { change.palette = "nothing"; }), "palette");
-  EXPECT_EQ(field_of([](auto& change) { change.range = fusion::RangeSetting{false, 2, 1}; }), "range");
+  EXPECT_EQ(field_of([](auto& change) { change.range = fusion::RangeSetting::manual(2, 1); }), "range");
+  EXPECT_EQ(field_of([](auto& change) { change.range = fusion::RangeSetting::percentile(2, 101); }), "range.high");
 }
 
 TEST(QualityMessages, RoundTheStepDownAndKeepTheRest) {

@@ -24,8 +24,29 @@ TEST(SettingsText, SetsEverythingThatIsWritten) {
   EXPECT_TRUE(std::holds_alternative<fusion::Automatic>(settings.params.at("high")));
   EXPECT_EQ(std::get<std::string>(settings.params.at("sides")), "hot");
   EXPECT_EQ(settings.palette, "turbo");
-  EXPECT_EQ(settings.range, (fusion::RangeSetting{false, -10, 40.5}));
+  EXPECT_EQ(settings.range, (fusion::RangeSetting::manual(-10, 40.5)));
   EXPECT_EQ(settings.missing, (fusion::Rgb8{255, 128, 0}));
+}
+
+TEST(SettingsText, ReadsPercentiles) {
+  EXPECT_EQ(range_from_text("percentile").value(), fusion::RangeSetting::percentile(1, 99));
+  EXPECT_EQ(range_from_text("percentile:0.5:99.5").value(), fusion::RangeSetting::percentile(0.5, 99.5));
+  SettingsText text;
+  text.range = "percentile:0:100";
+  EXPECT_EQ(settings_from_text(text).value().range, fusion::RangeSetting::percentile(0, 100));
+  for (const auto* wrong : {"percentile:", "percentile:1", "percentiles", "percentile:a:b", "percent:1:99"}) {
+    text.range = wrong;
+    const auto refused = settings_from_text(text);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().field, "range");
+    EXPECT_NE(refused.error().message.find("percentile:LO:HI"), std::string::npos) << refused.error().message;
+  }
+  for (const auto* wrong : {"percentile:-1:50", "percentile:60:40", "percentile:50:50"}) {
+    text.range = wrong;
+    EXPECT_EQ(settings_from_text(text).error().field, "range.low") << wrong;
+  }
+  text.range = "percentile:1:101";
+  EXPECT_EQ(settings_from_text(text).error().field, "range.high");
 }
 
 TEST(SettingsText, TakesTheDefaultOfEveryParameterOfEveryMethod) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "fusion/registry.hpp"
 #include "tests/unit/fusion/scene.hpp"
 
 namespace spectra::fusion {
@@ -24,9 +25,10 @@ Intervals highlighted(const std::string& method, ParameterValues params, std::ve
 }
 
 TEST(Highlighted, MethodsThatTreatAllTemperaturesAlikeHaveNone) {
-  for (const char* method :
-       {"thermal_only", "visible_only", "thermal_visible_blend", "intensity_hue", "inverse_intensity_hue"}) {
-    EXPECT_TRUE(highlighted(method, {}, {10, 20, 30}).empty()) << method;
+  std::vector<float> temperature(40, 20.0F);
+  temperature.insert(temperature.end(), {10, 40});
+  for (const Method* method : all_methods()) {
+    EXPECT_EQ(highlighted(method->id, {}, temperature).empty(), !method->highlights) << method->id;
   }
 }
 
@@ -63,9 +65,9 @@ TEST(Highlighted, NeighbouringBinsBecomeOneInterval) {
 
 TEST(Highlighted, DistributionIsOutsideOrInside) {
   const std::vector<float> temperature = {2, 4, 4, 4, 5, 5, 7, 9};  // mean 5, sigma 2
-  EXPECT_EQ(highlighted("histogram_distribution", {}, temperature), (Intervals{{2, 3}, {7, 9}}));
+  EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.0}}, temperature), (Intervals{{2, 3}, {7, 9}}));
   EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.75}}, temperature), (Intervals{{8.5, 9}}));
-  EXPECT_EQ(highlighted("histogram_distribution", {{"invert", true}}, temperature), (Intervals{{3, 7}}));
+  EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.0}, {"invert", true}}, temperature), (Intervals{{3, 7}}));
 }
 
 }  // namespace

@@ -103,6 +103,14 @@ TEST(Parameter, ReadsCommandLineText) {
   EXPECT_EQ(parse_parameter(parameter(ParameterKind::Choice), "hot").value(), ParameterValue{std::string("hot")});
   Parameter threshold;
   threshold.kind = ParameterKind::Temperature;
+  Parameter hue;
+  hue.name = "hue";
+  EXPECT_TRUE(parse_parameter(hue, "auto").has_error());
+  EXPECT_TRUE(validated(hue, Automatic{}).has_error());
+  hue.automatic = true;
+  EXPECT_EQ(parse_parameter(hue, "auto").value(), ParameterValue{Automatic{}});
+  EXPECT_EQ(validated(hue, Automatic{}).value(), ParameterValue{Automatic{}});
+  EXPECT_EQ(validated(hue, 30.0).value(), ParameterValue{30.0});
   EXPECT_EQ(parse_parameter(threshold, "auto").value(), ParameterValue{Automatic{}});
   EXPECT_EQ(parse_parameter(threshold, "null").value(), ParameterValue{Automatic{}});
   EXPECT_EQ(parse_parameter(threshold, "36.6").value(), ParameterValue{36.6});

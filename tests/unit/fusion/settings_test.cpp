@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "fusion/registry.hpp"
 
@@ -19,9 +20,9 @@ FusionChange to_method(const std::string& id, ParameterValues params = {}) {
 TEST(FusionSettings, DefaultsAreABlendInIron) {
   const FusionSettings settings = default_settings();
   EXPECT_EQ(settings.method, "thermal_visible_blend");
-  EXPECT_EQ(settings.params, (ParameterValues{{"alpha", 0.5}}));
+  EXPECT_EQ(settings.params, (ParameterValues{{"alpha", 0.4}}));
   EXPECT_EQ(settings.palette, "iron");
-  EXPECT_TRUE(settings.range.automatic);
+  EXPECT_EQ(settings.range, RangeSetting{});
   EXPECT_EQ(settings.missing, std::nullopt);
 }
 
@@ -46,7 +47,7 @@ TEST(FusionSettings, ParametersMergeAndANewMethodStartsAtItsDefaults) {
   EXPECT_EQ(settings.params.at("hue"), ParameterValue{120.0});
   EXPECT_EQ(settings.params.at("alpha"), ParameterValue{0.25});
   settings = with_change(settings, to_method("colour_mapped_threshold")).value();
-  EXPECT_EQ(settings.params.at("alpha"), ParameterValue{0.5});
+  EXPECT_EQ(settings.params.at("alpha"), ParameterValue{0.85});
   EXPECT_FALSE(settings.params.contains("hue"));
 }
 
@@ -69,11 +70,11 @@ TEST(FusionSettings, RefusalsNameTheField) {
   palette.palette = "grey";
   expect_error(palette, ErrorCode::UnknownPalette, "palette");
   FusionChange range;
-  range.range = RangeSetting{false, 30, 20};
+  range.range = RangeSetting::manual(30, 20);
   expect_error(range, ErrorCode::Inconsistent, "range");
-  range.range = RangeSetting{false, std::nan(""), 20};
+  range.range = RangeSetting::manual(std::nan(""), 20);
   expect_error(range, ErrorCode::OutOfRange, "range");
-  range.range = RangeSetting{false, 0, std::numeric_limits<double>::infinity()};
+  range.range = RangeSetting::manual(0, std::numeric_limits<double>::infinity());
   expect_error(range, ErrorCode::OutOfRange, "range");
 }
 
@@ -94,13 +95,42 @@ TEST(FusionSettings, LowAboveHighIsAnErrorOnlyWhenBothSidesAreOn) {
       with_change(default_settings(), to_method("thermal_highlighting", {{"low", 20.0}, {"high", 20.0}})).has_value());
 }
 
+TEST(FusionSettings, PercentilesAreSharesInOrder) {
+  const auto changed = [](double low, double high) {
+    FusionChange change;
+    change.range = RangeSetting::percentile(low, high);
+    return with_change(default_settings(), change);
+  };
+  EXPECT_EQ(changed(0.5, 99.5).value().range, RangeSetting::percentile(0.5, 99.5));
+  EXPECT_TRUE(changed(0, 100).has_value());
+  for (const auto& [low, high, field] :
+       {std::tuple(-1.0, 99.0, "range.low"), std::tuple(1.0, 100.5, "range.high"),
+        std::tuple(std::nan(""), 99.0, "range.low"), std::tuple(50.0, 50.0, "range.low"),
+        std::tuple(60.0, 40.0, "range.low"), std::tuple(1.0, std::nan(""), "range.high")}) {
+    const auto refused = changed(low, high);
+    ASSERT_TRUE(refused.has_error()) << low << " " << high;
+    EXPECT_EQ(refused.error().field, field);
+    EXPECT_NE(refused.error().message.find("100"), std::string::npos) << refused.error().message;
+  }
+}
+
+TEST(FusionSettings, TheFirstViewShowsOutliersOrWhatThereIs) {
+  TemperatureSummary scene;
+  EXPECT_EQ(first_view_settings(scene).method, "visible_only");
+  scene.finite_count = 10;
+  const FusionSettings first = first_view_settings(scene);
+  EXPECT_EQ(first.method, "histogram_distribution");
+  EXPECT_EQ(first.range, RangeSetting::percentile(0.5, 99.5));
+  EXPECT_EQ(with_change(first, {}).value(), first) << "complete and valid";
+}
+
 TEST(FusionSettings, AutomaticRangeForgetsHandSetValues) {
   FusionChange manual;
-  manual.range = RangeSetting{false, 10, 40};
+  manual.range = RangeSetting::manual(10, 40);
   const FusionSettings by_hand = with_change(default_settings(), manual).value();
   EXPECT_EQ(by_hand.range.minimum_celsius, 10);
   FusionChange automatic;
-  automatic.range = RangeSetting{true, 1, 2};
+  automatic.range = RangeSetting{.mode = RangeMode::Auto, .minimum_celsius = 1, .maximum_celsius = 2};
   EXPECT_EQ(with_change(by_hand, automatic).value(), default_settings());
 }
 
@@ -111,13 +141,17 @@ TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
       all.push_back(with_change(default_settings(), to_method(method->id)).value());
   }
   FusionChange change;
-  change.params["alpha"] = std::nextafter(0.5, 1);
+  change.params["alpha"] = std::nextafter(0.4, 1);
   all.push_back(with_change(default_settings(), change).value());
   change = {};
   change.palette = "rainbow";
   all.push_back(with_change(default_settings(), change).value());
   change = {};
-  change.range = RangeSetting{false, 0, 0};
+  change.range = RangeSetting::percentile();
+  all.push_back(with_change(default_settings(), change).value());
+  change.range = RangeSetting::percentile(1, 98);
+  all.push_back(with_change(default_settings(), change).value());
+  change.range = RangeSetting::manual(0, 0);
   all.push_back(with_change(default_settings(), change).value());
   change = {};
   change.missing = MissingDisplay{Rgb8{0, 0, 0}};
@@ -128,7 +162,7 @@ TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
     }
   }
   change = {};
-  change.range = RangeSetting{false, -0.0, 0.0};
+  change.range = RangeSetting::manual(-0.0, 0.0);
   EXPECT_EQ(cache_key(with_change(default_settings(), change).value()), cache_key(all[all.size() - 2]));
 }
 

@@ -24,6 +24,8 @@ TemperatureSummary summary_of(const std::vector<float>& values) {
 void expect_equal(const TemperatureSummary& a, const TemperatureSummary& b) {
   EXPECT_EQ(a.finite_count, b.finite_count);
   EXPECT_EQ(a.missing_count, b.missing_count);
+  EXPECT_EQ(a.over_range_count, b.over_range_count);
+  EXPECT_EQ(a.under_range_count, b.under_range_count);
   EXPECT_EQ(a.minimum, b.minimum);
   EXPECT_EQ(a.maximum, b.maximum);
   EXPECT_EQ(a.mean, b.mean);
@@ -34,14 +36,18 @@ TEST(TemperatureStatistics, NothingHasNoTemperature) {
   EXPECT_FALSE(summary_of({}).has_temperature());
   const TemperatureSummary missing = summary_of({kNan, kInfinity, -kInfinity});
   EXPECT_FALSE(missing.has_temperature());
-  EXPECT_EQ(missing.missing_count, 3U);
+  EXPECT_EQ(missing.missing_count, 1U);
+  EXPECT_EQ(missing.over_range_count, 1U);
+  EXPECT_EQ(missing.under_range_count, 1U);
   EXPECT_EQ(missing.mean, 0);
 }
 
 TEST(TemperatureStatistics, SmallExactCase) {
   const TemperatureSummary summary = summary_of({2, 4, kNan, 4, 4, 5, 5, 7, 9, -kInfinity});
   EXPECT_EQ(summary.finite_count, 8U);
-  EXPECT_EQ(summary.missing_count, 2U);
+  EXPECT_EQ(summary.missing_count, 1U);
+  EXPECT_EQ(summary.under_range_count, 1U);
+  EXPECT_EQ(summary.over_range_count, 0U);
   EXPECT_EQ(summary.minimum, 2);
   EXPECT_EQ(summary.maximum, 9);
   EXPECT_EQ(summary.mean, 5);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -93,7 +94,7 @@ void expect_exact_leaves(const MultispectralMesh& mesh, const SceneSnapshot& sce
       EXPECT_TRUE(is_same_float(tile->temperature_celsius[v], mesh.temperature_celsius()[source]));
       EXPECT_TRUE(p.x >= tile->bounds.min.x && p.y >= tile->bounds.min.y && p.z >= tile->bounds.min.z);
       EXPECT_TRUE(p.x <= tile->bounds.max.x && p.y <= tile->bounds.max.y && p.z <= tile->bounds.max.z);
-      if (is_drawn[v] && std::isfinite(tile->temperature_celsius[v])) {
+      if (is_drawn[v] && !std::isnan(tile->temperature_celsius[v])) {
         lowest = std::fmin(lowest, tile->temperature_celsius[v]);
         highest = std::fmax(highest, tile->temperature_celsius[v]);
       }
@@ -245,6 +246,12 @@ TEST(SceneSnapshot, ExtremesAreTheFirstOfTheirKind) {
   EXPECT_EQ(scene->hottest()->position, mesh.positions()[123]);
   EXPECT_EQ(scene->coldest()->temperature_celsius, -40);
   EXPECT_EQ(scene->coldest()->position, mesh.positions()[600]);
+  ASSERT_TRUE(scene->over_range());
+  EXPECT_EQ(scene->over_range()->position, mesh.positions()[5]) << "hotter than the sensor could tell is told apart";
+  EXPECT_FALSE(scene->under_range());
+  const auto probe = scene->probe(mesh.positions()[5]);
+  ASSERT_TRUE(probe && probe->temperature_celsius);
+  EXPECT_EQ(*probe->temperature_celsius, std::numeric_limits<float>::infinity());
 }
 
 TEST(SceneSnapshot, NoTemperatureMeansNoExtremes) {
@@ -284,11 +291,58 @@ TEST(SceneSnapshot, ProbeEqualsBruteForce) {
       EXPECT_EQ(probe->vertex_index, best);
       EXPECT_EQ(probe->position, mesh.positions()[best]);
       EXPECT_EQ(probe->visible, mesh.visible()[best]);
-      EXPECT_EQ(probe->temperature_celsius.has_value(), std::isfinite(mesh.temperature_celsius()[best]));
+      EXPECT_EQ(probe->temperature_celsius.has_value(), !std::isnan(mesh.temperature_celsius()[best]));
       EXPECT_DOUBLE_EQ(probe->distance_m, std::sqrt(best_squared));
     }
     EXPECT_FALSE(scene->probe({kNan, 0, 0}));
   }
+}
+
+fusion::FusionPlan threshold_plan(const SceneSnapshot& scene, double threshold, double alpha = 1) {
+  fusion::FusionChange change;
+  change.method = "colour_mapped_threshold";
+  change.params = {{"threshold", threshold}, {"alpha", alpha}};
+  const auto settings = fusion::with_change(fusion::default_settings(), change).value();
+  return fusion::FusionPlan::prepare(settings, scene.temperature()).value();
+}
+
+TEST(SceneSnapshot, HighlightedShareIsOfTheSurface) {
+  MultispectralMesh mesh = testing::terrain({.columns = 50, .rows = 50, .has_missing_temperature = false});
+  const auto area_of = [&](const fusion::Triangle& t) {
+    const auto p = mesh.positions();
+    const auto d = [&](std::uint32_t a, std::uint32_t b) {
+      return std::array{double{p[b].x} - double{p[a].x}, double{p[b].y} - double{p[a].y},
+                        double{p[b].z} - double{p[a].z}};
+    };
+    const auto u = d(t[0], t[1]), v = d(t[0], t[2]);
+    return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+  };
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) mesh.temperature_celsius()[v] = v < 400 ? 60 : 20;
+  mesh.temperature_celsius()[401] = std::numeric_limits<float>::infinity();
+  double hot = 0, all = 0;
+  for (const fusion::Triangle& t : mesh.triangles()) {
+    all += area_of(t);
+    for (const std::uint32_t v : t) hot += mesh.temperature_celsius()[v] > 40 ? area_of(t) / 3 : 0;
+  }
+  const auto scene = snapshot_of(mesh);
+  EXPECT_NEAR(scene->highlighted_share(threshold_plan(*scene, 40)), hot / all, 1e-5);
+  EXPECT_EQ(scene->highlighted_share(threshold_plan(*scene, 40, 0)), 0) << "nothing can be seen of it";
+  EXPECT_EQ(scene->highlighted_share(threshold_plan(*scene, -40)), 1);
+  const double saturated = scene->highlighted_share(threshold_plan(*scene, 4000));
+  EXPECT_GT(saturated, 0) << "over range is above every threshold";
+  EXPECT_LT(saturated, 0.01);
+}
+
+TEST(SceneSnapshot, HighlightedShareOfPointsCountsThem) {
+  MultispectralMesh mesh = testing::point_cloud(5'000, 9);
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) mesh.temperature_celsius()[v] = v % 5 == 0 ? 60 : 20;
+  const auto scene = snapshot_of(mesh);
+  EXPECT_DOUBLE_EQ(scene->highlighted_share(threshold_plan(*scene, 40)), 0.2);
+  MultispectralMesh one_place = testing::terrain({.columns = 20, .rows = 20, .has_missing_temperature = false});
+  std::ranges::fill(one_place.positions(), Vec3f{1, 2, 3});
+  std::ranges::fill(one_place.temperature_celsius(), 50.0F);
+  const auto flat = snapshot_of(one_place);
+  EXPECT_DOUBLE_EQ(flat->highlighted_share(threshold_plan(*flat, 40)), 1);
 }
 
 TEST(SceneSnapshot, PositionStepFollowsTheEdgeLength) {

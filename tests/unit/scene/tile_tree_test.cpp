@@ -127,7 +127,7 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
       for (std::size_t v = 0; v < leaf.positions.size(); ++v) {
         if (!is_drawn[v]) continue;
         under.insert(place(leaf.positions[v]));
-        if (!std::isfinite(leaf.temperature_celsius[v])) continue;
+        if (std::isnan(leaf.temperature_celsius[v])) continue;
         lowest = std::fmin(lowest, leaf.temperature_celsius[v]);
         highest = std::fmax(highest, leaf.temperature_celsius[v]);
       }
@@ -444,6 +444,24 @@ TEST(TileTree, MissingTemperatureGivesWayToAnyOther) {
     EXPECT_TRUE(std::isnan(tile->lowest_celsius) && std::isnan(tile->highest_celsius));
     for (const float t : tile->temperature_celsius) EXPECT_TRUE(std::isnan(t));
   }
+}
+
+TEST(TileTree, WhatIsOverRangeStandsOutMost) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 150, .has_missing_temperature = false});
+  mesh.temperature_celsius()[150 * 75 + 75] = kInfinity;
+  mesh.temperature_celsius()[150 * 20 + 20] = -kInfinity;
+  mesh.temperature_celsius()[150 * 76 + 75] = 5000;
+  const auto scene = tree_of(mesh);
+  const Tile& root = *scene->tiles()[0];
+  EXPECT_EQ(root.highest_celsius, kInfinity);
+  EXPECT_EQ(root.lowest_celsius, -kInfinity);
+  EXPECT_EQ(std::ranges::count(root.temperature_celsius, kInfinity), 1);
+  EXPECT_EQ(std::ranges::count(root.temperature_celsius, -kInfinity), 1);
+  expect_tree(mesh, *scene);
+  std::ranges::fill(mesh.temperature_celsius(), kInfinity);
+  const auto saturated = tree_of(mesh);
+  for (const float t : saturated->tiles()[0]->temperature_celsius) EXPECT_EQ(t, kInfinity);
 }
 
 TEST(TileTree, ColoursOfCoarseTilesAreMeans) {

@@ -33,6 +33,9 @@ class FakeScene : public SceneSnapshot {
   const fusion::SceneTemperature& temperature() const override { return temperature_; }
   std::optional<Probe> probe(fusion::Vec3f) const override { return std::nullopt; }
   std::optional<Extreme> hottest() const override { return std::nullopt; }
+  std::optional<Extreme> over_range() const override { return std::nullopt; }
+  std::optional<Extreme> under_range() const override { return std::nullopt; }
+  double highlighted_share(const fusion::FusionPlan&) const override { return 0; }
   std::optional<Extreme> coldest() const override { return std::nullopt; }
   float suggested_position_step_m() const override { return 0.001F; }
   fusion::MultispectralMesh whole_mesh() const override { return {}; }

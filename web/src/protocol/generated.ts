@@ -1,5 +1,6 @@
 // Made by `npm run generate` from protocol/schema. Not to be edited.
 
+export type BeyondRange = "over" | "under";
 /**
  * x, y, z in metres.
  *
@@ -27,10 +28,24 @@ export type ColourBytes = [number, number, number];
  */
 export type ColourTransform = "none" | "subtract_green";
 /**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector31 = [number, number, number];
+/**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector32 = [number, number, number];
+/**
  * number, integer, toggle (boolean), choice (string) or temperature (degC; null = automatic).
  */
 export type ParameterValue = number | string | boolean | null;
-export type RangeMode = "auto" | "manual";
+export type RangeMode = "auto" | "manual" | "percentile";
 /**
  * How vertices without temperature are shown: "visible" or a colour "#rrggbb".
  */
@@ -45,6 +60,7 @@ export type RpcId = number | string;
 export type StatusLevel = "info" | "warning" | "error";
 
 export interface ProtocolDefinitions {
+  BeyondRange: BeyondRange;
   Bounds: Bounds;
   CameraSet: CameraSet;
   Channel: Channel;
@@ -141,6 +157,8 @@ export interface Extreme {
 export interface ExtremesReply {
   hottest: Extreme | null;
   coldest: Extreme | null;
+  over_range?: Vector31;
+  under_range?: Vector32;
 }
 /**
  * Params of fusion.set: any part of FUSION; what is absent stays.
@@ -159,20 +177,36 @@ export interface ParameterValues {
   [k: string]: ParameterValue;
 }
 /**
- * mode auto, or mode manual with min and max (degC, min <= max).
+ * mode auto, or mode manual with min and max (degC, min <= max), or mode percentile with low and high (percent, low < high).
  */
 export interface RangeChange {
   mode: RangeMode;
   min?: number | null;
   max?: number | null;
+  /**
+   * Percent of the finite temperatures below the range; of percentile, 1 when absent.
+   */
+  low?: number;
+  /**
+   * Percent of the finite temperatures below its upper end; of percentile, 99 when absent.
+   */
+  high?: number;
 }
 /**
- * The active temperature range, degC; null without thermal data and automatic range.
+ * The active temperature range, degC; null without thermal data unless set by hand.
  */
 export interface FusionRange {
   mode: RangeMode;
   min: number | null;
   max: number | null;
+  /**
+   * Percent of the finite temperatures below min; of percentile only.
+   */
+  low?: number;
+  /**
+   * Percent of the finite temperatures below max; of percentile only.
+   */
+  high?: number;
 }
 /**
  * Result of fusion.set and fusion.get; params of the notification fusion.changed.
@@ -355,6 +389,10 @@ export interface ParameterDescription {
    * Ids of a choice.
    */
   options?: string[];
+  /**
+   * Whether null = automatic is allowed; absent: it is not.
+   */
+  automatic?: boolean;
 }
 /**
  * PALETTE.
@@ -412,6 +450,10 @@ export interface HistogramReply {
    * Intervals [low, high] that the current method highlights, degC.
    */
   highlighted: [number, number][];
+  /**
+   * Share of the surface (of points: of the vertices) that the current method highlights; absent for a method that shows all temperatures alike.
+   */
+  highlighted_share?: number;
 }
 /**
  * Params of scene.histogram.
@@ -429,9 +471,13 @@ export interface ProbeReply {
   vertex_index: number;
   position: Vector3;
   /**
-   * degC; null = missing.
+   * degC; null = missing, or beyond the sensor's range.
    */
   temperature: number | null;
+  /**
+   * The reading is beyond the sensor's range, hotter or colder than it could tell; absent otherwise.
+   */
+  temperature_range?: "over" | "under";
   visible: ColourBytes;
   fused: ColourBytes;
   /**

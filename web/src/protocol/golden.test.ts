@@ -30,7 +30,14 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
   'scene.unsubscribe.': (value) => value,
 };
 /** May be absent. */
-const optionalFields = new Set(['resumed_tiles', 'core_bounds']);
+const optionalFields = new Set([
+  'resumed_tiles',
+  'core_bounds',
+  'highlighted_share',
+  'temperature_range',
+  'over_range',
+  'under_range',
+]);
 const fromServer = list('messages/', '.json').filter(
   (name) => !name.includes('.request.') && !name.startsWith('camera.set') && !name.startsWith('stream.ack'),
 );

@@ -29,6 +29,7 @@ export type Parameter = Omit<wire.ParameterDescription, 'kind'> & { kind: string
 export type ParameterValue = wire.ParameterValue;
 export type Palette = wire.PaletteDescription;
 export type Range = wire.FusionRange;
+export type RangeChange = wire.RangeChange;
 export type Fusion = wire.FusionState;
 export type FusionState = wire.FusionReply;
 /** A partial change for fusion.set; what is absent stays, parameters merge. */
@@ -93,6 +94,7 @@ export const parameter: Decoder<Parameter> = object({
   step: optional(number),
   unit: optional(string),
   options: optional(array(string)),
+  automatic: optional(boolean),
 });
 
 export const method: Decoder<Method> = object({
@@ -112,7 +114,13 @@ export const palette: Decoder<Palette> = object({
   colours: array(triple(number)),
 });
 
-export const range: Decoder<Range> = object({ mode: oneOf('auto', 'manual'), min: nullable(number), max: nullable(number) });
+export const range: Decoder<Range> = object({
+  mode: oneOf('auto', 'manual', 'percentile'),
+  min: nullable(number),
+  max: nullable(number),
+  low: optional(number),
+  high: optional(number),
+});
 
 export const fusion: Decoder<Fusion> = object({
   method: string,
@@ -160,19 +168,26 @@ export const histogram: Decoder<Histogram> = object({
   mean: nullable(number),
   sigma: nullable(number),
   highlighted: array(pair(number)),
+  highlighted_share: optional(number),
 });
 
 export const probe: Decoder<Probe> = object({
   vertex_index: count,
   position: triple(number),
   temperature: nullable(number),
+  temperature_range: optional(oneOf('over', 'under')),
   visible: triple(number),
   fused: triple(number),
   distance: number,
 });
 
 const extreme = object({ position: triple(number), temperature: number });
-export const extremes: Decoder<Extremes> = object({ hottest: nullable(extreme), coldest: nullable(extreme) });
+export const extremes: Decoder<Extremes> = object({
+  hottest: nullable(extreme),
+  coldest: nullable(extreme),
+  over_range: optional(triple(number)),
+  under_range: optional(triple(number)),
+});
 
 /** `resumed_tiles` is there when the request had `resume`. */
 export const subscribed = object({ resumed_tiles: optional(count) });

@@ -53,6 +53,8 @@ describe('withChange', () => {
       max: 3,
     });
     expect(withChange(fusion, { range: { mode: 'auto' } }, methods).range).toEqual({ mode: 'auto', min: 1, max: 9 });
+    const percentile = { mode: 'percentile' as const, low: 0.5, high: 99.5 };
+    expect(withChange(fusion, { range: percentile }, methods).range).toEqual({ ...percentile, min: 1, max: 9 });
   });
 
   it('leaves the settings alone', () => {
@@ -70,6 +72,19 @@ describe('wholeChange', () => {
       palette: 'iron',
       range: { mode: 'auto' },
       missing: 'visible',
+    });
+  });
+
+  it('tells a new connection how the range follows the scene, not what it came to', () => {
+    expect(wholeChange({ ...fusion, range: { mode: 'percentile', min: 1, max: 9, low: 2, high: 98 } }).range).toEqual({
+      mode: 'percentile',
+      low: 2,
+      high: 98,
+    });
+    expect(wholeChange({ ...fusion, range: { mode: 'manual', min: 1, max: 9 } }).range).toEqual({
+      mode: 'manual',
+      min: 1,
+      max: 9,
     });
   });
 });

@@ -1,4 +1,4 @@
-import type { Fusion, FusionChange, Method, ParameterValue } from '../protocol/messages';
+import type { Fusion, FusionChange, Method, ParameterValue, Range, RangeChange } from '../protocol/messages';
 
 /** The change that has the effect of `earlier` followed by `later`. */
 export function mergedChange(earlier: FusionChange, later: FusionChange): FusionChange {
@@ -29,8 +29,9 @@ export function withChange(fusion: Fusion, change: FusionChange | null, methods:
   if (change.missing !== undefined) next.missing = change.missing;
   if (change.range !== undefined) {
     const { mode, min, max } = change.range;
-    next.range =
-      mode === 'auto' ? { ...fusion.range, mode } : { mode, min: min ?? fusion.range.min, max: max ?? fusion.range.max };
+    // Which temperatures a range that follows the scene comes to, only the server knows.
+    if (mode === 'manual') next.range = { mode, min: min ?? fusion.range.min, max: max ?? fusion.range.max };
+    else next.range = { min: fusion.range.min, max: fusion.range.max, ...rangeChange(change.range) };
   }
   return next;
 }
@@ -43,6 +44,13 @@ export function wholeChange(fusion: Fusion): FusionChange {
     params,
     palette,
     missing,
-    range: range.mode === 'manual' ? { ...range } : { mode: 'auto' },
+    range: rangeChange(range),
   };
+}
+
+/** What sets a range that is in force. */
+export function rangeChange({ mode, min, max, low, high }: Range | RangeChange): RangeChange {
+  if (mode === 'manual') return { mode, min: min ?? null, max: max ?? null };
+  if (mode === 'auto') return { mode };
+  return { mode, ...(low === undefined ? {} : { low }), ...(high === undefined ? {} : { high }) };
 }

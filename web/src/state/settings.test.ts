@@ -169,5 +169,14 @@ describe('Settings', () => {
     await asked.at(-1)?.answer(1, { ...fusionWith(0.5), range: { mode: 'manual', min: 10, max: 30 } });
     settings.toggleRangeLock();
     expect(asked.at(-1)?.change).toEqual({ range: { mode: 'auto' } });
+    await asked.at(-1)?.answer(2, fusionWith(0.5));
+    settings.toggleRangeExtremes();
+    const percentiles = { mode: 'percentile' as const, low: 0.5, high: 99.5 };
+    expect(asked.at(-1)?.change).toEqual({ range: percentiles });
+    await asked.at(-1)?.answer(3, { ...fusionWith(0.5), range: { ...percentiles, min: 11, max: 28 } });
+    settings.toggleRangeLock();
+    await asked.at(-1)?.answer(4, { ...fusionWith(0.5), range: { mode: 'manual', min: 11, max: 28 } });
+    settings.toggleRangeLock();
+    expect(asked.at(-1)?.change).toEqual({ range: percentiles });
   });
 });

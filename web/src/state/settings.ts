@@ -1,12 +1,14 @@
-import { type Fusion, type FusionChange, fusionState, type ParameterValue } from '../protocol/messages';
+import { type Fusion, type FusionChange, fusionState, type ParameterValue, type RangeChange } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, RpcError } from '../transport/connection';
-import { mergedChange, wholeChange } from './fusion_change';
+import { mergedChange, rangeChange, wholeChange } from './fusion_change';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
 
 /** Least time between two changes of the settings. */
 const CHANGE_INTERVAL_MS = 33;
 const BUSY_WAIT_MS = 300;
+/** All but the outermost temperatures, where the server has named no others. */
+const FIRST_PERCENTILES: RangeChange = { mode: 'percentile', low: 0.5, high: 99.5 };
 
 /** What the settings need of the session they belong to. */
 export interface SettingsSession {
@@ -28,6 +30,11 @@ export class Settings {
   readonly #sender: Coalescer<FusionChange>;
   #rememberedParams = new Map<string, Record<string, ParameterValue>>();
   #lastFusedMethod: string | null = null;
+  /** How the range followed the scene before it was held, and which percentiles it last had. */
+  #following: RangeChange = FIRST_PERCENTILES;
+  #percentiles: RangeChange = FIRST_PERCENTILES;
+  /** The user has chosen settings; those of a first view are the server's, which knows the scene. */
+  #hasChosen = false;
 
   constructor(
     private readonly store: Store,
@@ -86,16 +93,25 @@ export class Settings {
     this.#change({ range: { mode: 'manual', min: Math.min(min, max), max: Math.max(min, max) } }, settled);
   }
 
-  setRangeAutomatic(): void {
-    this.#change({ range: { mode: 'auto' } }, true);
-  }
-
-  /** Holds the range where it is, or lets it follow the scene again. */
+  /** Holds the range where it is, or lets it follow the scene again as it did before. */
   toggleRangeLock(): void {
     const range = this.store.fusion?.range;
     if (range === undefined || range.min === null || range.max === null) return;
-    if (range.mode === 'auto') this.setRange(range.min, range.max, true);
-    else this.setRangeAutomatic();
+    if (range.mode === 'manual') {
+      this.#change({ range: this.#following }, true);
+      return;
+    }
+    this.#following = rangeChange(range);
+    this.setRange(range.min, range.max, true);
+  }
+
+  /** To the extremes of the scene, or from there back to all but the outermost temperatures. */
+  toggleRangeExtremes(): void {
+    const range = this.store.fusion?.range;
+    if (range === undefined || range.min === null) return;
+    if (range.mode === 'percentile') this.#percentiles = rangeChange(range);
+    this.#following = range.mode === 'auto' ? this.#percentiles : { mode: 'auto' };
+    this.#change({ range: this.#following }, true);
   }
 
   // The connection
@@ -106,7 +122,8 @@ export class Settings {
    */
   greeted(fusion: Fusion, isReturning: boolean): FusionChange | null {
     const { store } = this;
-    const before = isReturning && store.fusionInForce !== null ? wholeChange(store.fusion ?? store.fusionInForce) : null;
+    const chosen = isReturning && this.#hasChosen ? (store.fusion ?? store.fusionInForce) : null;
+    const before = chosen === null ? null : wholeChange(chosen);
     this.#sender.reset();
     store.fusionInForce = fusion;
     store.wanted = before;
@@ -149,6 +166,7 @@ export class Settings {
 
   #change(change: FusionChange, isSettled: boolean): void {
     const { store } = this;
+    this.#hasChosen = true;
     store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
     store.refusals = {};
     if (!store.connected) return;

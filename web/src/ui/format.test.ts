@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { accuracyWords, bytes, celsius, count, duration, extent, figures, length } from './format';
+import { accuracyWords, bytes, celsius, count, duration, extent, figures, length, reading } from './format';
 
 const plain = (text: string | null) => text?.replaceAll('\u202f', ' ') ?? null;
 
@@ -23,6 +23,13 @@ describe('Numbers', () => {
     expect(plain(celsius(-3.14))).toBe('−3.1 °C');
     expect(plain(celsius(-0.04))).toBe('0.0 °C');
     expect(celsius(null)).toBe('none');
+  });
+
+  it('say what a sensor could not', () => {
+    expect(plain(reading({ temperature: 21.5 }))).toBe('21.5 °C');
+    expect(reading({ temperature: null })).toBe('no temperature');
+    expect(reading({ temperature: null, temperature_range: 'over' })).toBe('over range');
+    expect(reading({ temperature: null, temperature_range: 'under' })).toBe('under range');
   });
 
   it('have fitting lengths', () => {

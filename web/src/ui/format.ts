@@ -1,6 +1,6 @@
 /** Numbers as the instrument writes them. */
 
-import type { Scene } from '../protocol/messages';
+import type { Probe, Scene } from '../protocol/messages';
 
 const THIN_SPACE = '\u202f';
 const MINUS = '\u2212';
@@ -27,6 +27,13 @@ export function unitSymbol(unit: string): string {
 
 export function celsius(value: number | null | undefined): string {
   return value == null ? 'none' : withUnit(fixed(value, 1), 'degC');
+}
+
+/** What was read at a place, in words. */
+export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range'>): string {
+  if (probe.temperature_range === 'over') return 'over range';
+  if (probe.temperature_range === 'under') return 'under range';
+  return probe.temperature === null ? 'no temperature' : celsius(probe.temperature);
 }
 
 /** Three figures and an SI prefix: 990 k, 1.97 M. */

@@ -14,6 +14,7 @@ export const KEYS: readonly (readonly [string, string])[] = [
   ['F', 'Fit the scene into the window'],
   ['R', 'Back to the first view'],
   ['L', 'Lock the temperature range, or let it follow the scene'],
+  ['E', 'Range to the extremes of the scene, or to all but the outermost temperatures'],
   ['H', 'Hide the controls, or show them'],
   ['P', 'Read the temperature under the pointer, or at the mark in the middle'],
   ['S', 'Save a screenshot'],
@@ -53,6 +54,7 @@ export function handleKey(event: KeyboardEvent, session: Session, actions: KeyAc
   else if (event.key.toLowerCase() === 'f') session.fitView('fit');
   else if (event.key.toLowerCase() === 'r') session.fitView('reset');
   else if (event.key.toLowerCase() === 'l') session.settings.toggleRangeLock();
+  else if (event.key.toLowerCase() === 'e') session.settings.toggleRangeExtremes();
   else if (event.key.toLowerCase() === 'h') store.panelsHidden = !store.panelsHidden;
   else if (event.key.toLowerCase() === 'p') actions.probe();
   else if (event.key.toLowerCase() === 's') actions.screenshot();

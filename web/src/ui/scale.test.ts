@@ -1,7 +1,26 @@
 import { describe, expect, it } from 'vitest';
-import { positionOf, roundTicks, spreadApart, travelOf, valueAt } from './scale';
+import { positionOf, roundTicks, sharesBeyond, spreadApart, travelOf, valueAt } from './scale';
 
 const base = { label: '', help: '' };
+
+describe('sharesBeyond', () => {
+  const histogram = { edges: [0, 10, 20, 30, 40], counts: [10, 60, 20, 10] };
+  it('counts whole bins, and parts of those that an end cuts', () => {
+    expect(sharesBeyond(histogram, 0, 40)).toEqual({ below: 0, above: 0 });
+    expect(sharesBeyond(histogram, 10, 30)).toEqual({ below: 0.1, above: 0.1 });
+    expect(sharesBeyond(histogram, 15, 25).below).toBeCloseTo(0.4, 12);
+    expect(sharesBeyond(histogram, 15, 25).above).toBeCloseTo(0.2, 12);
+    expect(sharesBeyond(histogram, 50, 60)).toEqual({ below: 1, above: 0 });
+    expect(sharesBeyond(histogram, -9, -5)).toEqual({ below: 0, above: 1 });
+  });
+  it('knows a scene of one temperature, and one of none', () => {
+    const one = { edges: [20, 20, 20], counts: [7, 0] };
+    expect(sharesBeyond(one, 20, 20)).toEqual({ below: 0, above: 0 });
+    expect(sharesBeyond(one, 25, 30)).toEqual({ below: 1, above: 0 });
+    expect(sharesBeyond(one, 10, 15)).toEqual({ below: 0, above: 1 });
+    expect(sharesBeyond({ edges: [], counts: [] }, 0, 1)).toEqual({ below: 0, above: 0 });
+  });
+});
 
 describe('roundTicks', () => {
   it.each([
@@ -34,6 +53,13 @@ describe('Slider travel', () => {
     expect(positionOf(travel, 1)).toBeCloseTo(0.5, 6);
     expect(valueAt(travel, 0)).toBeGreaterThan(0);
     expect(valueAt(travel, 1)).toBe(100);
+  });
+
+  it('goes round once for an angle, and knows a wide range whose default is automatic', () => {
+    const hue = travelOf({ ...base, name: 'hue', kind: 'number', default: null, unit: 'deg', step: 1 });
+    expect([hue.min, hue.max, valueAt(hue, 0.5)]).toEqual([0, 360, 180]);
+    const n = travelOf({ ...base, name: 'n', kind: 'integer', default: null, min: 0, max: 4096, step: 1 });
+    expect(valueAt(n, 0.5)).toBe(64);
   });
 
   it('gives whole numbers for integers', () => {

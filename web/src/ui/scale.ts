@@ -30,7 +30,13 @@ const UNEVEN_RATIO = 12;
 /** The travel for a number or integer parameter; an open upper end is given a sensible one. */
 export function travelOf(parameter: Parameter): Travel {
   const whole = parameter.kind === 'integer';
-  const standard = typeof parameter.default === 'number' ? parameter.default : 0;
+  // An angle goes round once.
+  if (parameter.unit === 'deg' && parameter.min === undefined && parameter.max === undefined) {
+    return { min: 0, max: 360, power: 1, step: parameter.step ?? 0, whole };
+  }
+  // Where the default is automatic, what is usual is taken to lie near the lower end of a wide range.
+  const automatic = (parameter.min ?? 0) + ((parameter.max ?? 0) - (parameter.min ?? 0)) / 64;
+  const standard = typeof parameter.default === 'number' ? parameter.default : parameter.max === undefined ? 0 : automatic;
   const lower = parameter.min ?? parameter.exclusive_min ?? Math.min(0, standard);
   const max = parameter.max ?? lower + Math.max(1, Math.abs(standard - lower)) * 8;
   const step = parameter.step !== undefined && parameter.step > 0 ? parameter.step : whole ? 1 : 0;
@@ -55,6 +61,27 @@ export function valueAt(travel: Travel, position: number): number {
   // On an uneven scale one step is much near one end and nothing near the other: three figures are finer than a hand.
   const rounded = power === 1 && step > 0 ? Math.round((exact - min) / step) * step + min : Number(exact.toPrecision(3));
   return Math.min(max, Math.max(min, Number(rounded.toPrecision(12))));
+}
+
+/** Which share of counted values lies below and above a range; a bin that the end of the range cuts counts in part. */
+export function sharesBeyond(
+  { edges, counts }: { edges: readonly number[]; counts: readonly number[] },
+  lo: number,
+  hi: number,
+): { below: number; above: number } {
+  let below = 0;
+  let above = 0;
+  let all = 0;
+  counts.forEach((count, index) => {
+    const from = edges[index] ?? 0;
+    const to = edges[index + 1] ?? from;
+    // In a scene of one temperature the bin has no width: it is inside where its value is.
+    const part = (end: number) => (to > from ? Math.min(1, Math.max(0, (end - from) / (to - from))) : end > from ? 1 : 0);
+    all += count;
+    below += count * part(lo);
+    above += count * (1 - (to > from ? part(hi) : hi >= from ? 1 : 0));
+  });
+  return all > 0 ? { below: below / all, above: above / all } : { below: 0, above: 0 };
 }
 
 /** Moves labels apart so that none stands closer than `gap` to the next; keeps their order and stays inside lo..hi where it can. */
