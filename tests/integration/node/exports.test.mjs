@@ -81,8 +81,9 @@ async function loadedDraco(file) {
   }
 }
 
-/** A vertex of the z-up scene with +Y up. */
-const uprightOf = (ply, i) => [ply.x[i], ply.z[i], -ply.y[i]];
+/** A vertex with +Y up: z is up unless the scene says that y is. */
+const isYUp = /^comment up y$/m.test(readFileSync(scene).subarray(0, 1000).toString("latin1"));
+const uprightOf = (ply, i) => (isYUp ? [ply.x[i], ply.y[i], ply.z[i]] : [ply.x[i], ply.z[i], -ply.y[i]]);
 
 test("three.js reads the PLY", () => {
   const loader = new PLYLoader();
