@@ -94,17 +94,28 @@ fi
 "${as_root[@]}" test -w /var/lib/dpkg || stop "/var/lib/dpkg cannot be written (a read-only system?); missing: ${missing[*]}"
 "${as_root[@]}" apt-get update -qq >&2 || say "the package lists could not be brought up to date; going on with those that are here"
 
-plain=("${missing[@]}")
+# Sorts packages into those that can be added and those that conflict, halving a group that does harm: apt takes a second or
+# more for each question.
+plain=()
 conflicting=()
-if [ -n "$(harm_of "${plain[@]}")" ]; then
-  plain=()
-  for package in "${missing[@]}"; do
-    if [ -z "$(harm_of "$package")" ]; then plain+=("$package"); else conflicting+=("$package"); fi
-  done
-  if [ ${#plain[@]} -gt 0 ]; then
-    harm=$(harm_of "${plain[@]}")
-    [ -z "$harm" ] || stop "${plain[*]} cannot be added to this machine: $harm"
+declare -A harm_by
+is_split=false
+sort_out() {
+  local harm half=$(($# / 2))
+  harm=$(harm_of "$@")
+  if [ -z "$harm" ]; then plain+=("$@");
+  elif [ $# -eq 1 ]; then conflicting+=("$1") harm_by[$1]=$harm;
+  else
+    is_split=true
+    sort_out "${@:1:half}"
+    sort_out "${@:half + 1}"
   fi
+}
+sort_out "${missing[@]}"
+# What goes piece by piece need not go together.
+if $is_split && [ ${#plain[@]} -gt 0 ]; then
+  harm=$(harm_of "${plain[@]}")
+  [ -z "$harm" ] || stop "${plain[*]} cannot be added to this machine: $harm"
 fi
 
 if [ ${#conflicting[@]} -gt 0 ]; then
@@ -113,8 +124,7 @@ if [ ${#conflicting[@]} -gt 0 ]; then
   trap 'rm -rf "$new"' EXIT
   cp -a "$beside/." "$new"
   for package in "${conflicting[@]}"; do
-    harm=$(harm_of "$package")
-    say "$package cannot be installed here ($harm); unpacking it for this build alone into $beside"
+    say "$package cannot be installed here (${harm_by[$package]}); unpacking it for this build alone into $beside"
     reason=$(unpack "$package" "$new") || stop "$package cannot be unpacked beside the build either: $reason"
   done
 fi

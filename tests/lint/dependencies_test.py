@@ -11,7 +11,8 @@ import unittest
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "dependencies.sh"
 
 # Plays a machine described by files in $MACHINE: `installed` (package names), `conflicts/PACKAGE` (what apt prints in place of
-# installing it), `failing/COMMAND` (that command of apt-get fails with this text), `debs/PACKAGE.deb`. Writes down every call in `log`.
+# installing it; for several packages together A&B), `failing/COMMAND` (that command of apt-get fails with this text),
+# `debs/PACKAGE.deb`. Writes down every call in `log`.
 FAKE_APT_GET = "#!" + sys.executable + r""" -IS
 import os, pathlib, shutil, sys
 machine = pathlib.Path(os.environ["MACHINE"])
@@ -30,7 +31,8 @@ failing = machine / "failing" / command
 if failing.exists() and not is_simulated:
     sys.exit(failing.read_text())
 if command == "install":
-    for package in packages:
+    together = [c.name for c in (machine / "conflicts").iterdir() if "&" in c.name and set(c.name.split("&")) <= set(packages)]
+    for package in packages + together:
         conflict = machine / "conflicts" / package
         text = conflict.read_text() if conflict.exists() else f"Inst {package} (1.0 Debian:12 [amd64])\n"
         if text.startswith("E:"): sys.exit(text)
@@ -195,6 +197,12 @@ class Dependencies(unittest.TestCase):
         (self.machine / "failing" / "download").write_text("E: Unable to locate package libhwy-dev\n")
         self.assertEqual(self.run_script(), 1)
         self.assert_stopped_unchanged("Unable to locate package libhwy-dev")
+
+    def test_stops_when_packages_do_not_go_together(self):
+        self.lack("libhwy-dev", "libfmt-dev")
+        self.conflict("libfmt-dev&libhwy-dev", "Remv robot-software [1]\n")
+        self.assertEqual(self.run_script(), 1)
+        self.assert_stopped_unchanged("remove robot-software")
 
     def test_stops_with_the_command_for_an_administrator_when_sudo_wants_a_password(self):
         self.lack("libfmt-dev")
