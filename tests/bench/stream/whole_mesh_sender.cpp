@@ -32,7 +32,9 @@ constexpr int kSpeed = 7;
 fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
   fusion::TemperatureAccumulator accumulator;
   accumulator.add(mesh.temperature_celsius());
-  return {accumulator.summary(), {}};
+  fusion::SceneTemperature temperature;
+  temperature.summary = accumulator.summary();
+  return temperature;
 }
 
 /// The mesh with its positions; colours are written into its second attribute before each encoding.
