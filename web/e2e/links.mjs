@@ -35,10 +35,13 @@ export function addLinkTests(browser) {
       isBehind: globalThis.spectra.store.behindSince !== null,
       tiles: globalThis.spectra.store.shown.tiles,
     }));
+    await page.locator('[data-pending-method]').waitFor();
+    assert.match(await page.locator('[data-pending-method]').innerText(), /Thermal.*not yet in the picture[^]*Visible/);
     const coarse = sample(await screenshot(page, 'slow-coarse'));
     assert.deepEqual(during, { isBehind: true, tiles: 1 }, 'the root alone is drawn while the rest is on its way');
 
     await settled(page);
+    assert.equal(await page.locator('[data-pending-method]').count(), 0);
     assert.equal(await shownTiles(page), tiles);
     const fine = sample(await screenshot(page, 'slow-fine'));
     const changed = (a, b) => a.filter((pixel, index) => pixel !== b[index]).length / a.length;

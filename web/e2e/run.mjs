@@ -78,6 +78,10 @@ function assertColour(actual, expected, tolerance, what) {
   assert.ok(worst <= tolerance, `${what}: ${actual} is not ${expected} (tolerance ${tolerance})`);
 }
 
+/** What stands behind the name of a method in the panel. */
+const signBeside = (method) =>
+  page.locator(`[data-method="${method}"] .name`).evaluate((name) => getComputedStyle(name, '::after').content);
+
 const number = (selector) => page.locator(selector).inputValue().then(Number);
 
 test('The whole demo scene stands in the browser', async () => {
@@ -335,8 +339,17 @@ test('It reconnects by itself and keeps its settings', async () => {
   const before = await state();
   await server.stop();
   await page.getByText('Reconnecting').waitFor();
-  assert.equal(await page.locator('canvas.lost').count(), 1);
+  assert.equal(await page.locator('.stale').count(), 1);
   await page.waitForTimeout(1200);
+  // The picture keeps its colours; what is known of it, and of who looks at it, is not.
+  assert.equal(await page.locator('canvas').evaluate((canvas) => getComputedStyle(canvas).filter), 'none');
+  assert.doesNotMatch(await page.locator('main').innerText(), /\d viewer|within .* mm|colours exact/);
+  await page.locator('[data-method="intensity_hue"]').click();
+  assert.match(await page.locator('[data-waiting]').innerText(), /Waits to be sent: Intensity-hue/);
+  assert.match(await signBeside('intensity_hue'), /not yet in the picture/);
+  await page.locator('[data-method="thermal_highlighting"]').click();
+  await page.locator('[data-parameter="k"] input[type=number]').fill('2.5');
+  await page.keyboard.press('Enter');
   await screenshot(page, 'reconnecting');
   assert.match(await page.locator('footer').innerText(), /not connected, \d+\su?s? ?old|not connected/);
   server = await startServer(['--demo'], server.port);
@@ -345,7 +358,7 @@ test('It reconnects by itself and keeps its settings', async () => {
   const after = await state();
   assert.deepEqual(after.fusion, before.fusion);
   assert.equal(after.shown.triangles, after.scene.triangle_count);
-  assert.equal(await page.locator('canvas.lost').count(), 0);
+  assert.equal(await page.locator('.stale').count(), 0);
 });
 
 test('A page in a narrow window has axis and sheet beside each other', async () => {

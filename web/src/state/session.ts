@@ -336,7 +336,10 @@ export class Session {
     // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
     if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) this.tiles.clear();
     this.#look.sceneIs(next);
-    if (!same) store.pinned = null;
+    if (!same) {
+      store.pinned = null;
+      store.pictureMethod = null;
+    }
     this.#histogramAsker.push(true);
     this.#connection
       .request('scene.extremes', {})
@@ -422,6 +425,7 @@ export class Session {
       }
       store.behindSince = null;
       store.progress = 1;
+      store.pictureMethod = store.fusionInForce?.method ?? null;
     }
   }
 

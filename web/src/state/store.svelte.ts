@@ -39,6 +39,9 @@ export function viewModeOf(method: string): ViewMode {
   return method === VISIBLE_VIEW ? 'visible' : 'fused';
 }
 
+/** A picture that takes longer to show another method is said to be behind it. */
+const PENDING_AFTER_MS = 500;
+
 export const DEFAULT_BACKGROUND = '#1c1d1f';
 
 /** Everything the interface shows. Written by the session alone; the interface reads it and calls the session's actions. */
@@ -79,6 +82,8 @@ export class Store {
   behindSince = $state<number | null>(null);
   /** Share of the tiles that show the newest settings. */
   progress = $state(1);
+  /** Method that all of the picture shows; null before the first picture is complete. */
+  pictureMethod = $state<string | null>(null);
   /** What the last finished change cost: bytes received and time until all of it was on the screen. */
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
   /** The position step that the server chose by itself. */
@@ -121,9 +126,16 @@ export class Store {
   );
   readonly connected = $derived(this.link.phase === 'open');
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
-  /** How exact what is on the screen now is. */
+  /** The picture does not show the method that is named, or not everywhere, and that for longer than a moment. */
+  readonly methodIsPending = $derived(
+    this.pictureMethod !== null &&
+      this.fusion !== null &&
+      this.pictureMethod !== this.fusion.method &&
+      (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS)),
+  );
+  /** How exact what is on the screen now is; nobody can say that of the picture of a lost link. */
   readonly accuracy = $derived(
-    this.position_error_mm === null
+    !this.connected || this.position_error_mm === null
       ? null
       : { position_mm: this.position_error_mm, colour_levels: this.stats?.accuracy.colour_levels ?? null },
   );

@@ -1,0 +1,43 @@
+import { describe, expect, it } from 'vitest';
+import type { Method } from '../protocol/messages';
+import { wishWords } from './wishes';
+
+const parameter = (name: string, label: string, kind: string) => ({ name, label, kind, help: '', default: null });
+const methods = [
+  { id: 'blend', label: 'Blend', params: [parameter('alpha', 'Opacity', 'number')] },
+  { id: 'threshold', label: 'Threshold', params: [parameter('threshold', 'Threshold', 'temperature')] },
+] as unknown as Method[];
+const plain = (words: string[]) => words.map((word) => word.replaceAll('\u202f', ' '));
+
+describe('wishWords', () => {
+  it('says what is asked for, setting by setting', () => {
+    const words = wishWords(
+      {
+        method: 'threshold',
+        params: { threshold: 31.25 },
+        palette: 'iron',
+        range: { mode: 'manual', min: 8, max: 40.7 },
+        missing: '#404040',
+      },
+      methods,
+      [{ id: 'iron', label: 'Iron', fusion_safe: false, colours: [] }],
+      'blend',
+    );
+    expect(plain(words)).toEqual([
+      'Threshold',
+      'Threshold 31.3 °C',
+      'palette Iron',
+      'range 8.0 °C to 40.7 °C',
+      'colour of what has no temperature',
+    ]);
+  });
+
+  it('knows parameters of the method in force, automatic values, and words it does not know', () => {
+    expect(wishWords({ params: { alpha: 0.75, other: true } }, methods, [], 'blend')).toEqual(['Opacity 0.75', 'other true']);
+    expect(wishWords({ params: { threshold: null }, range: { mode: 'auto' } }, methods, [], 'threshold')).toEqual([
+      'Threshold automatic',
+      'range by itself',
+    ]);
+    expect(wishWords(null, methods, [], 'blend')).toEqual([]);
+  });
+});

@@ -1,0 +1,35 @@
+import type { FusionChange, Method, Palette } from '../protocol/messages';
+import { celsius, figures } from './format';
+
+/** What a change asks for, in words: one entry a setting. */
+export function wishWords(
+  change: FusionChange | null,
+  methods: readonly Method[],
+  palettes: readonly Palette[],
+  method: string,
+): string[] {
+  if (change === null) return [];
+  const words: string[] = [];
+  const wanted = methods.find(({ id }) => id === (change.method ?? method));
+  if (change.method !== undefined) words.push(wanted?.label ?? change.method);
+  for (const [name, value] of Object.entries(change.params ?? {})) {
+    const parameter = wanted?.params.find((one) => one.name === name);
+    const shown =
+      value === null
+        ? 'automatic'
+        : typeof value !== 'number'
+          ? String(value)
+          : parameter?.kind === 'temperature'
+            ? celsius(value)
+            : figures(value, 3);
+    words.push(`${parameter?.label ?? name} ${shown}`);
+  }
+  const palette = change.palette;
+  if (palette !== undefined) words.push(`palette ${palettes.find(({ id }) => id === palette)?.label ?? palette}`);
+  if (change.range !== undefined) {
+    const { mode, min, max } = change.range;
+    words.push(mode === 'manual' ? `range ${celsius(min)} to ${celsius(max)}` : 'range by itself');
+  }
+  if (change.missing !== undefined) words.push('colour of what has no temperature');
+  return words;
+}
