@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,8 +18,6 @@ namespace {
 constexpr double kRoomInMillimetres = 1000;
 /// A map is flatter: its height is a smaller share of its width.
 constexpr double kFlat = 0.1;
-/// The step of floats in relation to the distance of neighbours above which shapes suffer.
-constexpr double kCoarse = 1.0 / 8;
 
 std::array<double, 3> extents_of(const Bounds& box) {
   return {static_cast<double>(box.max.x) - static_cast<double>(box.min.x),
@@ -86,38 +83,12 @@ void judge_size(LoadedScene& scene, double metres_per_unit) {
                          true});
 }
 
-/// Of floats in the file; doubles are finer than anything that is measured.
-void judge_precision(LoadedScene& scene) {
-  const MultispectralMesh& mesh = scene.mesh;
-  if (mesh.double_positions || mesh.vertex_count() < 2) return;
-  const Bounds& core = *scene.core_bounds;
-  const auto extents = extents_of(core);
-  const double diagonal = std::hypot(extents[0], extents[1], extents[2]);
-  const double spacing = diagonal / std::sqrt(static_cast<double>(mesh.vertex_count()));
-  double farthest = 0;
-  for (const double c :
-       {mesh.origin.x + static_cast<double>(core.min.x), mesh.origin.x + static_cast<double>(core.max.x),
-        mesh.origin.y + static_cast<double>(core.min.y), mesh.origin.y + static_cast<double>(core.max.y),
-        mesh.origin.z + static_cast<double>(core.min.z), mesh.origin.z + static_cast<double>(core.max.z)}) {
-    farthest = std::max(farthest, std::abs(c));
-  }
-  if (farthest == 0) return;
-  const double step = std::ldexp(1.0, std::ilogb(farthest) - 23);
-  if (step < kCoarse * spacing) return;
-  scene.notes.push_back({"coarse_positions", mesh.vertex_count(),
-                         "Positions are floats up to " + distance_text(farthest) + " from zero, where they are " +
-                             distance_text(step) +
-                             " apart: finer shape is not in the file; write doubles, or subtract an offset first",
-                         true});
-}
-
 }  // namespace
 
 void survey(LoadedScene& scene, const ReadOptions& options) {
   find_strays(scene);
   find_up(scene, options.up);
   judge_size(scene, options.metres_per_unit);
-  judge_precision(scene);
 }
 
 }  // namespace spectra::fusion

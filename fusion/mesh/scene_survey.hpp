@@ -10,8 +10,7 @@ namespace spectra::fusion {
 /// know of it is added to the notes:
 /// - "stray_points": vertices far from everything else;
 /// - "up_found": up is not z, and nobody said so;
-/// - "may_be_millimetres": the size is one of a room, but in millimetres;
-/// - "coarse_positions": floats so far from 0 that what lies between neighbours was rounded away.
+/// - "may_be_millimetres": the size is one of a room, but in millimetres.
 void survey(LoadedScene& scene, const ReadOptions& options = {});
 
 }  // namespace spectra::fusion

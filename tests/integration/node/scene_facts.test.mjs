@@ -72,8 +72,9 @@ test("sizes and roundings that look wrong are said, with what mends them", async
   assert.match(note(info(millimetres), "may_be_millimetres").message, /--scale 0\.001/);
   assert.equal(note(info(millimetres, "--scale", "0.001"), "may_be_millimetres"), undefined);
   assert.match(run("info", millimetres), /^size +3000 x 3000/m);
-  assert.match(note(info(inField("18b-utm-float.ply")), "coarse_positions").message, /0\.500 m apart/);
-  assert.equal(note(info(inField("18a-utm-double.ply")), "coarse_positions"), undefined);
+  assert.match(note(info(inField("18b-utm-float.ply")), "rounded_positions").message, /0\.5 m/);
+  assert.equal(note(info(inField("18a-utm-double.ply")), "rounded_positions"), undefined);
+  for (const name of ["17e-one-place.ply", "17f-one-place-mesh.ply"]) assert.ok(!info(inField(name)).notes.some(({ id }) => /positions|millimetres|stray/.test(id)), name);
   await served([millimetres], (scene) => assert.ok(note(scene, "may_be_millimetres")));
 });
 
