@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "fusion/colour/hues.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 #include "fusion/mesh/output_file.hpp"
 #include "fusion/mesh/ply_encoder.hpp"
@@ -72,6 +73,24 @@ Histogram file_histogram(PlyStream& stream, const TemperatureSummary& summary, s
   return histogram;
 }
 
+/// The hues of the file's colours, by another pass over it; the pass's error, if any, is kept in `error`.
+Hues file_hues(PlyStream& stream, std::optional<Error>& error) {
+  Hues hues;
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    if (block.visible.empty()) return success();
+    return for_each_part(
+        block,
+        [&](std::size_t begin, std::size_t count) -> Result<void> {
+          add_to_hues(block.visible.subspan(begin, count), hues);
+          return success();
+        },
+        [](std::uint32_t) -> Result<void> { return success(); });
+  };
+  if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
+  return hues;
+}
+
 /// The last pass: every block fused and written. What the file does not have is filled in as MultispectralMesh does.
 Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const FusionPlan& plan,
                             PlyEncoder::Sink sink) {
@@ -117,13 +136,14 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
                             const FusionSettings& settings, const PaletteTable* palette, const ReadOptions& options) {
   BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, options));
   BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
-  std::optional<Error> histogram_error;
+  std::optional<Error> pass_error;
   SceneTemperature scene;
   scene.summary = pass.temperature;
-  scene.histogram = [&](std::uint32_t bins) { return file_histogram(stream, pass.temperature, bins, histogram_error); };
+  scene.histogram = [&](std::uint32_t bins) { return file_histogram(stream, pass.temperature, bins, pass_error); };
+  scene.hues = [&] { return file_hues(stream, pass_error); };
   auto plan =
       palette == nullptr ? FusionPlan::prepare(settings, scene) : FusionPlan::prepare(settings, scene, *palette);
-  if (histogram_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*histogram_error));
+  if (pass_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*pass_error));
   BOOST_OUTCOME_TRY(plan);
 
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
