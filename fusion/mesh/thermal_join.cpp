@@ -61,7 +61,8 @@ std::optional<double> unit_ratio(const Box& a, const Box& b) {
   if (!(a.diagonal() > 0) || !(b.diagonal() > 0)) return std::nullopt;
   constexpr double kFlat = 0.02;
   constexpr double kSame = 0.03;
-  for (const double unit : {1000.0, 100.0, 10.0, 1000 / 304.8, 1000 / 25.4, 25.4, 304.8}) {
+  // A million: millimetres beside metres, and the metres scaled as if they were the millimetres.
+  for (const double unit : {1e6, 1000.0, 100.0, 10.0, 1000 / 304.8, 1000 / 25.4, 25.4, 304.8}) {
     for (const double ratio : {unit, 1 / unit}) {
       std::size_t agreeing_count = 0;
       bool agrees = std::abs(b.diagonal() / a.diagonal() / ratio - 1) < kSame;
