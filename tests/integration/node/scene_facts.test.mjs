@@ -57,7 +57,6 @@ test("up is z unless the file, its shape or a person says otherwise", async () =
   assert.equal(info(told, "--up", "z").up, "z");
   assert.equal(info(told, "--up", "auto").up, "y");
   await served([room, "--up", "-y"], (scene) => assert.equal(scene.up, "-y"));
-  await served(["--demo"], (scene) => assert.equal(scene.up, "y"));
   const demo = path.join(folder, "demo.ply");
   run("demo-scene", demo, "--vertices", "5000");
   assert.equal(info(demo).up, "y");
@@ -120,7 +119,8 @@ test("a thermal file in another unit or place is refused with what mends it", ()
 
 test("the machine's own name is answered without an option", async () => {
   const name = os.hostname().split(".")[0].toLowerCase();
-  await served(["--demo"], async (_scene, server) => {
+  await served(["--demo"], async (scene, server) => {
+    assert.equal(scene.up, "y");
     const { port } = new URL(server.url);
     const status = (host) =>
       new Promise((resolve, reject) => {
