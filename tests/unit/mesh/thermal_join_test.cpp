@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <random>
 #include <string>
@@ -229,6 +231,25 @@ TEST(ThermalJoin, TakesAThermalPatchOfALargeScene) {
   ASSERT_TRUE(scene) << scene.error().message;
   EXPECT_GE(note_count(scene.value(), "thermal_joined_nearest"), 64U);
   EXPECT_LT(note_count(scene.value(), "thermal_joined_nearest"), 120U);
+}
+
+TEST(ThermalJoin, JoinsTwoReconstructionsOfOneCastle) {
+  const char* const folder = std::getenv("SPECTRA_TEST_DATA");
+  if (folder == nullptr) GTEST_SKIP() << "SPECTRA_TEST_DATA names no folder with scenes";
+  const std::filesystem::path fine = std::filesystem::path(folder) / "arco_castle_1m.ply";
+  const auto own = read_ply(fine);
+  const auto scene = read_ply_with_thermal(fine, std::filesystem::path(folder) / "arco_castle_250k.ply");
+  ASSERT_TRUE(own && scene);
+  std::vector<float> errors;
+  for (std::size_t v = 0; v < own.value().mesh.vertex_count(); ++v) {
+    const float error =
+        std::abs(own.value().mesh.temperature_celsius()[v] - scene.value().mesh.temperature_celsius()[v]);
+    if (std::isfinite(error)) errors.push_back(error);
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_GT(static_cast<double>(errors.size()), 0.995 * static_cast<double>(own.value().mesh.vertex_count()));
+  EXPECT_LT(errors[errors.size() / 2], 0.05F);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.2F);
 }
 
 TEST(NearestSurface, AgreesWithLookingAtAll) {
