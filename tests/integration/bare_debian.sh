@@ -20,7 +20,7 @@ if [ -e /etc/ssl/certs/ca-certificates.crt ]; then
   install -D /etc/ssl/certs/ca-certificates.crt "$root/etc/host-certificates.crt"
   printf 'cafile=/etc/host-certificates.crt\n' > "$root/root/.npmrc"
 fi
-if [ ! -e "$root/spectra" ]; then git clone -q "$source_root" "$root/spectra"; else git -C "$root/spectra" pull -q; fi
+if [ ! -e "$root/spectra" ]; then git clone -q "$source_root" "$root/spectra"; else git -C "$root/spectra" fetch -q origin HEAD && git -C "$root/spectra" reset -q --hard FETCH_HEAD; fi
 for mount in proc sys dev dev/pts; do
   mountpoint -q "$root/$mount" || mount --rbind "/$mount" "$root/$mount"
   mount --make-rslave "$root/$mount"
