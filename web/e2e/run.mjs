@@ -280,7 +280,7 @@ test('A click reads the temperature', async () => {
     return null;
   });
   await page.mouse.click(place.x, place.y);
-  const card = page.locator('.pin .card');
+  const card = page.locator('.card');
   await card.waitFor();
   assert.match(await card.innerText(), /°C|no temperature/);
   await page.keyboard.press('Escape');
