@@ -1,7 +1,7 @@
 // The controls on every screen that people bring: nothing is cut, nothing lies over something else, a finger finds its targets, and
 // the keyboard and other aids reach everything.
 import assert from 'node:assert/strict';
-import { openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 
 /** Width and height in CSS pixels; `touch` screens have no mouse. */
 const SCREENS = [
@@ -118,6 +118,8 @@ export function addLayoutTests(browser) {
         assert.notEqual(place, null, 'nothing of the scene can be read');
         await page.evaluate((at) => globalThis.spectra.pin(at), place);
         await page.locator('.card').waitFor();
+        // Its size is known once it has been laid out.
+        await drawn(page);
         await look(`with a reading at the ${side}`);
       }
       for (const method of ['colour_mapped_threshold', 'thermal_highlighting', 'histogram_bin']) {

@@ -7,6 +7,9 @@ export interface Box {
   bottom: number;
 }
 
+/** Width and height of the orientation gizmo: under a finger every ball is 44 px wide, and the whole so large that they stand apart. */
+export const GIZMO_SIZE = typeof matchMedia === 'function' && matchMedia('(pointer: coarse)').matches ? 148 : 76;
+
 /** The panel becomes a sheet below the scene where it would leave too little beside it: phones, and tablets held upright. */
 export function isNarrow(width: number, height: number): boolean {
   return width < 720 || (width < 1100 && height > width);
