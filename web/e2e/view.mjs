@@ -228,7 +228,12 @@ export function addViewTests(browser, scratch) {
     await worker.evaluate(() => self.losing.restoreContext());
     await page.waitForFunction(() => globalThis.spectra.store.graphicsLostAt === null);
     await drawn(page);
-    const after = await screenshot(page, 'context-restored');
+    // The browser shows a worker's picture when it gets to it: a page under load a little later.
+    let after = await screenshot(page, 'context-restored');
+    for (let i = 0; i < 20 && after.at(200, 60).join() !== before.at(200, 60).join(); i += 1) {
+      await page.waitForTimeout(100);
+      after = await screenshot(page, 'context-restored');
+    }
     for (let x = 200; x < 1100; x += 25) {
       for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
     }

@@ -58,8 +58,9 @@ export class PictureRenderer {
     // The renderer makes its objects anew from the arrays as they are drawn; what it keeps as state is to be set again.
     canvas.addEventListener('webglcontextrestored', () => {
       this.#renderer.setClearColor(this.#background, 1);
+      // Only with a picture on it is the canvas shown again.
+      this.#draw();
       this.reply({ kind: 'context', isLost: false });
-      this.#drawSoon();
     });
   }
 
