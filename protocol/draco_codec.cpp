@@ -17,7 +17,8 @@
 namespace spectra::protocol {
 namespace {
 
-constexpr std::int32_t kLatticeLimit = 1 << 21;
+constexpr std::int32_t kLatticeLimit = 1 << 23;
+constexpr std::size_t kMostVertices = 1 << 21;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 auto internal(std::string message) {
@@ -202,25 +203,19 @@ Result<EncodedGeometry> encoded_mesh(std::span<const LatticePoint> positions, st
   return encoded;
 }
 
-/// A lattice point as one number; its order is that of the coordinates.
-std::uint64_t lattice_key(const LatticePoint& point) {
-  return static_cast<std::uint64_t>(point[0]) << 42 | static_cast<std::uint64_t>(point[1]) << 21 |
-         static_cast<std::uint64_t>(point[2]);
-}
-
-/// (key, index) in ascending order; equal keys by index.
-using KeyedIndex = std::pair<std::uint64_t, std::uint32_t>;
+/// In ascending order of points; equal ones by index.
+using IndexedPoint = std::pair<LatticePoint, std::uint32_t>;
 
 /// The kd-tree encoder reorders the points. Points are told apart by nothing but their place, so both sides sorted by it
 /// pair up; of points at one place any pairing is right.
 Result<EncodedGeometry> encoded_cloud(std::span<const LatticePoint> positions, std::int32_t largest_coordinate,
                                       float step_m, int speed) {
   std::vector<std::array<float, 3>> positions_m;
-  std::vector<KeyedIndex> wanted;
+  std::vector<IndexedPoint> wanted;
   positions_m.reserve(positions.size());
   wanted.reserve(positions.size());
   for (const LatticePoint& point : positions) {
-    wanted.emplace_back(lattice_key(point), static_cast<std::uint32_t>(positions_m.size()));
+    wanted.emplace_back(point, static_cast<std::uint32_t>(positions_m.size()));
     positions_m.push_back(position_m(point, step_m));
   }
   std::sort(wanted.begin(), wanted.end());
@@ -247,7 +242,7 @@ Result<EncodedGeometry> encoded_cloud(std::span<const LatticePoint> positions, s
   if (!is_position_attribute(attribute)) return internal("decoded points have no positions");
   if (seen.num_points() != positions.size()) return internal("points were lost");
 
-  std::vector<KeyedIndex> found;
+  std::vector<IndexedPoint> found;
   found.reserve(positions.size());
   for (std::uint32_t i = 0; i < seen.num_points(); ++i) {
     const std::array<float, 3> value = float_value(*attribute, i);
@@ -259,7 +254,7 @@ Result<EncodedGeometry> encoded_cloud(std::span<const LatticePoint> positions, s
       point[axis] = static_cast<std::int32_t>(coordinate);
     }
     if (position_m(point, step_m) != value) return internal("a decoded point is off the lattice");
-    found.emplace_back(lattice_key(point), i);
+    found.emplace_back(point, i);
   }
   std::sort(found.begin(), found.end());
   encoded.input_of_decoded.resize(positions.size());
@@ -275,7 +270,7 @@ Result<EncodedGeometry> encoded_cloud(std::span<const LatticePoint> positions, s
 Result<EncodedGeometry> encoded_geometry(std::span<const LatticePoint> positions,
                                          std::span<const TileTriangle> triangles, float step_m, int speed) {
   if (positions.empty()) return internal("a tile without vertices");
-  if (positions.size() >= static_cast<std::size_t>(kLatticeLimit)) return internal("a tile of too many vertices");
+  if (positions.size() >= kMostVertices) return internal("a tile of too many vertices");
   if (!(step_m > 0 && step_m <= std::numeric_limits<float>::max() / static_cast<float>(kLatticeLimit)))
     return internal("the position step is not a positive length");
   if (speed < 0 || speed > 10) return internal("speed " + std::to_string(speed) + " is not within 0..10");

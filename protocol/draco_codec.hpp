@@ -26,7 +26,7 @@ struct EncodedGeometry {
 };
 
 /// Encodes a triangle mesh (edgebreaker) or, without triangles, a point cloud. `positions` are lattice coordinates >= 0
-/// and < 2^21; `step_m` is exactly representable with few enough bits that coordinate * step is exact in float. The map
+/// and < 2^23; `step_m` is exactly representable with few enough bits that coordinate * step is exact in float. The map
 /// is proven: the stream is decoded, and every vertex lies on the lattice point of the vertex it is said to come from,
 /// every triangle is there once; InternalError otherwise. `speed` 0 (smallest) .. 10 (fastest).
 Result<EncodedGeometry> encoded_geometry(std::span<const LatticePoint> positions,

@@ -149,7 +149,7 @@ fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem
 }
 
 float file_position_step_m(const SceneSnapshot& scene) {
-  return position_step_in_force(0, scene.suggested_position_step_m(), scene.bounds());
+  return one_step_for_all(position_step_in_force(0, scene.suggested_position_step_m()), scene.bounds());
 }
 
 }  // namespace spectra::server

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/scene/octree_cut.hpp"
+#include "server/scene/position_step.hpp"
 #include "server/scene/surface.hpp"
 #include "server/scene/tile_tree.hpp"
 
@@ -137,59 +138,9 @@ class SurfaceShare {
   double total_area_ = 0;
 };
 
-/// Up to `kSampleCount` lengths of what neighbours in a leaf: edges, or in a point cloud nearest vertices.
-std::vector<double> neighbour_distances(const Tile& leaf) {
-  constexpr std::size_t kSampleCount = 256;
-  constexpr std::size_t kPointSampleCount = 16;
-  std::vector<double> distances;
-  const auto keep = [&](double squared) {
-    if (squared > 0) distances.push_back(std::sqrt(squared));
-  };
-  if (!leaf.triangles.empty()) {
-    const std::size_t stride = leaf.triangles.size() / kSampleCount + 1;
-    for (std::size_t t = 0; t < leaf.triangles.size(); t += stride) {
-      const fusion::Triangle& triangle = leaf.triangles[t];
-      for (unsigned corner = 0; corner < 3; ++corner) {
-        keep(squared_distance(leaf.positions[triangle[corner]], leaf.positions[triangle[(corner + 1) % 3]]));
-      }
-    }
-    return distances;
-  }
-  const std::size_t stride = leaf.positions.size() / kPointSampleCount + 1;
-  for (std::size_t v = 0; v < leaf.positions.size(); v += stride) {
-    double nearest = 0;
-    for (const Vec3f& other : leaf.positions) {
-      const double squared = squared_distance(leaf.positions[v], other);
-      if (squared > 0 && (nearest == 0 || squared < nearest)) nearest = squared;
-    }
-    keep(nearest);
-  }
-  return distances;
-}
-
-float position_step_m(std::vector<double> distances, const Bounds& bounds) {
-  double step = 0;
-  if (!distances.empty()) {
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    step = *middle / 4;
-  }
-  // Below the spacing of floats at the far end of the scene a step says nothing.
-  double farthest = 0;
-  for (const Vec3f& corner : {bounds.min, bounds.max}) {
-    for (const float c : {corner.x, corner.y, corner.z}) {
-      if (std::isfinite(c)) farthest = std::max(farthest, std::fabs(static_cast<double>(c)));
-    }
-  }
-  step = std::max(step, farthest * 0x1p-24);
-  if (step == 0) step = 0.001;
-  return static_cast<float>(std::max(step, static_cast<double>(std::numeric_limits<float>::min())));
-}
-
 /// What one leaf contributes to the facts of the scene.
 struct LeafFacts {
   fusion::TemperatureAccumulator temperature;
-  std::vector<double> distances;
   std::optional<std::uint32_t> hottest, coldest;         ///< Of the finite ones; indices into the leaf.
   std::optional<std::uint32_t> over_range, under_range;  ///< The first of the input.
 };
@@ -197,7 +148,6 @@ struct LeafFacts {
 LeafFacts leaf_facts(const Tile& leaf) {
   LeafFacts facts;
   facts.temperature.add(owned_temperature(leaf));
-  facts.distances = neighbour_distances(leaf);
   const auto is_before = [&](std::uint32_t a, std::uint32_t b) {
     return leaf.source_vertex[a] < leaf.source_vertex[b];
   };
@@ -254,13 +204,17 @@ class TiledSnapshot final : public SceneSnapshot {
         up_(scene.mesh.up),
         notes_(std::move(scene.notes)) {
     std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
+    const PositionSteps position_steps(leaves, pool);
+    position_step_m_ = position_steps.largest_step_m();
+    pool.for_each(leaves.size(), [&](std::size_t i) { position_steps.apply(*leaves[i]); });
     std::vector<LeafFacts> facts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
     leaves_.assign(leaves.begin(), leaves.end());
     gather(std::move(facts));
     core_bounds_ = scene.core_bounds.value_or(bounds_);
     if (levels == LevelsOfDetail::All) {
-      const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius()};
+      const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius(),
+                                &position_steps};
       tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool);
     } else {
       tiles_ = leaves_;
@@ -387,7 +341,6 @@ class TiledSnapshot final : public SceneSnapshot {
 
   void gather(std::vector<LeafFacts> facts) {
     fusion::TemperatureAccumulator accumulator;
-    std::vector<double> distances;
     std::uint32_t hottest_source = 0, coldest_source = 0, over_source = 0, under_source = 0;
     const auto take = [](std::optional<Extreme>& best, std::uint32_t& best_source, const Tile& leaf,
                          std::optional<std::uint32_t> vertex, float sign) {
@@ -404,7 +357,6 @@ class TiledSnapshot final : public SceneSnapshot {
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
       const Tile& leaf = *leaves_[i];
       accumulator.merge(facts[i].temperature);
-      distances.insert(distances.end(), facts[i].distances.begin(), facts[i].distances.end());
       take(hottest_, hottest_source, leaf, facts[i].hottest, 1.0f);
       take(coldest_, coldest_source, leaf, facts[i].coldest, -1.0f);
       take(over_range_, over_source, leaf, facts[i].over_range, 1.0f);
@@ -413,7 +365,6 @@ class TiledSnapshot final : public SceneSnapshot {
       corners.push_back(leaf.bounds.max);
     }
     if (!corners.empty()) bounds_ = bounds_of(corners);
-    position_step_m_ = position_step_m(std::move(distances), bounds_);
     temperature_.summary = accumulator.summary();
     const auto source = std::make_shared<FactSource>(leaves_, temperature_.summary);
     temperature_.histogram = [source](std::uint32_t bins) { return source->histogram(bins); };

@@ -22,6 +22,9 @@ namespace spectra::server {
 
 using fusion::Bounds;
 
+/// How many times the position step is halved for a vertex, along each axis.
+using StepHalvings = std::array<std::uint8_t, 3>;
+
 /// One node of the tile tree: flat arrays of its vertices. Owned vertices come first: every vertex of the scene is owned
 /// by exactly one leaf, copies on a border follow. Vertices of no triangle are owned too, but not part of the geometry.
 /// Every tile of a scene with triangles has at least one.
@@ -38,6 +41,7 @@ struct Tile {
   std::vector<fusion::Rgb8> visible;
   std::vector<float> temperature_celsius;
   std::vector<std::uint32_t> source_vertex;    ///< Index in the input, per vertex.
+  std::vector<StepHalvings> step_halvings;     ///< Per vertex; empty: none are halved.
   std::vector<fusion::Triangle> triangles;     ///< Indices into this tile; empty for a point cloud.
   std::vector<std::uint32_t> source_triangle;  ///< Index in the input, per triangle (leaves).
 };
@@ -111,8 +115,9 @@ class SceneSnapshot {
   /// The first vertex of the input that is hotter or colder than the sensor could tell; its temperature is infinite.
   virtual std::optional<Extreme> over_range() const = 0;
   virtual std::optional<Extreme> under_range() const = 0;
-  /// A position step (metres) that loses nothing the eye can see: about a quarter of the median edge length (of a point
-  /// cloud: of the distance to the nearest neighbour). Positive and finite whatever the scene.
+  /// The largest position step (metres) of the scene, a power of two: about a quarter of the median edge length (of a point
+  /// cloud: of the distance to the nearest neighbour). Where the scene holds finer form its tiles say how often it is halved;
+  /// see PositionSteps. Positive and finite whatever the scene.
   virtual float suggested_position_step_m() const = 0;
   /// Which share of the surface, 0 to 1, a plan made for this scene highlights; of a point cloud, or of a mesh without any
   /// area, which share of the vertices. Thread-safe.

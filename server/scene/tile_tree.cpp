@@ -476,6 +476,7 @@ void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
       is_point_cloud ? thinned_points(mesh, wanted_count) : thinned_surface(mesh, is_locked, wanted_count);
   show(node, mesh, thinning, is_locked, options.median_celsius);
   tile.owned_count = static_cast<std::uint32_t>(tile.positions.size());
+  if (options.position_steps != nullptr) options.position_steps->apply(tile);
   constexpr float kLargest = std::numeric_limits<float>::max();
   const double error_m = children_error_m + thinning.distance_m;
   tile.geometric_error_m =

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "server/scene/position_step.hpp"
 #include "server/scene/scene_snapshot.hpp"
 #include "server/scene/worker_pool.hpp"
 
@@ -14,6 +15,8 @@ struct TreeOptions {
   std::uint32_t tile_vertex_count = 32'000;  ///< Most vertices of a coarse tile, unless locked borders need more.
   std::uint32_t root_vertex_count = 20'000;  ///< Most vertices of the root: the first picture must be small.
   float median_celsius = 0;                  ///< What temperatures are measured from; NaN = the scene has none.
+  const PositionSteps* position_steps =
+      nullptr;  ///< How finely the vertices of coarse tiles are rounded; null: as one.
 };
 
 /// Makes the tiles above the leaves, up to the root, and returns all tiles: coarse before fine, along a Morton curve within

@@ -11,8 +11,7 @@ namespace spectra::server {
 void encode_first_picture(const std::shared_ptr<const SceneSnapshot>& scene, FrameCache& cache) {
   FrameCache::State& state = *cache.state();
   const StreamQuality quality;
-  const float step_m =
-      position_step_in_force(quality.position_step_m, scene->suggested_position_step_m(), scene->bounds());
+  const float step_m = position_step_in_force(quality.position_step_m, scene->suggested_position_step_m());
   const ViewTree tree(*scene);
   for (const ViewTree::Node& node : tree.nodes()) {
     if (node.parent) continue;

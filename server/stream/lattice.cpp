@@ -1,8 +1,10 @@
 #include "server/stream/lattice.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "server/stream/viewer_stream.hpp"
@@ -10,8 +12,78 @@
 namespace spectra::server {
 namespace {
 
-// A lattice coordinate of 21 bits times a step of three significant bits fills the 24 bits of a float.
-constexpr std::int32_t kLatticeLimit = 1 << 21;
+// So many steps of that length are exact in the 24 bits of a float, with those of the step itself.
+double most_steps(float step_m) {
+  int exponent = 0;
+  auto significand = static_cast<std::uint32_t>(std::ldexp(std::frexp(step_m, &exponent), 24));
+  significand >>= std::countr_zero(significand);
+  return std::ldexp(1, 24 - static_cast<int>(std::bit_width(significand - 1)));
+}
+
+// Draco adds half a step before it rounds, and needs a bit for that.
+constexpr double kMostStepsOfTile = 0x1p23;
+
+// How the coordinates of one tile are rounded.
+class Rounding {
+ public:
+  Rounding(const Tile& tile, float step_m)
+      : tile_(tile),
+        step_m_(static_cast<double>(step_m)),
+        most_steps_(most_steps(step_m)),
+        drawn_(tile.positions.size()) {
+    if (tile.triangles.empty()) drawn_.assign(drawn_.size(), true);
+    for (const fusion::Triangle& triangle : tile.triangles) {
+      for (const std::uint32_t v : triangle) drawn_[v] = true;
+    }
+    std::array<float, 3> low{}, high{};
+    low.fill(std::numeric_limits<float>::infinity());
+    high.fill(-std::numeric_limits<float>::infinity());
+    for (std::size_t v = 0; v < drawn_.size(); ++v) {
+      if (!drawn_[v]) continue;
+      const std::array<float, 3> p = coordinates(v);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], p[axis]);
+        high[axis] = std::max(high[axis], p[axis]);
+      }
+    }
+    double extent = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, double{high[axis]} - double{low[axis]});
+    constexpr int kSmallestExponent = -124;
+    most_halvings_ =
+        halvings_within(extent, std::ilogb(step_m) - kSmallestExponent, std::min(most_steps_, kMostStepsOfTile));
+  }
+
+  bool is_drawn(std::size_t v) const { return drawn_[v]; }
+
+  std::array<float, 3> coordinates(std::size_t v) const {
+    const fusion::Vec3f& position = tile_.positions[v];
+    return {position.x, position.y, position.z};
+  }
+
+  // Of one coordinate of a vertex; negative: doublings.
+  int halvings(std::size_t v, std::size_t axis) const {
+    const int wanted = tile_.step_halvings.empty() ? 0 : int{tile_.step_halvings[v][axis]};
+    return halvings_within(static_cast<double>(std::abs(coordinates(v)[axis])), std::min(wanted, most_halvings_),
+                           most_steps_);
+  }
+
+  double step_m(int halvings) const { return std::ldexp(step_m_, -halvings); }
+
+ private:
+  // As many, and few enough for so many metres.
+  int halvings_within(double length_m, int wanted, double most_steps) const {
+    while (std::isfinite(length_m) && length_m > step_m(wanted) * (most_steps - 2)) {
+      wanted = std::min(wanted - 1, static_cast<int>(std::floor(std::log2(step_m_ * most_steps / length_m))));
+    }
+    return wanted;
+  }
+
+  const Tile& tile_;
+  double step_m_;
+  double most_steps_;
+  int most_halvings_ = 0;
+  std::vector<bool> drawn_;
+};
 
 }  // namespace
 
@@ -25,44 +97,68 @@ float lattice_step(double wanted_m) {
   return static_cast<float>(std::ldexp(std::floor(8 * fraction), exponent - 3));
 }
 
-float position_step_in_force(float wanted_m, float suggested_m, const Bounds& bounds) {
-  double step = static_cast<double>(lattice_step(static_cast<double>(wanted_m > 0 ? wanted_m : suggested_m)));
+float position_step_in_force(float wanted_m, float suggested_m) {
+  return lattice_step(static_cast<double>(wanted_m > 0 ? wanted_m : suggested_m));
+}
+
+float one_step_for_all(float step_m, const Bounds& bounds) {
+  constexpr int kMostSteps = 1 << 21;
+  auto step = static_cast<double>(step_m);
   double reach = 0;
   for (const auto member : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
     const auto low = static_cast<double>(bounds.min.*member);
     const auto high = static_cast<double>(bounds.max.*member);
     reach = std::max({reach, std::abs(low), std::abs(high), high - low});
   }
-  while (std::isfinite(reach) && reach >= step * (kLatticeLimit - 2)) step *= 2;
+  while (std::isfinite(reach) && reach >= step * (kMostSteps - 2)) step *= 2;
   return lattice_step(step);
 }
 
 protocol::Result<TileLattice> tile_lattice(const Tile& tile, float step_m) {
   TileLattice lattice;
-  lattice.points.resize(tile.positions.size());
-  if (tile.positions.empty()) return lattice;
-  const auto step = static_cast<double>(step_m);
-  std::array<std::int32_t, 3> lowest{};
-  lowest.fill(std::numeric_limits<std::int32_t>::max());
-  for (std::size_t i = 0; i < tile.positions.size(); ++i) {
-    const fusion::Vec3f& position = tile.positions[i];
-    const std::array<float, 3> coordinates{position.x, position.y, position.z};
+  lattice.step_m = step_m;
+  lattice.coarsest_step_m = step_m;
+  const std::size_t count = tile.positions.size();
+  lattice.points.resize(count);
+  const Rounding rounding(tile, step_m);
+  std::optional<int> fewest, most;
+  for (std::size_t v = 0; v < count; ++v) {
+    if (!rounding.is_drawn(v)) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double nearest = std::floor(static_cast<double>(coordinates[axis]) / step + 0.5);
-      if (!(std::abs(nearest) < kLatticeLimit)) {
+      const float coordinate = rounding.coordinates(v)[axis];
+      if (!std::isfinite(coordinate)) {
         return protocol::refusal(protocol::RpcErrorCode::InternalError,
-                                 "vertex " + std::to_string(i) + " lies " + std::to_string(coordinates[axis]) +
-                                     " m from the scene origin, which is beyond 2^21 position steps of " +
-                                     std::to_string(step) + " m");
+                                 "vertex " + std::to_string(v) + " has a coordinate that is not finite");
       }
-      lattice.points[i][axis] = static_cast<std::int32_t>(nearest);
-      lowest[axis] = std::min(lowest[axis], lattice.points[i][axis]);
+      const int halvings = rounding.halvings(v, axis);
+      fewest = std::min(fewest.value_or(halvings), halvings);
+      most = std::max(most.value_or(halvings), halvings);
     }
   }
-  for (std::size_t axis = 0; axis < 3; ++axis) lattice.origin_m[axis] = static_cast<float>(lowest[axis] * step);
-  for (auto& point : lattice.points) {
-    for (std::size_t axis = 0; axis < 3; ++axis) point[axis] -= lowest[axis];
+  if (!most) return lattice;
+  const double finest_m = rounding.step_m(*most);
+  std::vector<std::array<double, 3>> rounded(count);
+  std::array<double, 3> lowest{};
+  lowest.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t v = 0; v < count; ++v) {
+    if (!rounding.is_drawn(v)) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int halvings = rounding.halvings(v, axis);
+      const double step = rounding.step_m(halvings);
+      // In finest steps, exact.
+      rounded[v][axis] =
+          std::ldexp(std::floor(static_cast<double>(rounding.coordinates(v)[axis]) / step + 0.5), *most - halvings);
+      lowest[axis] = std::min(lowest[axis], rounded[v][axis]);
+    }
   }
+  for (std::size_t v = 0; v < count; ++v) {
+    if (!rounding.is_drawn(v)) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      lattice.points[v][axis] = static_cast<std::int32_t>(rounded[v][axis] - lowest[axis]);
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) lattice.origin_m[axis] = static_cast<float>(lowest[axis] * finest_m);
+  lattice.step_m = static_cast<float>(finest_m);
+  lattice.coarsest_step_m = static_cast<float>(rounding.step_m(*fewest));
   return lattice;
 }
 

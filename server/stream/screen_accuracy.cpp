@@ -6,8 +6,8 @@
 
 namespace spectra::server {
 
-ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<int>& colour_bits,
-                               const std::optional<Camera>& camera, float position_step_m) {
+ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuality>& held,
+                               const std::optional<Camera>& camera) {
   const auto& nodes = tree.nodes();
   std::vector<bool> is_covered(nodes.size());  // By itself or by its children.
   const auto is_replaced = [&](std::size_t index) {
@@ -16,7 +16,7 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<int>& col
            std::all_of(children.begin(), children.end(), [&](std::size_t child) { return is_covered[child]; });
   };
   for (std::size_t index = nodes.size(); index-- > 0;) {
-    is_covered[index] = colour_bits[index] > 0 || is_replaced(index);
+    is_covered[index] = held[index].colour_bits > 0 || is_replaced(index);
   }
   ScreenAccuracy accuracy;
   std::vector<bool> is_passed(nodes.size());  // Its children are drawn in its place.
@@ -28,10 +28,10 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<int>& col
       continue;
     }
     if (camera && !may_be_in_view(*camera, node.bounds)) continue;
-    accuracy.colour_bits = std::min(accuracy.colour_bits, colour_bits[index]);
+    accuracy.colour_bits = std::min(accuracy.colour_bits, held[index].colour_bits);
     const auto error_m = static_cast<double>(node.tile->geometric_error_m);
     // Each of three axes may be off by half a step.
-    const double rounding_m = static_cast<double>(position_step_m) / 2 * std::sqrt(3.0);
+    const double rounding_m = static_cast<double>(held[index].position_step_m) / 2 * std::sqrt(3.0);
     accuracy.position_mm = std::max(accuracy.position_mm, (error_m + rounding_m) * 1e3);
     if (camera) {
       const double pixels =

@@ -14,9 +14,14 @@ struct ScreenAccuracy {
   int colour_bits = 8;     ///< A channel of the coarsest colours.
 };
 
-/// Of what the viewer draws by the REPLACE rule within the view, when it has colours of `colour_bits` for each node, 0 where
-/// the node cannot be drawn. Positions are rounded to `position_step_m`.
-ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<int>& colour_bits,
-                               const std::optional<Camera>& camera, float position_step_m);
+/// What a viewer has of one node.
+struct HeldQuality {
+  int colour_bits = 0;        ///< 0: the node cannot be drawn.
+  float position_step_m = 0;  ///< The coarsest that its positions are rounded to.
+};
+
+/// Of what the viewer draws by the REPLACE rule within the view; `held` is by node.
+ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuality>& held,
+                               const std::optional<Camera>& camera);
 
 }  // namespace spectra::server

@@ -12,9 +12,9 @@ namespace spectra::server {
 protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed) {
   BOOST_OUTCOME_TRY(auto lattice, tile_lattice(tile, position_step_m));
   BOOST_OUTCOME_TRY(auto geometry,
-                    protocol::encoded_geometry(lattice.points, tile.triangles, position_step_m, encoder_speed));
+                    protocol::encoded_geometry(lattice.points, tile.triangles, lattice.step_m, encoder_speed));
   return EncodedTile{.revision = 0,
-                     .position_step_m = position_step_m,
+                     .position_step_m = lattice.coarsest_step_m,
                      .origin_m = lattice.origin_m,
                      .input_of_decoded = std::move(geometry.input_of_decoded),
                      .payload = std::make_shared<const std::vector<std::byte>>(std::move(geometry.payload))};

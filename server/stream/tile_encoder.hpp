@@ -18,13 +18,13 @@ using Payload = std::shared_ptr<const std::vector<std::byte>>;
 /// The geometry of a tile as it goes over the wire, and how to put colours into its decoded order. Immutable.
 struct EncodedTile {
   std::uint32_t revision = 0;  ///< Names this encoding and no other; the tile revision of the wire. From 1.
-  float position_step_m = 0;
+  float position_step_m = 0;   ///< The coarsest that a vertex of the tile has.
   std::array<float, 3> origin_m{};
   std::vector<std::uint32_t> input_of_decoded;  ///< Vertex of the Tile for each decoded vertex.
   Payload payload;
 };
 
-/// Encodes the geometry of a tile; the revision is left to the cache.
+/// Encodes the geometry of a tile of a scene whose largest step is to be `position_step_m`; the revision is left to the cache.
 protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed);
 
 /// Fuses a tile and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile.

@@ -190,6 +190,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
         return given_out(header_of(*slot, FrameKind::Geometry), slot->geometry->payload, now_s);
       }
       slot->held_geometry_epoch = demand_.geometry_epoch;
+      slot->held_position_step_m = slot->geometry->position_step_m;
       slot->held_vertex_count = static_cast<std::uint32_t>(slot->geometry->input_of_decoded.size());
       std::optional<OutgoingFrame> frame;
       if (!slot->has_colours(demand_)) {
@@ -242,9 +243,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
     stats.queued_bytes = window_.in_flight_bytes() + tiles_.prepared_bytes();
     stats.skipped_frames = skipped_frame_count_;
     stats.failed_tiles = failed_tile_count_;
-    std::vector<int> colour_bits;
-    for (const auto& slot : tiles_.slots()) colour_bits.push_back(slot->is_drawable() ? slot->held_colour_bits : 0);
-    const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), colour_bits, camera_, demand_.position_step_m);
+    std::vector<HeldQuality> held;
+    for (const auto& slot : tiles_.slots())
+      held.push_back({slot->is_drawable() ? slot->held_colour_bits : 0, slot->held_position_step_m});
+    const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), held, camera_);
     stats.colour_levels = 1 << std::min(accuracy.colour_bits, demand_.colour_bits);
     stats.position_mm = accuracy.position_mm;
     stats.pixel_error = accuracy.pixel_error;
@@ -321,7 +323,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // Brings what is demanded in line with quality, point, camera and scene.
   void apply() {
-    const float step = position_step_in_force(wanted_step_m_, scene_->suggested_position_step_m(), scene_->bounds());
+    const float step = position_step_in_force(wanted_step_m_, scene_->suggested_position_step_m());
     quality_.position_step_m = step;
     if (step != demand_.position_step_m || quality_.encoder_speed != demand_.encoder_speed) {
       demand_.position_step_m = step;

@@ -45,6 +45,7 @@ struct TileSlot {
   std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
   int held_colour_bits = 0;
+  float held_position_step_m = 0;  ///< The coarsest of the tile.
   std::uint64_t failed_geometry_epoch = 0;
   std::uint64_t failed_colour_epoch = 0;
 

@@ -57,11 +57,10 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
     base.level = level;
     for (const auto& tile : tiles) base.vertex_count += tile->positions.size();
     for (const double factor : options.step_factors) {
-      const float step_m =
-          position_step_in_force(lattice_step(factor * static_cast<double>(suggested_m)), suggested_m, scene.bounds());
+      const float step_m = position_step_in_force(lattice_step(factor * static_cast<double>(suggested_m)), suggested_m);
       base.position_step_mm = 1000 * static_cast<double>(step_m);
       progress("level " + std::to_string(level) + ", position step " + std::to_string(base.position_step_mm) + " mm");
-      const PositionError error = samples.position_error(tiles, static_cast<double>(step_m));
+      BOOST_OUTCOME_TRY(const PositionError error, samples.position_error(tiles, step_m));
       base.error_rms_mm = error.rms_mm;
       base.error_worst_mm = error.worst_mm;
       BOOST_OUTCOME_TRY(auto points, geometry_costs(tiles, step_m, options.encoder_speeds, base));

@@ -10,6 +10,7 @@
 #include "fusion/colour/colour_difference.hpp"
 #include "fusion/colour/palette.hpp"
 #include "protocol/draco_codec.hpp"
+#include "server/stream/lattice.hpp"
 #include "server/tradeoff/surface_index.hpp"
 
 namespace spectra::server {
@@ -36,11 +37,20 @@ LevelSurface merged(const Tiles& tiles) {
 }
 
 /// The same surface as a client decodes it at a position step.
-void snap_to_lattice(LevelSurface& surface, double step_m) {
-  const auto snapped = [step_m](float value) {
-    return static_cast<float>(std::floor(static_cast<double>(value) / step_m + 0.5) * step_m);
-  };
-  for (Vec3f& p : surface.positions) p = {snapped(p.x), snapped(p.y), snapped(p.z)};
+fusion::Result<LevelSurface> decoded(const Tiles& tiles, float step_m) {
+  LevelSurface surface = merged(tiles);
+  std::size_t next = 0;
+  for (const auto& tile : tiles) {
+    const auto lattice = tile_lattice(*tile, step_m);
+    if (!lattice) return failure(fusion::ErrorCode::BadValue, lattice.error().message, "position");
+    const auto& [x, y, z] = lattice.value().origin_m;
+    const float finest_m = lattice.value().step_m;
+    for (const protocol::LatticePoint& point : lattice.value().points) {
+      const auto metres = [&](std::size_t axis) { return static_cast<float>(point[axis]) * finest_m; };
+      surface.positions[next++] = {x + metres(0), y + metres(1), z + metres(2)};
+    }
+  }
+  return surface;
 }
 
 double percentile(std::vector<double> values, double share) {
@@ -143,10 +153,9 @@ void ErrorSamples::take_evenly(const SceneSnapshot& scene, std::uint32_t wanted)
   }
 }
 
-PositionError ErrorSamples::position_error(const Tiles& tiles, double step_m) const {
-  LevelSurface decoded = merged(tiles);
-  snap_to_lattice(decoded, step_m);
-  const SurfaceIndex index(decoded.positions, decoded.triangles);
+fusion::Result<PositionError> ErrorSamples::position_error(const Tiles& tiles, float step_m) const {
+  BOOST_OUTCOME_TRY(const auto surface, decoded(tiles, step_m));
+  const SurfaceIndex index(surface.positions, surface.triangles);
   PositionError error;
   double squares = 0;
   for (const Vec3f& place : positions_) {

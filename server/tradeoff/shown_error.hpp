@@ -33,8 +33,8 @@ class ErrorSamples {
   static fusion::Result<ErrorSamples> take(const SceneSnapshot& scene, std::uint32_t sample_count,
                                            const std::string& palette);
 
-  /// Of these tiles as a client decodes them at a position step.
-  PositionError position_error(const Tiles& tiles, double step_m) const;
+  /// Of these tiles as a client decodes them when the largest position step is `step_m`. Fails where a tile cannot be encoded.
+  fusion::Result<PositionError> position_error(const Tiles& tiles, float step_m) const;
   /// Of these tiles' colours, fused with look() and rounded to each number of bits, and of the temperature that thermal_only
   /// shows.
   std::vector<ColourError> colour_errors(const Tiles& tiles, const std::vector<int>& colour_bits) const;

@@ -58,27 +58,82 @@ export function identityOfPly(ply, origin, step) {
   return identityOfCorners(hashes, ply.triangles);
 }
 
-/** Identity of what a client holds; checks that every decoded coordinate is a lattice point. */
+/** Identity of what a client holds, positions as it decodes them. */
 export function identityOfTiles(tiles) {
+  const bits = new Int32Array(1);
+  const metres = new Float32Array(bits.buffer);
+  return identityOfHashedTiles(tiles, (place, colour) => {
+    const hashed = place.map((value) => {
+      metres[0] = value;
+      return bits[0];
+    });
+    return cornerHash(hashed, colour);
+  });
+}
+
+/** Identity of a file's triangles by nothing but the colours of their corners. */
+export function colourIdentityOfPly(ply) {
+  const hashes = new Uint32Array(ply.vertexCount);
+  for (let i = 0; i < ply.vertexCount; ++i) hashes[i] = cornerHash([0, 0, 0], [ply.red[i], ply.green[i], ply.blue[i]]);
+  return identityOfCorners(hashes, ply.triangles);
+}
+
+/** The same of what a client holds. */
+export const colourIdentityOfTiles = (tiles) =>
+  identityOfHashedTiles(tiles, (_, colour) => cornerHash([0, 0, 0], colour));
+
+const placeOf = ({ frame, geometry }, v) => [0, 1, 2].map((axis) => geometry.positions[3 * v + axis] + frame.origin[axis]);
+
+function identityOfHashedTiles(tiles, hashOf) {
   const identity = new MeshIdentity();
-  for (const { frame, geometry, colours } of tiles) {
-    const count = geometry.positions.length / 3;
-    const hashes = new Uint32Array(count);
-    for (let i = 0; i < count; ++i) {
-      const lattice = [0, 1, 2].map((axis) => {
-        const metres = geometry.positions[3 * i + axis] + frame.origin[axis];
-        const index = Math.round(metres / frame.step);
-        if (index * frame.step !== metres) throw new Error(`${frame.tile}: vertex ${i} lies off the lattice`);
-        return index;
-      });
-      hashes[i] = cornerHash(lattice, colours.subarray(3 * i, 3 * i + 3));
-    }
-    const part = identityOfCorners(hashes, geometry.indices);
+  for (const tile of tiles) {
+    const hashes = new Uint32Array(tile.geometry.positions.length / 3);
+    for (let v = 0; v < hashes.length; ++v) hashes[v] = hashOf(placeOf(tile, v), tile.colours.subarray(3 * v, 3 * v + 3));
+    const part = identityOfCorners(hashes, tile.geometry.indices);
     identity.first += part.first;
     identity.second += part.second;
     identity.count += part.count;
   }
   return identity;
+}
+
+/** Decoded vertices that no vertex of the file with their colour is near to: half a step of their tile along each axis. */
+export function misplacedVertices(tiles, ply, origin) {
+  const cell = Math.max(...tiles.map(({ frame }) => frame.step));
+  const slots = 1 << 21;
+  const slotOf = (x, y, z) => mixed(mixed(x | 0, y | 0), z | 0) & (slots - 1);
+  const cellOf = (value) => Math.floor(value / cell);
+  const at = (i) => [ply.x[i] - origin[0], ply.y[i] - origin[1], ply.z[i] - origin[2]];
+  const first = new Int32Array(slots).fill(-1);
+  const next = new Int32Array(ply.vertexCount);
+  for (let i = 0; i < ply.vertexCount; ++i) {
+    const slot = slotOf(...at(i).map(cellOf));
+    next[i] = first[slot];
+    first[slot] = i;
+  }
+  const misplaced = [];
+  for (const tile of tiles) {
+    const reach = tile.frame.step * 0.500001;
+    for (let v = 0; v < tile.geometry.positions.length / 3; ++v) {
+      const place = placeOf(tile, v);
+      const [red, green, blue] = tile.colours.subarray(3 * v, 3 * v + 3);
+      const isNear = (i) =>
+        ply.red[i] === red && ply.green[i] === green && ply.blue[i] === blue &&
+        at(i).every((value, axis) => Math.abs(value - place[axis]) <= reach);
+      const low = place.map((value) => cellOf(value - reach));
+      const high = place.map((value) => cellOf(value + reach));
+      let isFound = false;
+      for (let x = low[0]; x <= high[0] && !isFound; ++x) {
+        for (let y = low[1]; y <= high[1] && !isFound; ++y) {
+          for (let z = low[2]; z <= high[2] && !isFound; ++z) {
+            for (let i = first[slotOf(x, y, z)]; i >= 0 && !isFound; i = next[i]) isFound = isNear(i);
+          }
+        }
+      }
+      if (!isFound) misplaced.push(`${tile.frame.tile}: ${place}`);
+    }
+  }
+  return misplaced;
 }
 
 function identityOfCorners(hashes, indices) {

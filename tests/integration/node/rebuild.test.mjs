@@ -1,11 +1,11 @@
 // A third party's client rebuilds the scene from the frames and finds what `spectra fuse` writes: every triangle once,
-// every position on the nearest lattice point (so within step / 2 per axis), every colour equal.
+// every colour equal, every position within half a step of its tile along each axis.
 import assert from "node:assert/strict";
 import { existsSync, mkdtempSync, readdirSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
-import { identityOfPly, identityOfTiles } from "./mesh_identity.mjs";
+import { colourIdentityOfPly, colourIdentityOfTiles, misplacedVertices } from "./mesh_identity.mjs";
 import { readPly } from "./ply.mjs";
 import { isColours, KIND, SpectraClient } from "./spectra_client.mjs";
 import { run, serve } from "./spectra_server.mjs";
@@ -36,14 +36,14 @@ async function checkPicture(client, change, expected, shown = (value) => value) 
   assert.equal(fusion.method, change.method);
   const tiles = client.drawnTiles();
   assert.ok(tiles.every((tile) => tile.generation === generation), "every tile shows the newest generation");
-  const steps = new Set(tiles.map((tile) => tile.frame.step));
-  assert.equal(steps.size, 1, "one lattice");
-  const { origin, vertex_count, triangle_count } = client.hello.scene;
+  const { origin, vertex_count, triangle_count, position_step_m } = client.hello.scene;
+  for (const { frame } of tiles) assert.ok(frame.step <= position_step_m, `step of ${frame.tile}`);
   assert.equal(vertex_count, expected.vertexCount);
   assert.equal(triangle_count, expected.triangles.length / 3);
   const picture = { ...expected };
   for (const channel of ["red", "green", "blue"]) picture[channel] = expected[channel].map(shown);
-  assert.equal(`${identityOfTiles(tiles)}`, `${identityOfPly(picture, origin, ...steps)}`, JSON.stringify(change));
+  assert.equal(`${colourIdentityOfTiles(tiles)}`, `${colourIdentityOfPly(picture)}`, JSON.stringify(change));
+  assert.deepEqual(misplacedVertices(tiles, picture, origin).slice(0, 5), [], JSON.stringify(change));
 }
 
 /** The same scene for two clients, one for each way to write colours. */

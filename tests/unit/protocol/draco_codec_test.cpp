@@ -118,6 +118,14 @@ TEST(EncodedGeometry, IsExactOnTheWholeLatticeForEveryMantissaOfAStep) {
     }
 }
 
+TEST(EncodedGeometry, IsExactOnALargerLatticeWhereTheStepIsAPowerOfTwo) {
+  const std::int32_t last = (1 << 23) - 1;
+  Input input{{{last, 0, 1}, {last - 1, last / 3, last}, {0, last / 7, 12345}, {1, 1, 1}}, {{0, 1, 2}, {1, 3, 2}}};
+  expect_faithful(input, 0x1p-9F, 7);
+  input.triangles.clear();
+  expect_faithful(input, 0x1p-9F, 7);
+}
+
 TEST(EncodedGeometry, GivesBackEveryPointOfACloud) {
   std::mt19937 random(7);
   std::uniform_int_distribution<std::int32_t> coordinate(0, 90);
@@ -145,7 +153,7 @@ TEST(EncodedGeometry, RefusesWhatIsNoTile) {
   EXPECT_EQ(code(encoded_geometry(positions, triangles, 1.0F, 11)), RpcErrorCode::InternalError);
   const std::vector<TileTriangle> beyond{{0, 1, 3}};
   EXPECT_EQ(code(encoded_geometry(positions, beyond, 1.0F, 7)), RpcErrorCode::InternalError);
-  const std::vector<LatticePoint> outside{{0, 0, 0}, {1 << 21, 0, 0}, {0, 1, 0}};
+  const std::vector<LatticePoint> outside{{0, 0, 0}, {1 << 23, 0, 0}, {0, 1, 0}};
   EXPECT_EQ(code(encoded_geometry(outside, triangles, 1.0F, 7)), RpcErrorCode::InternalError);
   const std::vector<LatticePoint> negative{{0, 0, 0}, {-1, 0, 0}, {0, 1, 0}};
   EXPECT_EQ(code(encoded_geometry(negative, triangles, 1.0F, 7)), RpcErrorCode::InternalError);

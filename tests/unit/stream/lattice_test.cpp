@@ -43,15 +43,17 @@ TEST(LatticeStep, StaysFiniteAndPositiveForAnyNumber) {
   }
 }
 
-TEST(PositionStep, IsRaisedWhereTheSceneIsTooLargeForIt) {
-  const Bounds room{{0, 0, 0}, {10, 10, 3}};
-  EXPECT_EQ(position_step_in_force(0.002F, 1, room), lattice_step(static_cast<double>(0.002F)));
-  EXPECT_EQ(position_step_in_force(0, 0.01F, room), lattice_step(static_cast<double>(0.01F)));
-  const Bounds country{{-1e6F, 0, 0}, {1e6F, 10, 3}};
-  const float step = position_step_in_force(0.002F, 1, country);
-  EXPECT_EQ(step, lattice_step(static_cast<double>(step)));
-  EXPECT_LT(2e6F / step, 1 << 21);
-  EXPECT_GT(2e6F / step, 1 << 19);
+TEST(PositionStep, IsTheWantedOneOrElseTheScenes) {
+  EXPECT_EQ(position_step_in_force(0.002F, 1), lattice_step(static_cast<double>(0.002F)));
+  EXPECT_EQ(position_step_in_force(0, 0.01F), lattice_step(static_cast<double>(0.01F)));
+}
+
+TEST(PositionStep, OfAFileIsRaisedWhereTheSceneIsTooLargeForIt) {
+  const float step = lattice_step(0.002);
+  EXPECT_EQ(one_step_for_all(step, {{0, 0, 0}, {10, 10, 3}}), step);
+  const float raised = one_step_for_all(step, {{-1e6F, 0, 0}, {1e6F, 10, 3}});
+  EXPECT_LT(2e6F / raised, 1 << 21);
+  EXPECT_GT(2e6F / raised, 1 << 19);
 }
 
 TEST(TileLattice, IsWithinHalfAStepAndSharedByNeighbours) {
@@ -74,32 +76,69 @@ TEST(TileLattice, IsWithinHalfAStepAndSharedByNeighbours) {
   }
 }
 
-TEST(TileLattice, HoldsEveryCornerOfTheLargestSceneThatAStepIsKeptFor) {
-  // A step of 1 m up to 2^21 steps and a little beyond: where a scene is too large for it, it must have been raised.
+TEST(TileLattice, HoldsEveryCornerOfTheLargestTileThatAStepIsKeptFor) {
+  // A step of 1.25 m up to 2^21 steps and a little beyond, where it is doubled.
+  constexpr float kStep = 1.25F;
   constexpr int kMostSteps = 1 << 21;
   std::set<float> steps;
-  for (float reach_m = kMostSteps - 4; reach_m < kMostSteps + 2; reach_m += 0.25F) {
+  for (float steps_wide = kMostSteps - 4; steps_wide < kMostSteps + 2; steps_wide += 0.25F) {
     for (const float low_share : {0.0F, 0.5F, 1.0F}) {
+      const float reach_m = kStep * steps_wide;
       const float low_m = -low_share * reach_m;
-      const Bounds bounds{{low_m, 0, 0}, {low_m + reach_m, 1, 1}};
-      const float step = position_step_in_force(0, 1, bounds);
-      steps.insert(step);
       auto tile = testing::patch_tile({}, 2, 0, 20);
-      tile->positions[0] = bounds.min;
-      tile->positions[3] = bounds.max;
-      const auto lattice = tile_lattice(*tile, step);
+      tile->positions[0] = {low_m, 0, 0};
+      tile->positions[3] = {low_m + reach_m, 1, 1};
+      const auto lattice = tile_lattice(*tile, kStep);
       ASSERT_TRUE(lattice.has_value()) << reach_m << " m from " << low_m << " m: " << lattice.error().message;
+      steps.insert(lattice.value().coarsest_step_m);
       for (const auto& point : lattice.value().points) EXPECT_LT(point[0], kMostSteps);
     }
   }
-  EXPECT_EQ(steps, (std::set{1.0F, 2.0F}));
+  EXPECT_EQ(steps, (std::set{kStep, 2 * kStep}));
 }
 
-TEST(TileLattice, RefusesWhatItCannotHold) {
+TEST(TileLattice, RoundsEachVertexToItsOwnStep) {
+  const float step = lattice_step(0.05);
+  const auto tile = testing::patch_tile({}, 12, 0, 20);
+  tile->step_halvings.assign(tile->positions.size(), {0, 0, 0});
+  for (std::size_t v = 0; v < 60; ++v) tile->step_halvings[v] = {3, 5, 1};
+  const TileLattice lattice = tile_lattice(*tile, step).value();
+  EXPECT_EQ(lattice.step_m, step / 32);
+  EXPECT_EQ(lattice.coarsest_step_m, step);
+  for (std::size_t v = 0; v < tile->positions.size(); ++v) {
+    const std::array<float, 3> p{tile->positions[v].x, tile->positions[v].y, tile->positions[v].z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float own = std::ldexp(step, -int{tile->step_halvings[v][axis]});
+      const float decoded = lattice.origin_m[axis] + static_cast<float>(lattice.points[v][axis]) * lattice.step_m;
+      EXPECT_EQ(decoded / own, std::floor(decoded / own));
+      EXPECT_LE(std::abs(decoded - p[axis]), own / 2 * 1.0001F);
+    }
+  }
+}
+
+TEST(TileLattice, DoublesAStepThatFloatsDoNotTellApart) {
+  auto tile = testing::patch_tile({}, 12, 0, 20);
+  const auto decoded_x = [&](const TileLattice& lattice, std::size_t v) {
+    return lattice.origin_m[0] + static_cast<float>(lattice.points[v][0]) * lattice.step_m;
+  };
+  for (const float step : {0x1p-10F, 0x1.4p-10F}) {
+    tile->positions[4].x = 31'000;  // 2^25 of these steps away
+    const TileLattice lattice = tile_lattice(*tile, step).value();
+    EXPECT_LT(31'000 / lattice.step_m, 1 << 23);
+    EXPECT_NEAR(decoded_x(lattice, 4), 31'000, lattice.coarsest_step_m / 2);
+    EXPECT_NEAR(decoded_x(lattice, 5), tile->positions[5].x, lattice.coarsest_step_m / 2);
+  }
+  // What is not drawn has no say.
+  tile->positions.push_back({1e9F, 0, 0});
+  tile->visible.emplace_back();
+  tile->temperature_celsius.push_back(20);
+  tile->positions[4].x = 0.5F;
+  EXPECT_EQ(tile_lattice(*tile, 0x1p-10F).value().coarsest_step_m, 0x1p-10F);
+}
+
+TEST(TileLattice, RefusesWhatIsNotFinite) {
   auto tile = testing::patch_tile({}, 3, 0, 20);
   tile->positions[4].y = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_FALSE(tile_lattice(*tile, 0.5F).has_value());
-  tile->positions[4].y = 3e7F;
   EXPECT_FALSE(tile_lattice(*tile, 0.5F).has_value());
 }
 

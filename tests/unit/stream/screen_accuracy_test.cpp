@@ -13,7 +13,9 @@ namespace {
 class ScreenAccuracyTest : public ::testing::Test {
  protected:
   ScreenAccuracy of(const std::vector<int>& colour_bits, const std::optional<Camera>& camera = std::nullopt) const {
-    return screen_accuracy(tree_, colour_bits, camera, kStep);
+    std::vector<HeldQuality> held;
+    for (const int bits : colour_bits) held.push_back({bits, kStep});
+    return screen_accuracy(tree_, held, camera);
   }
   std::vector<int> none() const { return std::vector<int>(tree_.nodes().size()); }
 

@@ -1,5 +1,5 @@
 import { DecodePool, Superseded } from '../decode/pool';
-import { decodeTileFrame, FrameKind, type TileFrame } from '../protocol/frame';
+import { decodeTileFrame, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
   extremes,
@@ -336,6 +336,8 @@ export class Session {
     // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
     if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) this.tiles.clear();
     this.#look.sceneIs(next);
+    if (!this.#qualityChanged && store.quality !== null)
+      store.quality = { ...store.quality, position_step_mm: next.position_step_m * 1000 };
     if (!same) {
       store.pinned = null;
       store.pictureMethod = null;
@@ -386,19 +388,7 @@ export class Session {
       this.#say(error);
       return;
     }
-    if (frame.kind === FrameKind.geometry) {
-      this.#look.stepIs(frame.position_step_m);
-      this.#stepIs(frame.position_step_m * 1000);
-    }
     this.#intake.receive(frame);
-  }
-
-  /** A server that had no scene when it said hello chooses its step later: the tiles tell which one it is. */
-  #stepIs(position_step_mm: number): void {
-    const { store } = this;
-    if (!this.#qualityChanged) store.baseStep_mm = position_step_mm;
-    if (store.quality === null || this.#qualitySender.busy || store.quality.position_step_mm === position_step_mm) return;
-    store.quality = { ...store.quality, position_step_mm };
   }
 
   /** Brings decoded tiles into the picture. Returns true when the next one has work, too. */

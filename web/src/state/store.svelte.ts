@@ -86,8 +86,6 @@ export class Store {
   pictureMethod = $state<string | null>(null);
   /** What the last finished change cost: bytes received and time until all of it was on the screen. */
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
-  /** The position step that the server chose by itself. */
-  baseStep_mm = $state<number | null>(null);
   /** Farthest that what is on the screen may be from the full mesh. */
   position_error_mm = $state<number | null>(null);
   camera = $state.raw<CameraPose | null>(null);

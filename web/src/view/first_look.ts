@@ -23,10 +23,8 @@ export interface Looking {
   setReach(nearest: number, farthest: number): void;
 }
 
-/** Nearest approach, in steps of the lattice of the finest tile: the picture is then about three of them high. */
-const NEAREST_STEPS = 4;
-/** A step is told in every tile; until one has come, and where it is absurd, a share of the scene's size stands for it. */
-const LEAST_SHARE = 1e-7;
+/** Nearest approach, as a share of the scene's size: 4 mm in a map of 4 km. */
+const NEAREST_SHARE = 1e-6;
 const FARTHEST_RADII = 20;
 
 /**
@@ -37,7 +35,6 @@ export class FirstLook {
   #scene: Scene | null = null;
   #up: UpAxis = 'y';
   #userMoved = false;
-  #finestStep = Infinity;
   /** What the first tile said; null until it has come. */
   #decided: { points: Vec3[]; facing: Vec3 } | null = null;
   #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
@@ -59,7 +56,6 @@ export class FirstLook {
       return;
     this.#decided = null;
     this.#userMoved = false;
-    this.#finestStep = Infinity;
     this.#setUp(this.choices.get(scene.name, scene.bounds) ?? scene.up);
     this.#look(false);
   }
@@ -74,13 +70,6 @@ export class FirstLook {
       facing: meanNormal(geometries),
     };
     if (!this.#userMoved) this.#look(false);
-  }
-
-  /** A tile of this lattice step has come. */
-  stepIs(position_step_m: number): void {
-    if (!(position_step_m < this.#finestStep)) return;
-    this.#finestStep = position_step_m;
-    this.#updateReach();
   }
 
   /** The user moved the camera: from now on it is not moved for them. */
@@ -153,12 +142,13 @@ export class FirstLook {
   /** Far enough away to see everything, strays too; near enough to see the finest detail that there is. */
   #updateReach(): void {
     if (this.#scene === null) return;
-    const { min, max } = this.#scene.bounds;
-    const diagonal = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
-    const size = diagonal > 0 ? diagonal : 1;
-    const step = Number.isFinite(this.#finestStep) && this.#finestStep < size ? this.#finestStep : 0;
-    this.viewport.setReach(Math.max(step * NEAREST_STEPS, size * LEAST_SHARE), (size / 2) * FARTHEST_RADII);
+    const { bounds, core_bounds } = this.#scene;
+    this.viewport.setReach(sizeOf(core_bounds ?? bounds) * NEAREST_SHARE, (sizeOf(bounds) / 2) * FARTHEST_RADII);
   }
+}
+
+function sizeOf({ min, max }: Bounds): number {
+  return Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1;
 }
 
 /** A scene that grows bit by bit stays where it is looked at. */

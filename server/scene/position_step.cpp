@@ -1,0 +1,529 @@
+#include "server/scene/position_step.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "server/scene/octree_cut.hpp"
+#include "server/scene/surface.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::Vec3f;
+
+/// Half as many to so many vertices are a cell: no more than the smallest patch that is to keep its form.
+constexpr std::uint32_t kCellVertexCount = 44;
+
+/// Parts of the tree that are made independently of each other.
+constexpr std::uint32_t kBranchVertexCount = 1 << 16;
+
+/// Where coincident vertices are sought: everything in the same place is together by then.
+constexpr std::uint32_t kWeldVertexCount = 512;
+
+/// Of what a side of a box measures. Each of its two ends is off by half a step at most, so that a tenth is on the safe side:
+/// for pieces, and for what is so dense that the usual step halved would not keep it apart. Of other cells, which a patch is larger
+/// than, a little more: what half the vertices of a scan pay for.
+constexpr double kStepOfPieceSide = 0.1;
+constexpr double kStepOfCellSide = 0.24;
+
+/// One in so many vertices of a cell may fall together with another.
+constexpr std::size_t kVerticesToMerged = 5;
+
+/// How far the needs of a cell reach beyond it, in parts of its longest side. Those of what is much closer together than the usual
+/// step reach to the next vertices; others to what the cell touches, and with one halving less to the next vertices.
+constexpr double kReach = 0.25;
+constexpr double kTouch = 0.05;
+
+/// What is thinner beside its breadth is flat.
+constexpr double kFlat = 0x1p-12;
+
+/// Pieces of more vertices are as many cells.
+constexpr std::uint32_t kSmallPieceVertexCount = 64;
+
+/// More than a tile has steps from end to end.
+constexpr int kMostHalvings = 24;
+
+/// A scene may be rounded finer everywhere for so many bits; by no more than a thousandth of the step.
+constexpr std::size_t kNegligibleBits = 8 * 4096;
+constexpr int kMostSpareHalvings = 10;
+
+std::array<float, 3> coordinates(const Vec3f& v) {
+  return {v.x, v.y, v.z};
+}
+
+bool is_finite(const Vec3f& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Up to `kSampleCount` lengths of what neighbours in a leaf: edges, or in a point cloud nearest vertices.
+std::vector<double> neighbour_distances(const Tile& leaf) {
+  constexpr std::size_t kSampleCount = 256;
+  constexpr std::size_t kPointSampleCount = 16;
+  std::vector<double> distances;
+  const auto keep = [&](double squared) {
+    if (squared > 0 && std::isfinite(squared)) distances.push_back(std::sqrt(squared));
+  };
+  if (!leaf.triangles.empty()) {
+    const std::size_t stride = leaf.triangles.size() / kSampleCount + 1;
+    for (std::size_t t = 0; t < leaf.triangles.size(); t += stride) {
+      const fusion::Triangle& triangle = leaf.triangles[t];
+      for (unsigned corner = 0; corner < 3; ++corner) {
+        keep(squared_distance(leaf.positions[triangle[corner]], leaf.positions[triangle[(corner + 1) % 3]]));
+      }
+    }
+    return distances;
+  }
+  const std::size_t stride = leaf.positions.size() / kPointSampleCount + 1;
+  for (std::size_t v = 0; v < leaf.positions.size(); v += stride) {
+    double nearest = 0;
+    for (const Vec3f& other : leaf.positions) {
+      const double squared = squared_distance(leaf.positions[v], other);
+      if (squared > 0 && (nearest == 0 || squared < nearest)) nearest = squared;
+    }
+    keep(nearest);
+  }
+  return distances;
+}
+
+/// The power of two nearest to a quarter of the median distance between neighbours.
+float usual_step_m(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool) {
+  std::vector<std::vector<double>> of_leaf(leaves.size());
+  pool.for_each(leaves.size(), [&](std::size_t i) { of_leaf[i] = neighbour_distances(*leaves[i]); });
+  std::vector<double> distances;
+  for (const auto& some : of_leaf) distances.insert(distances.end(), some.begin(), some.end());
+  if (distances.empty()) return 0x1p-10F;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  const double exponent = std::round(std::log2(*middle / 4));
+  return static_cast<float>(std::exp2(std::clamp(exponent, -90.0, 100.0)));
+}
+
+/// Vertices that count: in a scene with triangles those of a triangle.
+std::vector<bool> drawn_vertices(const Tile& tile) {
+  std::vector<bool> is_drawn(tile.positions.size(), tile.triangles.empty());
+  for (const fusion::Triangle& triangle : tile.triangles) {
+    for (const std::uint32_t v : triangle) is_drawn[v] = true;
+  }
+  return is_drawn;
+}
+
+double longest_side(const Bounds& box) {
+  return std::max({double{box.max.x} - double{box.min.x}, double{box.max.y} - double{box.min.y},
+                   double{box.max.z} - double{box.min.z}});
+}
+
+/// How often `step_m` is halved until it is `wanted_m` or less.
+std::uint8_t halvings_to(double wanted_m, double step_m) {
+  if (wanted_m >= step_m) return 0;
+  return static_cast<std::uint8_t>(std::min(std::ceil(std::log2(step_m / wanted_m)), double{kMostHalvings}));
+}
+
+/// A box of points and how it wants to be rounded.
+struct Shape {
+  Bounds bounds;
+  std::array<double, 3> side{};
+  std::array<double, 3> float_spacing{};  ///< Of coordinates as far out.
+
+  explicit Shape(const Bounds& box) : bounds(box) {
+    const auto low = coordinates(box.min), high = coordinates(box.max);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      side[axis] = double{high[axis]} - double{low[axis]};
+      const double farthest = std::max(std::abs(double{low[axis]}), std::abs(double{high[axis]}));
+      float_spacing[axis] = farthest > 0 ? std::ldexp(1, std::ilogb(farthest) - 23) : 0;
+    }
+  }
+
+  StepHalvings within_precision(StepHalvings halvings, double step_m) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (float_spacing[axis] > 0) halvings[axis] = std::min(halvings[axis], halvings_to(float_spacing[axis], step_m));
+    }
+    return halvings;
+  }
+
+  /// So that no side that is one changes by more than a tenth.
+  StepHalvings for_sides(double step_of_side, double step_m) const {
+    std::array<double, 3> sorted = side;
+    std::sort(sorted.begin(), sorted.end());
+    StepHalvings halvings{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (side[axis] <= 8 * float_spacing[axis] || side[axis] < kFlat * sorted[1]) continue;
+      halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
+    }
+    return halvings;
+  }
+};
+
+StepHalvings finer(const StepHalvings& a, const StepHalvings& b) {
+  return {std::max(a[0], b[0]), std::max(a[1], b[1]), std::max(a[2], b[2])};
+}
+
+/// How often `step_m` is halved until all but `may_merge` of these distinct positions stay distinct.
+std::uint8_t halvings_apart(std::span<const Vec3f> positions, std::size_t may_merge, double step_m) {
+  std::vector<std::array<double, 3>> rounded(positions.size());
+  for (int halvings = 0; halvings < kMostHalvings; ++halvings) {
+    const double step = std::ldexp(step_m, -halvings);
+    std::size_t merged_count = 0;
+    for (std::size_t i = 0; i < positions.size() && merged_count <= may_merge; ++i) {
+      const auto p = coordinates(positions[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) rounded[i][axis] = std::floor(double{p[axis]} / step + 0.5);
+      const auto end = rounded.begin() + static_cast<std::ptrdiff_t>(i);
+      if (std::find(rounded.begin(), end, rounded[i]) != end) ++merged_count;
+    }
+    if (merged_count <= may_merge) return static_cast<std::uint8_t>(halvings);
+  }
+  return kMostHalvings;
+}
+
+/// Which vertices hang together.
+class Pieces {
+ public:
+  explicit Pieces(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+  std::uint32_t of(std::uint32_t v) {
+    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+    return v;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = of(a);
+    b = of(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace
+
+/// A part of the tree while it is made.
+struct PositionSteps::Branch {
+  std::uint32_t begin = 0, end = 0;
+  std::uint32_t place = 0;  ///< Its first node in the whole tree.
+  std::vector<Node> nodes;
+  std::vector<Cell> cells;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident;
+
+  /// Splits a range of points in two along its longest side; false where all are in one place. Equal positions stay together.
+  static bool split(std::span<Point> points, Node& node, std::size_t& below_count) {
+    Bounds box{points[0].position, points[0].position};
+    for (const Point& point : points) {
+      const Vec3f& p = point.position;
+      box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
+      box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
+    }
+    const Shape shape(box);
+    const auto longest = std::max_element(shape.side.begin(), shape.side.end());
+    if (!(*longest > 0)) return false;
+    const auto axis = static_cast<std::size_t>(longest - shape.side.begin());
+    const auto at = [axis](const Point& point) { return coordinates(point.position)[axis]; };
+    const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
+    std::nth_element(points.begin(), middle, points.end(),
+                     [&](const Point& a, const Point& b) { return at(a) < at(b); });
+    node.axis = static_cast<std::uint8_t>(axis);
+    node.split = at(*middle);
+    if (node.split == coordinates(box.min)[axis]) {
+      node.split = std::numeric_limits<float>::infinity();
+      for (const Point& point : points) {
+        if (at(point) > coordinates(box.min)[axis]) node.split = std::min(node.split, at(point));
+      }
+    }
+    const auto end = std::partition(points.begin(), points.end(), [&](const Point& p) { return at(p) < node.split; });
+    below_count = static_cast<std::size_t>(end - points.begin());
+    return true;
+  }
+
+  /// Leaves one vertex of each place at the front; returns how many.
+  std::size_t weld(std::span<Point> points) {
+    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
+      return std::tuple(a.position.x, a.position.y, a.position.z, a.source) <
+             std::tuple(b.position.x, b.position.y, b.position.z, b.source);
+    });
+    std::size_t count = 0;
+    for (const Point& point : points) {
+      if (count > 0 && points[count - 1].position == point.position) {
+        coincident.emplace_back(points[count - 1].source, point.source);
+      } else {
+        points[count++] = point;
+      }
+    }
+    return count;
+  }
+
+  void grow(std::span<Point> all, std::uint32_t at_node, std::uint32_t first, std::uint32_t last, bool is_welded) {
+    std::span<Point> points = all.subspan(first, last - first);
+    if (!is_welded && points.size() <= kWeldVertexCount) {
+      last = first + static_cast<std::uint32_t>(weld(points));
+      points = points.first(last - first);
+      is_welded = true;
+    }
+    Node node;
+    std::size_t below_count = 0;
+    if ((is_welded && points.size() <= kCellVertexCount) || !split(points, node, below_count)) {
+      if (!is_welded) {
+        last = first + static_cast<std::uint32_t>(weld(points));
+        points = points.first(last - first);
+      }
+      Cell cell;
+      cell.begin = first;
+      cell.end = last;
+      cell.bounds = {points[0].position, points[0].position};
+      for (const Point& point : points) {
+        const Vec3f& p = point.position;
+        Bounds& box = cell.bounds;
+        box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
+        box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
+      }
+      nodes[at_node].below = static_cast<std::uint32_t>(cells.size());
+      cells.push_back(cell);
+      return;
+    }
+    node.below = static_cast<std::uint32_t>(nodes.size());
+    nodes[at_node] = node;
+    nodes.resize(nodes.size() + 2);
+    const std::uint32_t middle = first + static_cast<std::uint32_t>(below_count);
+    grow(all, node.below, first, middle, is_welded);
+    grow(all, node.below + 1, middle, last, is_welded);
+  }
+};
+
+PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool) {
+  largest_step_m_ = usual_step_m(leaves, pool);
+  gather(leaves);
+  if (points_.empty()) return;
+  const std::size_t spare = kNegligibleBits / (3 * points_.size());
+  largest_step_m_ = std::ldexp(largest_step_m_, -static_cast<int>(std::min<std::size_t>(spare, kMostSpareHalvings)));
+  cut(pool);
+  ask_cells(pool);
+  ask_pieces(leaves);
+  ask_neighbours(pool);
+  const bool has_triangles =
+      std::any_of(leaves.begin(), leaves.end(), [](const auto& leaf) { return !leaf->triangles.empty(); });
+  if (has_triangles) limit_to_one_tile();
+  points_ = {};
+  coincident_ = {};
+}
+
+void PositionSteps::gather(std::span<const std::shared_ptr<Tile>> leaves) {
+  std::size_t count = 0;
+  for (const auto& leaf : leaves) count += leaf->owned_count;
+  points_.reserve(count);
+  for (const auto& leaf : leaves) {
+    const std::vector<bool> is_drawn = drawn_vertices(*leaf);
+    for (std::uint32_t v = 0; v < leaf->owned_count; ++v) {
+      if (is_drawn[v] && is_finite(leaf->positions[v])) points_.push_back({leaf->positions[v], leaf->source_vertex[v]});
+    }
+  }
+}
+
+void PositionSteps::cut(WorkerPool& pool) {
+  std::vector<Branch> branches;
+  nodes_.resize(1);
+  // The top, down to branches that are made in parallel.
+  std::vector<Branch> open;
+  open.push_back({0, static_cast<std::uint32_t>(points_.size()), 0, {}, {}, {}});
+  while (!open.empty()) {
+    Branch branch = std::move(open.back());
+    open.pop_back();
+    const std::span<Point> points = std::span(points_).subspan(branch.begin, branch.end - branch.begin);
+    Node node;
+    std::size_t below_count = 0;
+    if (points.size() <= kBranchVertexCount || !Branch::split(points, node, below_count)) {
+      branches.push_back(std::move(branch));
+      continue;
+    }
+    node.below = static_cast<std::uint32_t>(nodes_.size());
+    nodes_[branch.place] = node;
+    nodes_.resize(nodes_.size() + 2);
+    const std::uint32_t middle = branch.begin + static_cast<std::uint32_t>(below_count);
+    open.push_back({branch.begin, middle, node.below, {}, {}, {}});
+    open.push_back({middle, branch.end, node.below + 1, {}, {}, {}});
+  }
+  pool.for_each(branches.size(), [&](std::size_t i) {
+    branches[i].nodes.resize(1);
+    branches[i].grow(points_, 0, branches[i].begin, branches[i].end, false);
+  });
+  for (Branch& branch : branches) {
+    const auto first_node = static_cast<std::uint32_t>(nodes_.size());
+    const auto first_cell = static_cast<std::uint32_t>(cells_.size());
+    // The first node has its place already.
+    for (std::size_t i = 0; i < branch.nodes.size(); ++i) {
+      Node node = branch.nodes[i];
+      node.below += node.axis == kNoAxis ? first_cell : first_node - 1;
+      if (i == 0) {
+        nodes_[branch.place] = node;
+      } else {
+        nodes_.push_back(node);
+      }
+    }
+    cells_.insert(cells_.end(), branch.cells.begin(), branch.cells.end());
+    coincident_.insert(coincident_.end(), branch.coincident.begin(), branch.coincident.end());
+  }
+}
+
+void PositionSteps::ask_cells(WorkerPool& pool) {
+  constexpr std::size_t kChunk = 4096;
+  const auto step_m = static_cast<double>(largest_step_m_);
+  pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    std::vector<Vec3f> positions;
+    for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
+      Cell& cell = cells_[c];
+      positions.clear();
+      for (std::uint32_t i = cell.begin; i < cell.end; ++i) positions.push_back(points_[i].position);
+      const Shape shape(cell.bounds);
+      const std::uint8_t apart = halvings_apart(positions, positions.size() / kVerticesToMerged, step_m);
+      const double step_of_side = apart > 1 ? kStepOfPieceSide : kStepOfCellSide;
+      cell.own = shape.within_precision(finer(shape.for_sides(step_of_side, step_m), {apart, apart, apart}), step_m);
+      cell.is_dense = apart > 0;
+    }
+  });
+}
+
+void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
+  std::uint32_t source_count = 0;
+  for (const Point& point : points_) source_count = std::max(source_count, point.source + 1);
+  bool has_triangles = false;
+  Pieces pieces(source_count);
+  for (const auto& leaf : leaves) {
+    has_triangles = has_triangles || !leaf->triangles.empty();
+    for (const fusion::Triangle& t : leaf->triangles) {
+      const std::uint32_t first = leaf->source_vertex[t[0]];
+      pieces.join(first, leaf->source_vertex[t[1]]);
+      pieces.join(first, leaf->source_vertex[t[2]]);
+    }
+  }
+  if (!has_triangles) return;
+  for (const auto& [a, b] : coincident_) pieces.join(a, b);
+
+  constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number_of(source_count, kNone);
+  struct Piece {
+    Bounds bounds;
+    std::uint32_t count = 0;
+    StepHalvings halvings{};
+    std::vector<Vec3f> positions;  ///< Of a small one.
+  };
+  std::vector<Piece> all;
+  for (const Cell& cell : cells_) {
+    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
+      const Vec3f& p = points_[i].position;
+      std::uint32_t& number = number_of[pieces.of(points_[i].source)];
+      if (number == kNone) {
+        number = static_cast<std::uint32_t>(all.size());
+        all.push_back({{p, p}, 0, {}, {}});
+      }
+      Piece& piece = all[number];
+      piece.bounds.min = {std::min(piece.bounds.min.x, p.x), std::min(piece.bounds.min.y, p.y),
+                          std::min(piece.bounds.min.z, p.z)};
+      piece.bounds.max = {std::max(piece.bounds.max.x, p.x), std::max(piece.bounds.max.y, p.y),
+                          std::max(piece.bounds.max.z, p.z)};
+      if (++piece.count <= kSmallPieceVertexCount) piece.positions.push_back(p);
+    }
+  }
+  const auto step_m = static_cast<double>(largest_step_m_);
+  bool is_any_fine = false;
+  for (Piece& piece : all) {
+    const Shape shape(piece.bounds);
+    piece.halvings = shape.for_sides(kStepOfPieceSide, step_m);
+    if (piece.count <= kSmallPieceVertexCount) {
+      const std::uint8_t apart = halvings_apart(piece.positions, piece.positions.size() / kVerticesToMerged, step_m);
+      piece.halvings = finer(piece.halvings, {apart, apart, apart});
+    }
+    piece.halvings = shape.within_precision(piece.halvings, step_m);
+    is_any_fine = is_any_fine || piece.halvings != StepHalvings{};
+  }
+  if (!is_any_fine) return;
+  for (Cell& cell : cells_) {
+    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
+      cell.halvings = finer(cell.halvings, all[number_of[pieces.of(points_[i].source)]].halvings);
+    }
+  }
+}
+
+void PositionSteps::ask_neighbours(WorkerPool& pool) {
+  constexpr std::size_t kChunk = 4096;
+  const auto raise = [](std::uint8_t& value, std::uint8_t to) {
+    const std::atomic_ref<std::uint8_t> shared(value);
+    std::uint8_t now = shared.load(std::memory_order_relaxed);
+    while (now < to && !shared.compare_exchange_weak(now, to, std::memory_order_relaxed)) {
+    }
+  };
+  for (Cell& cell : cells_) cell.halvings = finer(cell.halvings, cell.own);
+  pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    std::vector<std::uint32_t> open;
+    for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
+      const Cell& cell = cells_[c];
+      if (cell.own == StepHalvings{}) continue;
+      const double longest = longest_side(cell.bounds);
+      std::array<double, 3> low{}, high{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = double{coordinates(cell.bounds.min)[axis]} - longest * kReach;
+        high[axis] = double{coordinates(cell.bounds.max)[axis]} + longest * kReach;
+      }
+      open.assign(1, 0);
+      while (!open.empty()) {
+        const Node node = nodes_[open.back()];
+        open.pop_back();
+        if (node.axis != kNoAxis) {
+          if (low[node.axis] < double{node.split}) open.push_back(node.below);
+          if (high[node.axis] >= double{node.split}) open.push_back(node.below + 1);
+          continue;
+        }
+        Cell& other = cells_[node.below];
+        double gap = 0;  // Along the axis on which they are farthest apart.
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          gap = std::max({gap, double{coordinates(other.bounds.min)[axis]} - double{coordinates(cell.bounds.max)[axis]},
+                          double{coordinates(cell.bounds.min)[axis]} - double{coordinates(other.bounds.max)[axis]}});
+        }
+        if (gap > longest * kReach) continue;
+        const int fewer = cell.is_dense || gap <= longest * kTouch ? 0 : 1;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          raise(other.halvings[axis], static_cast<std::uint8_t>(std::max(0, cell.own[axis] - fewer)));
+        }
+      }
+    }
+  });
+}
+
+void PositionSteps::limit_to_one_tile() {
+  std::vector<Vec3f> corners;
+  for (const Cell& cell : cells_) {
+    corners.push_back(cell.bounds.min);
+    corners.push_back(cell.bounds.max);
+  }
+  const double extent = longest_side(bounds_of(corners));
+  const double most = std::floor(std::log2(static_cast<double>(largest_step_m_) * 0x1.fffffcp23 / extent));
+  // A triangle to a stray vertex coarsens the tiles that have it, no others.
+  if (!(most >= 1 && most < kMostHalvings)) return;
+  const auto limit = static_cast<std::uint8_t>(most);
+  for (Cell& cell : cells_) {
+    for (std::uint8_t& halvings : cell.halvings) halvings = std::min(halvings, limit);
+  }
+}
+
+const PositionSteps::Cell& PositionSteps::cell_at(const Vec3f& position) const {
+  const auto p = coordinates(position);
+  const Node* node = &nodes_[0];
+  while (node->axis != kNoAxis) node = &nodes_[node->below + (p[node->axis] < node->split ? 0 : 1)];
+  return cells_[node->below];
+}
+
+void PositionSteps::apply(Tile& tile) const {
+  tile.step_halvings.clear();
+  if (cells_.empty() || tile.positions.empty()) return;
+  const std::vector<bool> is_drawn = drawn_vertices(tile);
+  std::vector<StepHalvings> halvings(tile.positions.size());
+  bool is_any = false;
+  for (std::size_t v = 0; v < halvings.size(); ++v) {
+    if (!is_drawn[v]) continue;
+    halvings[v] = cell_at(tile.positions[v]).halvings;
+    is_any = is_any || halvings[v] != StepHalvings{};
+  }
+  if (is_any) tile.step_halvings = std::move(halvings);
+}
+
+}  // namespace spectra::server

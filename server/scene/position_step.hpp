@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/scene/scene_snapshot.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::server {
+
+/// How finely the positions of a scene are rounded where: a power of two in metres for every place and axis, so that all
+/// lattices are parts of one. A position alone decides its step: whatever tiles and levels hold a vertex, it is rounded to
+/// the same point.
+///
+/// The step is about a quarter of the scene's median edge, and is halved where what is there would lose its form:
+/// - four fifths of a few dozen neighbouring vertices stay apart,
+/// - what they span along an axis is at least four steps (what is thinner than a 4,096th of its breadth, or than eight times
+///   what floats tell apart there, counts as flat),
+/// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps.
+/// Neighbours get the finer of their steps. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
+/// Vertices of no triangle in a scene with triangles are not drawn and have no say.
+class PositionSteps {
+ public:
+  /// Of the full mesh; the same for any number of threads. Must not be called from a job of the pool.
+  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool);
+
+  /// The coarsest step that any vertex may have; a power of two.
+  float largest_step_m() const { return largest_step_m_; }
+
+  /// Fills in the step_halvings of a tile whose vertices are vertices of the scene. Thread-safe for different tiles.
+  void apply(Tile& tile) const;
+
+ private:
+  /// A few neighbouring vertices.
+  struct Cell {
+    Bounds bounds;
+    std::uint32_t begin = 0, end = 0;  ///< In points_.
+    StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood.
+    bool is_dense = false;             ///< Its vertices would fall together at the usual step.
+  };
+  struct Point {
+    fusion::Vec3f position;
+    std::uint32_t source = 0;
+  };
+  /// Halves what is left of it: below `split` on `axis` is `below`, the rest `below + 1`; without an axis it is a cell.
+  struct Node {
+    std::uint8_t axis = kNoAxis;
+    float split = 0;
+    std::uint32_t below = 0;
+  };
+  struct Branch;
+  static constexpr std::uint8_t kNoAxis = 3;
+
+  void gather(std::span<const std::shared_ptr<Tile>> leaves);
+  void cut(WorkerPool& pool);
+  void ask_cells(WorkerPool& pool);
+  void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
+  void ask_neighbours(WorkerPool& pool);
+  /// No step is finer than a tile of half the scene can have: neighbours would differ on their border.
+  void limit_to_one_tile();
+  const Cell& cell_at(const fusion::Vec3f& position) const;
+
+  float largest_step_m_ = 0;
+  std::vector<Point> points_;
+  std::vector<Node> nodes_;
+  std::vector<Cell> cells_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident_;  ///< Vertices in the same place.
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,78 @@
+// What rounding positions leaves of the form of scenes, and what their geometry weighs beside one step for all of it.
+//   form_bench [--seeds N] SCENE.ply...
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "fusion/mesh/ply_reader.hpp"
+#include "server/scene/scene_snapshot.hpp"
+#include "server/stream/tile_encoder.hpp"
+#include "server/stream/viewer_stream.hpp"
+#include "tests/unit/stream/form.hpp"
+
+namespace {
+
+using namespace spectra;
+using namespace spectra::server;
+
+void measure(const std::string& path, std::size_t seed_count) {
+  auto loaded = fusion::read_ply(path);
+  const std::string name = path.substr(path.find_last_of('/') + 1);
+  if (!loaded) {
+    std::printf("%-30s refused\n", name.c_str());
+    return;
+  }
+  WorkerPool pool(2);
+  const auto scene =
+      SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
+  std::size_t root_bytes = 0, leaf_bytes = 0, bytes = 0, uniform_leaf_bytes = 0;
+  for (const auto& tile : scene->tiles()) {
+    const auto geometry = encoded_tile(*tile, scene->suggested_position_step_m(), 7);
+    if (!geometry) {
+      std::printf("%s: %s\n", name.c_str(), geometry.error().message.c_str());
+      std::exit(1);
+    }
+    const std::size_t size = geometry.value().payload->size();
+    bytes += size;
+    if (tile->child_mask == 0) {
+      leaf_bytes += size;
+      Tile uniform = *tile;
+      uniform.step_halvings.clear();
+      uniform_leaf_bytes += encoded_tile(uniform, scene->suggested_position_step_m(), 7).value().payload->size();
+    }
+    if (tile->id.level == 0) root_bytes += size;
+  }
+  const testing::FormReport form = testing::form_of(*scene, seed_count);
+  std::printf(
+      "%-30s step %-11.6g geometry: leaves %8zu (%.3f of one step) all %8zu root %6zu | pieces %5zu: flattened %zu, "
+      "merged %zu | "
+      "patches %6zu: flattened %zu, merged %zu, worst side %.3f | torn %zu\n",
+      name.c_str(), static_cast<double>(scene->suggested_position_step_m()), leaf_bytes,
+      static_cast<double>(leaf_bytes) / static_cast<double>(uniform_leaf_bytes), bytes, root_bytes, form.piece_count,
+      form.flattened_piece_count, form.merged_piece_count, form.patch_count, form.flattened_patch_count,
+      form.merged_patch_count, form.worst_side_change, form.torn_count);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::size_t seed_count = 20'000;
+  std::vector<std::string> paths;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--seeds" && i + 1 < argc) {
+      seed_count = std::stoul(argv[++i]);
+    } else {
+      paths.push_back(argument);
+    }
+  }
+  if (paths.empty()) {
+    std::fprintf(stderr, "usage: form_bench [--seeds N] SCENE.ply...\n");
+    return 2;
+  }
+  for (const std::string& path : paths) measure(path, seed_count);
+  return 0;
+}

@@ -1,0 +1,231 @@
+#include "server/scene/position_step.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "form.hpp"
+#include "server/stream/lattice.hpp"
+#include "tests/unit/scene/generated_scene.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::MultispectralMesh;
+using fusion::Triangle;
+using fusion::Vec3f;
+using testing::form_of;
+using testing::FormReport;
+
+/// Parts of a scene; what is added keeps its place.
+struct Parts {
+  std::vector<Vec3f> positions;
+  std::vector<Triangle> triangles;
+
+  std::uint32_t add(double x, double y, double z) {
+    positions.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+    return static_cast<std::uint32_t>(positions.size() - 1);
+  }
+
+  /// A grid of vertices over a parallelogram, with a height for each.
+  template <class Height>
+  void grid(int columns, int rows, Vec3f corner, Vec3f along, Vec3f across, Height height) {
+    const auto first = static_cast<std::uint32_t>(positions.size());
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        add(double{corner.x} + column * double{along.x} + row * double{across.x},
+            double{corner.y} + column * double{along.y} + row * double{across.y},
+            double{corner.z} + column * double{along.z} + row * double{across.z} + height(column, row));
+      }
+    }
+    for (int row = 0; row + 1 < rows; ++row) {
+      for (int column = 0; column + 1 < columns; ++column) {
+        const std::uint32_t v = first + static_cast<std::uint32_t>(row * columns + column);
+        const auto next = static_cast<std::uint32_t>(columns);
+        triangles.push_back({v, v + 1, v + next});
+        triangles.push_back({v + 1, v + next + 1, v + next});
+      }
+    }
+  }
+
+  /// Level ground, `spacing` metres between vertices.
+  void ground(int side, float spacing) {
+    grid(side, side, {0, 0, 0}, {spacing, 0, 0}, {0, spacing, 0}, [](int, int) { return 0.0; });
+  }
+
+  void box(Vec3f low, Vec3f high) {
+    std::array<std::uint32_t, 8> v{};
+    for (unsigned i = 0; i < 8; ++i)
+      v[i] = add(double{(i & 1) != 0 ? high.x : low.x}, double{(i & 2) != 0 ? high.y : low.y},
+                 double{(i & 4) != 0 ? high.z : low.z});
+    for (const std::array<unsigned, 4> side :
+         {std::array<unsigned, 4>{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}}) {
+      triangles.push_back({v[side[0]], v[side[1]], v[side[2]]});
+      triangles.push_back({v[side[0]], v[side[2]], v[side[3]]});
+    }
+  }
+
+  /// A tube of rings of six along a direction.
+  void tube(Vec3f start, Vec3f along, int ring_count, double radius) {
+    const auto first = static_cast<std::uint32_t>(positions.size());
+    // Two directions across: good enough for a tube.
+    const std::array<double, 3> a{double{along.x}, double{along.y}, double{along.z}};
+    const bool is_steep = std::abs(a[2]) > std::abs(a[0]);
+    const std::array<double, 3> u = is_steep ? std::array{1.0, 0.0, -a[0] / a[2]} : std::array{-a[2] / a[0], 0.0, 1.0};
+    const std::array<double, 3> w{a[1] * u[2] - a[2] * u[1], a[2] * u[0] - a[0] * u[2], a[0] * u[1] - a[1] * u[0]};
+    const auto scaled = [radius](const std::array<double, 3>& v) {
+      const double length = std::hypot(v[0], v[1], v[2]);
+      return std::array{radius * v[0] / length, radius * v[1] / length, radius * v[2] / length};
+    };
+    const auto across = scaled(u), up = scaled(w);
+    for (int ring = 0; ring < ring_count; ++ring) {
+      for (int i = 0; i < 6; ++i) {
+        const double c = std::cos(i * 1.0471975511965976), s = std::sin(i * 1.0471975511965976);
+        add(double{start.x} + ring * a[0] + c * across[0] + s * up[0],
+            double{start.y} + ring * a[1] + c * across[1] + s * up[1],
+            double{start.z} + ring * a[2] + c * across[2] + s * up[2]);
+      }
+    }
+    for (int ring = 0; ring + 1 < ring_count; ++ring) {
+      for (std::uint32_t i = 0; i < 6; ++i) {
+        const std::uint32_t v = first + static_cast<std::uint32_t>(6 * ring) + i,
+                            w6 = first + static_cast<std::uint32_t>(6 * ring) + (i + 1) % 6;
+        triangles.push_back({v, w6, v + 6});
+        triangles.push_back({w6, w6 + 6, v + 6});
+      }
+    }
+  }
+
+  MultispectralMesh mesh() const {
+    MultispectralMesh result;
+    result.name = "parts";
+    result.has_visible = true;
+    result.resize_vertices(positions.size());
+    std::copy(positions.begin(), positions.end(), result.positions().begin());
+    result.triangles() = triangles;
+    return result;
+  }
+};
+
+std::shared_ptr<const SceneSnapshot> scene_of(MultispectralMesh mesh) {
+  WorkerPool pool(2);
+  return SceneSnapshot::build(std::move(mesh), 1, pool, 4'000, LevelsOfDetail::All);
+}
+
+std::string described(const FormReport& form) {
+  return "pieces " + std::to_string(form.piece_count) + ": flattened " + std::to_string(form.flattened_piece_count) +
+         ", merged " + std::to_string(form.merged_piece_count) + "; patches " + std::to_string(form.patch_count) +
+         ": flattened " + std::to_string(form.flattened_patch_count) + ", merged " +
+         std::to_string(form.merged_patch_count) + ", worst side " + std::to_string(form.worst_side_change) +
+         "; torn " + std::to_string(form.torn_count);
+}
+
+void expect_kept(MultispectralMesh mesh) {
+  const auto scene = scene_of(std::move(mesh));
+  const FormReport form = form_of(*scene, 600);
+  EXPECT_TRUE(form.is_kept()) << described(form);
+}
+
+TEST(PositionSteps, KeepARoomOfAFewVertices) {
+  Parts room;
+  room.box({0, 0, 0}, {8, 6, 3});
+  room.box({4, 0, 0}, {4.1F, 4, 3});
+  room.box({1, 1, 0}, {1.3F, 1.3F, 0.3F});
+  expect_kept(room.mesh());
+}
+
+TEST(PositionSteps, KeepALongPipe) {
+  Parts pipe;
+  pipe.tube({0, 0, 0}, {60, 0, 0}, 2, 0.1);
+  expect_kept(pipe.mesh());
+  pipe.ground(120, 5);
+  expect_kept(pipe.mesh());
+}
+
+TEST(PositionSteps, KeepAWarmHandOnACoarseFloor) {
+  Parts scene;
+  scene.ground(120, 0.8F);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 100; ++i) {
+    const double x = normal(random), y = normal(random), z = normal(random), length = std::hypot(x, y, z);
+    scene.add(40.3 + 0.09 * x / length, 41.2 + 0.05 * y / length, 0.8 + 0.03 * z / length);
+  }
+  scene.triangles.clear();  // a cloud
+  expect_kept(scene.mesh());
+}
+
+TEST(PositionSteps, KeepALabelInAMap) {
+  Parts scene;
+  scene.ground(130, 31);
+  // Strokes of two millimetres, raised by one.
+  scene.grid(60, 30, {1234.5F, 2345.25F, 12}, {0.0008F, 0, 0}, {0, 0.0003F, 0.0007F},
+             [](int column, int row) { return column % 6 < 3 && row % 9 > 2 ? 0.001 : 0.0; });
+  expect_kept(scene.mesh());
+}
+
+TEST(PositionSteps, KeepWiresAndCombs) {
+  Parts scene;
+  scene.ground(100, 0.5F);
+  scene.tube({3, 3, 2}, {0.05F, 0, 0}, 60, 0.0005);
+  scene.tube({3, 9, 2}, {0.03F, 0.02F, 0.04F}, 60, 0.0005);
+  scene.tube({9, 9, 2}, {0, 0.001F, 0.06F}, 40, 0.002);
+  const auto first = static_cast<std::uint32_t>(scene.positions.size());
+  for (int tooth = 0; tooth < 60; ++tooth) {
+    const float x = 20 + 0.004F * static_cast<float>(tooth);
+    scene.box({x, 20, 1}, {x + 0.001F, 20.5F, 1.002F});
+    if (tooth == 0) continue;
+    const std::uint32_t v = first + 8 * static_cast<std::uint32_t>(tooth);
+    scene.triangles.push_back({v, v - 8, v - 7});
+  }
+  expect_kept(scene.mesh());
+}
+
+TEST(PositionSteps, KeepHeapsOfSmallPieces) {
+  Parts scene;
+  scene.ground(80, 1);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(20, 22), size(0.001F, 0.3F);
+  for (int i = 0; i < 400; ++i) {
+    const Vec3f low{place(random), place(random), place(random) - 20};
+    scene.box(low, {low.x + size(random), low.y + size(random), low.z + size(random)});
+  }
+  expect_kept(scene.mesh());
+}
+
+TEST(PositionSteps, AreTheSameForATriangleSoup) {
+  const MultispectralMesh terrain = spectra::testing::terrain({.columns = 110, .rows = 110});
+  const auto shared = scene_of(spectra::testing::copy_of(terrain)), soup = scene_of(spectra::testing::soup_of(terrain));
+  EXPECT_EQ(shared->suggested_position_step_m(), soup->suggested_position_step_m());
+  EXPECT_EQ(form_of(*soup, 100).torn_count, 0u);
+  EXPECT_EQ(form_of(*shared, 100).torn_count, 0u);
+}
+
+TEST(PositionSteps, AreNotCoarsenedByAStrayPoint) {
+  MultispectralMesh cloud = spectra::testing::point_cloud(20'000, 3);
+  const auto without = scene_of(spectra::testing::copy_of(cloud));
+  cloud.resize_vertices(20'001);
+  cloud.positions()[20'000] = {31'000, -25'000, 900};
+  const auto with = scene_of(std::move(cloud));
+  EXPECT_EQ(with->suggested_position_step_m(), without->suggested_position_step_m());
+  const FormReport form = form_of(*with, 300);
+  EXPECT_EQ(form.flattened_patch_count + form.merged_patch_count, 0u) << described(form);
+}
+
+TEST(PositionSteps, AreTheSameForAnyNumberOfThreads) {
+  const MultispectralMesh cloud = spectra::testing::point_cloud(200'000, 9);
+  const auto halvings = [&](unsigned thread_count) {
+    WorkerPool pool(thread_count);
+    const auto scene = SceneSnapshot::build(spectra::testing::copy_of(cloud), 1, pool);
+    std::vector<StepHalvings> all;
+    for (const auto& tile : scene->tiles())
+      all.insert(all.end(), tile->step_halvings.begin(), tile->step_halvings.end());
+    return all;
+  };
+  EXPECT_EQ(halvings(1), halvings(4));
+}
+
+}  // namespace
+}  // namespace spectra::server
