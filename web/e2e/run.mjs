@@ -287,6 +287,39 @@ test('A click reads the temperature', async () => {
   await card.waitFor({ state: 'detached' });
 });
 
+test('The axis leads to the hottest and to the coldest place, from where they are seen', async () => {
+  const { extremes } = await state();
+  const step_m = (await page.evaluate(() => globalThis.spectra.store.quality.position_step_mm)) / 1000;
+  for (const kind of ['hottest', 'coldest']) {
+    await page.getByRole('button', { name: `Go to the ${kind} place` }).click();
+    await page.waitForFunction(
+      ([x, y, z]) => {
+        const { eye, target } = globalThis.spectra.viewport.pose;
+        return Math.hypot(target[0] - x, target[1] - y, target[2] - z) < 1e-3 * Math.hypot(eye[0] - x, eye[1] - y, eye[2] - z);
+      },
+      extremes[kind].position,
+      { timeout: 30_000 },
+    );
+    await settled(page);
+    const seen = await page.evaluate(async (position) => {
+      const { viewport } = globalThis.spectra;
+      const place = viewport.project(position);
+      const hit = await viewport.pick(place.x, place.y);
+      return { place, away: hit === null ? null : Math.hypot(...hit.map((value, axis) => value - position[axis])) };
+    }, extremes[kind].position);
+    assert.ok(
+      seen.away !== null && seen.away < Math.min(0.01, 4 * step_m + 0.002),
+      `${kind}: what is seen there is ${seen.away} m away`,
+    );
+    await page.locator(`[data-mark="${kind}"]:not(.hidden)`).waitFor();
+    assert.match(await page.locator(`[data-mark="${kind}"]`).innerText(), /^(hottest|coldest) [−\d.]+\s°C$/);
+    await screenshot(page, `fly-${kind}`);
+  }
+  await page.locator('canvas').first().focus();
+  await page.keyboard.press('r');
+  await drawn(page);
+});
+
 test('S saves a picture', async () => {
   const [download] = await Promise.all([page.waitForEvent('download'), page.keyboard.press('s')]);
   assert.match(download.suggestedFilename(), /^spectra-.*\.png$/);

@@ -9,10 +9,15 @@ export interface Ray {
 
 /**
  * Distance along the ray to the nearest surface, or null. Of a point cloud, the nearest point within `cone` (tangent of the angle
- * between the ray and the point) counts.
+ * between the ray and the point) counts. Nothing is looked for beyond `limit`.
  */
-export function nearestHit(geometries: Iterable<Omit<TileArrays, 'rgba'>>, ray: Ray, cone: number): number | null {
-  let nearest = Infinity;
+export function nearestHit(
+  geometries: Iterable<Omit<TileArrays, 'rgba'>>,
+  ray: Ray,
+  cone: number,
+  limit = Infinity,
+): number | null {
+  let nearest = limit;
   for (const geometry of geometries) {
     if (!meetsSphere(ray, geometry.centre, geometry.radius, cone, nearest)) continue;
     nearest =
@@ -20,7 +25,7 @@ export function nearestHit(geometries: Iterable<Omit<TileArrays, 'rgba'>>, ray: 
         ? nearestPoint(geometry.positions, ray, cone, nearest)
         : nearestTriangle(geometry.positions, geometry.indices, ray, nearest);
   }
-  return nearest === Infinity ? null : nearest;
+  return nearest === limit ? null : nearest;
 }
 
 function meetsSphere(ray: Ray, centre: Vec3, radius: number, cone: number, nearest: number): boolean {

@@ -14,6 +14,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { Vec3 } from '../protocol/messages';
+import { clearSight } from './clear_sight';
 import { depthRange } from './depth_range';
 import { nearestHit } from './picking';
 import type { Eye, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
@@ -77,11 +78,12 @@ export class PictureRenderer {
         this.#newest = request.number;
         this.#drawSoon();
         break;
-      case 'pick': {
-        const visible = [...this.#tiles.values()].filter(({ object }) => object.visible).map(({ arrays }) => arrays);
-        this.reply({ kind: 'picked', id: request.id, distance: nearestHit(visible, request.ray, request.cone) });
+      case 'pick':
+        this.reply({ kind: 'picked', id: request.id, distance: nearestHit(this.#drawn(), request.ray, request.cone) });
         break;
-      }
+      case 'sight':
+        this.reply({ kind: 'sighted', id: request.id, eye: clearSight(this.#drawn(), request.wish) });
+        break;
       case 'copy':
         void this.#copy(request.id);
     }
@@ -133,6 +135,10 @@ export class PictureRenderer {
         // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
         this.#draw();
     }
+  }
+
+  #drawn(): Tile['arrays'][] {
+    return [...this.#tiles.values()].filter(({ object }) => object.visible).map(({ arrays }) => arrays);
   }
 
   #create(arrays: TileArrays): Tile {

@@ -1,6 +1,7 @@
 /** What the page and its drawing side, in a worker of its own where the browser can do that, say to each other. */
 
 import type { Vec3 } from '../protocol/messages';
+import type { SightWish } from './clear_sight';
 import type { Ray } from './picking';
 
 /** One tile as it is drawn: metres relative to the scene origin, and a colour per vertex. */
@@ -41,6 +42,8 @@ export type RenderRequest =
   /** Apply the changes, then draw from there; of several that come before the screen takes one, the last is drawn. */
   | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye }
   | { kind: 'pick'; id: number; ray: Ray; cone: number }
+  /** Where the target of the wish is seen from. */
+  | { kind: 'sight'; id: number; wish: SightWish }
   | { kind: 'copy'; id: number };
 
 /** Objects held on the GPU, and what the last picture drew. */
@@ -57,6 +60,7 @@ export type RenderReply =
   /** Everything up to picture `number` has been drawn. */
   | { kind: 'drawn'; number: number; gpu: GpuObjects }
   | { kind: 'picked'; id: number; distance: number | null }
+  | { kind: 'sighted'; id: number; eye: Vec3 | null }
   /** Null: there is none, for the GPU is away. */
   | { kind: 'copied'; id: number; picture: ImageBitmap | null }
   /** The browser has taken the GPU away, or given it back. */

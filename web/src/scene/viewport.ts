@@ -2,8 +2,8 @@ import type { DecodedGeometry } from '../decode/messages';
 import type { CameraPose, Vec3 } from '../protocol/messages';
 import { AimedControls } from './aimed_controls';
 import { UP, type UpAxis, type View } from './first_view';
-import type { Ray } from './picking';
-import type { GpuObjects, RenderCommand, RenderReply } from './render_messages';
+import type { SightWish } from './clear_sight';
+import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from './render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
 import { PerspectiveCamera, Vector3 } from './three_math';
 import type { Drawable } from './tile_set';
@@ -240,6 +240,12 @@ export class Viewport {
     return direction.multiplyScalar(reply.distance).add(eye).toArray();
   }
 
+  /** Where a place on a surface is seen from, by what is drawn; null where it is walled in. */
+  async sightOf(wish: SightWish): Promise<Vec3 | null> {
+    const reply = await this.#ask((id) => ({ kind: 'sight', id, wish }));
+    return reply.kind === 'sighted' ? reply.eye : null;
+  }
+
   /** Where a point of the scene is on the canvas, in CSS pixels; null behind the camera. */
   project(point: Vec3): { x: number; y: number; depth: number } | null {
     this.#camera.updateMatrixWorld();
@@ -325,7 +331,7 @@ export class Viewport {
     if (point !== null) this.aimAt(point);
   }
 
-  #ask(question: (id: number) => { kind: 'pick'; id: number; ray: Ray; cone: number } | { kind: 'copy'; id: number }) {
+  #ask(question: (id: number) => Extract<RenderRequest, { id: number }>) {
     this.#questionId += 1;
     const id = this.#questionId;
     return new Promise<RenderReply>((resolve) => {

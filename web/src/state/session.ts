@@ -26,6 +26,7 @@ import { Viewport, type ViewportEvents } from '../scene/viewport';
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
+import { Markers } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
 import { cacheBytes } from './cache_bytes';
 import { Settings } from './settings';
@@ -37,6 +38,8 @@ const QUALITY_INTERVAL_MS = 33;
 const CAMERA_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
 const TICK_MS = 100;
+/** Distance to what is flown to, as a share of the scene's diagonal. */
+const SIGHT_SHARE = 0.08;
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
 
@@ -58,6 +61,7 @@ export class Session {
 
   readonly #intake: FrameIntake;
   readonly #look: FirstLook;
+  readonly #markers: Markers;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   #connectionNumber = 0;
   /** Session whose server knows what the tile set claims. */
@@ -93,6 +97,9 @@ export class Session {
         store.upAxis = up;
       },
     );
+    this.#markers = new Markers(this.viewport, (marks) => {
+      store.marks = marks;
+    });
     this.#intake = new FrameIntake(this.tiles, new DecodePool(createDecodeWorker), {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),
@@ -155,6 +162,7 @@ export class Session {
     clearTimeout(this.#nextPicture);
     this.#connection.stop();
     this.#intake.dispose();
+    this.#markers.dispose();
     this.tiles.clear();
     this.viewport.dispose();
   }
@@ -196,6 +204,31 @@ export class Session {
   setView(view: View): void {
     this.#look.userMoved();
     this.viewport.setView(view, false);
+  }
+
+  /** Goes to where the hottest or the coldest place of the scene is seen, on a side with nothing in between. */
+  async flyTo(kind: 'hottest' | 'coldest'): Promise<void> {
+    const { scene, extremes: places } = this.store;
+    const target = places?.[kind]?.position;
+    if (!scene || target === undefined) return;
+    const { eye } = this.viewport.pose;
+    const { min, max } = scene.core_bounds ?? scene.bounds;
+    const size = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) || 1;
+    const [x, y, z] = [eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]];
+    const away = Math.hypot(x, y, z) || 1;
+    const step_m = (this.store.quality?.position_step_mm ?? 1) / 1000;
+    const found = await this.viewport.sightOf({
+      target,
+      distance: size * SIGHT_SHARE,
+      tolerance: Math.min(size * 1e-3, 3 * step_m),
+      preferred: [x / away, y / away, z / away],
+    });
+    if (found === null) {
+      this.#say(new Error(`The ${kind} place lies between surfaces that touch each other: it cannot be seen from anywhere.`));
+      return;
+    }
+    this.#look.userMoved();
+    this.viewport.setView({ eye: found, target }, true);
   }
 
   retryNow(): void {
@@ -329,6 +362,7 @@ export class Session {
       this.#look.sceneIs(null);
       store.histogram = null;
       store.extremes = null;
+      this.#markers.extremesAre(null);
       this.viewport.invalidate();
       return;
     }
@@ -347,6 +381,7 @@ export class Session {
       .request('scene.extremes', {})
       .then((answer) => {
         store.extremes = extremes(answer, 'scene.extremes');
+        this.#markers.extremesAre(store.extremes);
       })
       .catch((error: unknown) => this.#say(error));
   }
@@ -408,6 +443,7 @@ export class Session {
     const { store } = this;
     this.tiles.settle();
     store.shown = this.tiles.counts();
+    this.#markers.update();
     store.complete = message;
     if (message.generation >= store.generation && !this.settings.busy) {
       if (store.behindSince !== null) {
@@ -425,6 +461,7 @@ export class Session {
     const { store } = this;
     store.camera = pose;
     store.axes = this.viewport.axesInView();
+    this.#markers.update();
     if (store.pinned !== null) {
       store.pinned = { ...store.pinned, place: this.viewport.project(store.pinned.reading.probe.position) };
     }

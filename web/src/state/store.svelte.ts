@@ -18,6 +18,7 @@ import type {
 import type { UpAxis } from '../scene/first_view';
 import type { TileCounts } from '../scene/tile_set';
 import type { LinkState } from '../transport/connection';
+import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
 import { type Note, notesOf } from './notes';
 
@@ -65,6 +66,9 @@ export class Store {
 
   histogram = $state.raw<Histogram | null>(null);
   extremes = $state.raw<Extremes | null>(null);
+  /** The hottest and the coldest place of the scene, as they stand on the screen. */
+  marks = $state.raw<readonly Mark[]>([]);
+  marksShown = $state(true);
   /** Under the pointer. */
   hover = $state.raw<Reading | null>(null);
   /** Readings pinned by a click, newest last. */

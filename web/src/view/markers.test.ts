@@ -1,0 +1,62 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import type { Vec3 } from '../protocol/messages';
+import { type Mark, Markers } from './markers';
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+/** Looks along -z from z = 10; `front` is the depth at which a ray meets something. */
+function setUp(front: () => number | null) {
+  let marks: Mark[] = [];
+  let picks = 0;
+  const markers = new Markers(
+    {
+      pose: { eye: [0, 0, 10], target: [0, 0, 0] },
+      size: [100, 100],
+      project: ([x, y, z]: Vec3) => (z > 10 ? null : { x: 50 + x, y: 50 - y }),
+      pick: (x: number, y: number) => {
+        picks += 1;
+        const depth = front();
+        return Promise.resolve(depth === null ? null : [x - 50, 50 - y, 10 - depth]);
+      },
+    },
+    (next) => {
+      marks = next;
+    },
+  );
+  return { markers, marks: () => marks, picks: () => picks };
+}
+const extremes = {
+  hottest: { position: [1, 2, 0] as Vec3, temperature: 57 },
+  coldest: { position: [-300, 0, 0] as Vec3, temperature: 3 },
+};
+
+describe('Markers', () => {
+  it('marks what is on the screen, and nothing else', () => {
+    const { markers, marks } = setUp(() => null);
+    markers.extremesAre(extremes);
+    expect(marks()).toEqual([{ kind: 'hottest', temperature: 57, x: 51, y: 48, isHidden: false }]);
+    markers.extremesAre({ hottest: null, coldest: { position: [0, 0, 11], temperature: 3 } });
+    expect(marks()).toEqual([]);
+    markers.extremesAre(null);
+    expect(marks()).toEqual([]);
+  });
+
+  it('finds out at rest whether something stands before it', async () => {
+    let front: number | null = 4;
+    const { markers, marks, picks } = setUp(() => front);
+    markers.extremesAre(extremes);
+    await vi.advanceTimersByTimeAsync(100);
+    markers.update();
+    await vi.advanceTimersByTimeAsync(200);
+    expect(picks()).toBe(0);
+    await vi.advanceTimersByTimeAsync(100);
+    expect(marks()[0]?.isHidden).toBe(true);
+    front = 10;
+    markers.update();
+    expect(marks()[0]?.isHidden).toBe(true);
+    await vi.advanceTimersByTimeAsync(300);
+    expect(marks()[0]?.isHidden).toBe(false);
+    expect(picks()).toBe(2);
+  });
+});
