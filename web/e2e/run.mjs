@@ -288,6 +288,7 @@ test('A click reads the temperature', async () => {
 });
 
 test('The axis leads to the hottest and to the coldest place, from where they are seen', async () => {
+  await settled(page);
   const { extremes } = await state();
   const step_m = (await page.evaluate(() => globalThis.spectra.store.quality.position_step_mm)) / 1000;
   for (const kind of ['hottest', 'coldest']) {

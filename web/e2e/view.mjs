@@ -240,4 +240,51 @@ export function addViewTests(browser, scratch) {
     await page.close();
     await server.stop();
   });
+
+  test('A slow machine draws less while the camera moves, and everything at rest', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const pose = await page.evaluate(() => globalThis.spectra.viewport.pose);
+    await page.evaluate(({ eye, target }) => globalThis.spectra.setView({ eye, target }), pose);
+    await settled(page);
+    const before = await screenshot(page, 'pace-before');
+    const { triangles } = await page.evaluate(() => globalThis.spectra.viewport.gpuObjects);
+    await page.evaluate(() => {
+      globalThis.waits = [];
+      globalThis.notches = [];
+      addEventListener('pointermove', (event) => {
+        globalThis.waits.push(performance.now() - event.timeStamp);
+        globalThis.notches.push(globalThis.spectra.viewport.notch);
+      });
+    });
+    await page.mouse.move(700, 450);
+    await page.mouse.down();
+    const pictures = () => page.evaluate(() => [globalThis.spectra.viewport.pictures, performance.now()]);
+    const [first, start] = await pictures();
+    for (let i = 1; i <= 80; i += 1) {
+      await page.mouse.move(700 + 200 * Math.sin(i / 8), 450 + 30 * Math.sin(i / 5));
+      await page.waitForTimeout(16);
+    }
+    const [last, end] = await pictures();
+    await page.mouse.up();
+    const { waits, notches } = await page.evaluate(() => ({ waits: globalThis.waits, notches: globalThis.notches }));
+    const used = notches.filter((notch) => notch !== null);
+    waits.sort((a, b) => a - b);
+    console.log(
+      `        moving: ${((end - start) / (last - first)).toFixed(0)} ms a picture, at last ${JSON.stringify(used.at(-1))};` +
+        ` an input waited ${waits[waits.length >> 1].toFixed(0)} ms (median), ${waits.at(-1).toFixed(0)} ms (longest)`,
+    );
+    assert.ok(used.at(-1).resolution < 1, 'drawing by software is a slow machine');
+    await page.evaluate(({ eye, target }) => globalThis.spectra.setView({ eye, target }), pose);
+    await settled(page);
+    await page.mouse.move(20, 890);
+    const after = await screenshot(page, 'pace-after');
+    assert.equal(await page.evaluate(() => globalThis.spectra.viewport.gpuObjects.triangles), triangles);
+    for (let x = 200; x < 1100; x += 25) {
+      for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
+    }
+    await page.close();
+    await server.stop();
+  });
 }

@@ -40,8 +40,11 @@ export class PictureRenderer {
   readonly #tiles = new Map<number, Tile>();
   #eye: Eye = { world_from_camera: new Matrix4().toArray(), tangents: [1, 1], distance: 1 };
   #background = 0;
+  #fullPixelRatio = 1;
+  #resolution = 1;
   #pixelRatio = 1;
   #pointDiameter: number | null = null;
+  #isResized = false;
   #frame = 0;
   #newest = 0;
 
@@ -76,6 +79,7 @@ export class PictureRenderer {
         this.#eye = request.eye;
         for (const command of request.commands) this.#apply(command);
         this.#newest = request.number;
+        this.#resolve(request.resolution);
         this.#drawSoon();
         break;
       case 'pick':
@@ -129,8 +133,9 @@ export class PictureRenderer {
         this.#pointDiameter = command.diameter;
         break;
       case 'size':
-        this.#pixelRatio = command.pixel_ratio;
-        this.#renderer.setPixelRatio(command.pixel_ratio);
+        this.#fullPixelRatio = command.pixel_ratio;
+        this.#pixelRatio = command.pixel_ratio * this.#resolution;
+        this.#renderer.setPixelRatio(this.#pixelRatio);
         this.#renderer.setSize(command.width, command.height, false);
         // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
         this.#draw();
@@ -187,13 +192,14 @@ export class PictureRenderer {
     if (this.#frame !== 0) return;
     this.#frame = requestAnimationFrame(() => {
       this.#frame = 0;
+      const start = performance.now();
       this.#draw();
-      this.#whenDone(this.#newest);
+      this.#whenDone(this.#newest, start);
     });
   }
 
   /** Tells the page that a picture has been drawn once the GPU is through with it, so that a slow one is not given more and more. */
-  #whenDone(number: number): void {
+  #whenDone(number: number, start: number): void {
     const gl = this.context;
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -204,12 +210,24 @@ export class PictureRenderer {
         return;
       }
       gl.deleteSync(fence);
-      this.reply({ kind: 'drawn', number, gpu: this.#gpuObjects });
+      this.reply({ kind: 'drawn', number, gpu: this.#gpuObjects, ms: performance.now() - start });
     };
     check();
   }
 
+  /** Another size of the canvas empties it; the picture that asked for it is drawn in the frame to come. */
+  #resolve(resolution: number): void {
+    if (resolution === this.#resolution) return;
+    this.#resolution = resolution;
+    this.#isResized = true;
+  }
+
   #draw(): void {
+    if (this.#isResized) {
+      this.#isResized = false;
+      this.#pixelRatio = this.#fullPixelRatio * this.#resolution;
+      this.#renderer.setPixelRatio(this.#pixelRatio);
+    }
     this.#lookFrom(this.#eye);
     this.#renderer.render(this.#scene, this.#camera);
   }

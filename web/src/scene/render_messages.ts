@@ -39,8 +39,8 @@ export interface Eye {
 
 export type RenderRequest =
   | { kind: 'start'; canvas: OffscreenCanvas }
-  /** Apply the changes, then draw from there; of several that come before the screen takes one, the last is drawn. */
-  | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye }
+  /** Apply the changes, then draw from there; of several that come before the screen takes one, the last is drawn. `resolution`: share of the screen's, along each side. */
+  | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye; resolution: number }
   | { kind: 'pick'; id: number; ray: Ray; cone: number }
   /** Where the target of the wish is seen from. */
   | { kind: 'sight'; id: number; wish: SightWish }
@@ -57,8 +57,8 @@ export interface GpuObjects {
 
 export type RenderReply =
   | { kind: 'failed'; message: string }
-  /** Everything up to picture `number` has been drawn. */
-  | { kind: 'drawn'; number: number; gpu: GpuObjects }
+  /** Everything up to picture `number` has been drawn; the last one took so long. */
+  | { kind: 'drawn'; number: number; gpu: GpuObjects; ms: number }
   | { kind: 'picked'; id: number; distance: number | null }
   | { kind: 'sighted'; id: number; eye: Vec3 | null }
   /** Null: there is none, for the GPU is away. */

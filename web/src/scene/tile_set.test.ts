@@ -66,6 +66,25 @@ describe('TileSet', () => {
     expect(drawable.shade).toBe(80);
   });
 
+  it('leaves out the finest levels while the camera moves, where nothing newer is lost by it', () => {
+    const coarse = add(root, { child_mask: 3 });
+    const fine = [childTile(root, 0), childTile(root, 1)].map((id) => add(id));
+    expect([coarse, ...fine].map(({ visible }) => visible)).toEqual([false, true, true]);
+    tiles.leaveOut(1);
+    tiles.updateSelection();
+    expect([coarse, ...fine].map(({ visible }) => visible)).toEqual([true, false, false]);
+    // What is complete is counted by all detail, and one newer child is not hidden by its older parent.
+    tiles.settle();
+    expect(tiles.progress(1)).toEqual({ current: 2, total: 2 });
+    recolour(childTile(root, 0), 2);
+    expect([coarse, ...fine].map(({ visible }) => visible)).toEqual([false, true, true]);
+    recolour(root, 2);
+    expect(coarse.visible).toBe(true);
+    tiles.leaveOut(0);
+    recolour(childTile(root, 1), 2);
+    expect([coarse, ...fine].map(({ visible }) => visible)).toEqual([false, true, true]);
+  });
+
   it('keeps the newest of colours that wait for their geometry', () => {
     tiles.addColours(frame(root, { generation: 9 }), colours(90));
     tiles.addColours(frame(root, { generation: 8 }), colours(80));

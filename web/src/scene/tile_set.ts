@@ -78,6 +78,8 @@ export class TileSet {
   #connection = 0;
   /** The geometry of the earlier connection is still good: its colours come alone. */
   #isResumed = false;
+  /** Tiles of this level and beyond are not replaced by their children, unless those are newer. */
+  #finestLevel = Infinity;
 
   constructor(private readonly createDrawable: CreateDrawable) {}
 
@@ -142,8 +144,13 @@ export class TileSet {
       const { shown } = node;
       if (shown !== null && this.#isStale(shown) && !(this.#isResumed && shown.isKnownToServer)) this.#delete(node);
     }
+    const finest = this.#finestLevel;
+    this.#finestLevel = Infinity;
+    this.#selectionDirty = true;
     this.updateSelection();
     for (const node of this.#nodes.values()) node.isEnd = node.isDrawn;
+    this.#finestLevel = finest;
+    this.#selectionDirty = finest !== Infinity;
   }
 
   addGeometry(frame: TileFrame, geometry: DecodedGeometry): void {
@@ -195,6 +202,16 @@ export class TileSet {
     this.#nodes.clear();
     this.#tops.clear();
     this.#drawn.clear();
+    this.#selectionDirty = true;
+  }
+
+  /** Leaves out so many of the finest levels, where a coarser tile is as new as what it stands for; 0: all detail is drawn. */
+  leaveOut(levels: number): void {
+    let deepest = 0;
+    for (const { id, shown } of this.#nodes.values()) if (shown !== null) deepest = Math.max(deepest, id.level);
+    const finest = levels === 0 ? Infinity : Math.max(0, deepest - levels);
+    if (finest === this.#finestLevel) return;
+    this.#finestLevel = finest;
     this.#selectionDirty = true;
   }
 
@@ -364,7 +381,8 @@ export class TileSet {
   }
 
   #select(node: TileNode): void {
-    if (node.shown !== null && node.coverRank < node.shown.rank) {
+    const isFineEnough = node.id.level >= this.#finestLevel && isAsNewAsBelow(node);
+    if (node.shown !== null && (node.coverRank < node.shown.rank || isFineEnough)) {
       this.#drawn.add(node);
       if (node.isDrawn) return;
       node.isDrawn = true;
@@ -388,6 +406,14 @@ function octantOf(id: TileId): number {
 
 function isHeld(node: TileNode): boolean {
   return node.shown !== null || node.waitingGeometry !== null || node.waitingColours !== null;
+}
+
+/** Nothing that the tile stands for has newer colours. */
+function isAsNewAsBelow(node: TileNode): boolean {
+  const rank = node.shown?.rank ?? NOTHING;
+  const isOlder = (child: TileNode | undefined): boolean =>
+    child !== undefined && ((child.shown?.rank ?? NOTHING) > rank || child.children.some(isOlder));
+  return !node.children.some(isOlder);
 }
 
 function coverRankOf(node: TileNode): number {

@@ -5,12 +5,15 @@ import { UP, type UpAxis, type View } from './first_view';
 import type { SightWish } from './clear_sight';
 import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from './render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
+import { MotionPace, type Notch } from './motion_pace';
 import { PerspectiveCamera, Vector3 } from './three_math';
 import type { Drawable } from './tile_set';
 
 export const FIELD_OF_VIEW_DEG = 45;
 /** Pictures that may be on their way to the drawing side: one that it draws and one that waits. */
 const MOST_UNDRAWN = 2;
+/** A camera that has not moved for so long rests. */
+const REST_MS = 200;
 
 export interface ViewportEvents {
   /** The camera has moved, or the picture has changed its size. */
@@ -21,6 +24,8 @@ export interface ViewportEvents {
   onUserMove: () => void;
   /** Called before each picture, to bring in what has been decoded. Returns true when more waits for the next picture. */
   beforeRender: () => boolean;
+  /** So many of the finest levels are to be left out, while the camera moves on a slow machine; 0: none. */
+  onDetail: (levels: number) => void;
   /** The browser has taken the GPU away, or given it back and the picture is drawn again. */
   onContext: (isLost: boolean) => void;
   /** The drawing side has failed; `everDrew` false: it could not even start. */
@@ -40,6 +45,11 @@ export class Viewport {
   #size: [number, number] = [1, 1];
   #up: UpAxis = 'y';
   #isAiming = false;
+  readonly #pace = new MotionPace();
+  /** How pictures that have been sent and not drawn are drawn; null: in full. */
+  #notches = new Map<number, Notch | null>();
+  #isMoving = false;
+  #rest: ReturnType<typeof setTimeout> | undefined;
 
   /** Changes that the next picture takes along, and the buffers that move with them. */
   #commands: RenderCommand[] = [];
@@ -89,7 +99,12 @@ export class Viewport {
 
   /** True when the last picture that was asked for has been drawn, and none is due. */
   get isUpToDate(): boolean {
-    return this.#drawn > 0 && this.#frame === 0 && !this.#isHeldUp && this.#drawn === this.#sent;
+    return this.#drawn > 0 && this.#frame === 0 && !this.#isMoving && !this.#isHeldUp && this.#drawn === this.#sent;
+  }
+
+  /** How pictures are drawn while the camera moves; null at rest. */
+  get notch(): Notch | null {
+    return this.#isMoving ? this.#pace.moving : null;
   }
 
   /** Objects held on the GPU when the last picture was drawn. */
@@ -257,6 +272,8 @@ export class Viewport {
 
   /** The picture as it is now; the caller closes it. */
   async copy(): Promise<ImageBitmap> {
+    this.#rests();
+    this.events.beforeRender();
     this.#send();
     const reply = await this.#ask((id) => ({ kind: 'copy', id }));
     if (reply.kind !== 'copied' || reply.picture === null) throw new Error('There is no picture while the graphics restart.');
@@ -269,6 +286,7 @@ export class Viewport {
 
   dispose(): void {
     cancelAnimationFrame(this.#frame);
+    clearTimeout(this.#rest);
     this.#resize.disconnect();
     this.canvas.removeEventListener('wheel', this.#aimAtPointer, { capture: true });
     this.canvas.removeEventListener('pointerdown', this.#aimAtPointer, { capture: true });
@@ -291,8 +309,9 @@ export class Viewport {
     }
     const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
     this.#lastFrameAt = now;
-    const more = this.events.beforeRender();
     const moved = this.#controls.update(elapsed_s);
+    if (moved) this.#moves();
+    const more = this.events.beforeRender();
     this.#send();
     if (moved) this.events.onCamera(this.pose);
     if (moved || more) this.invalidate();
@@ -306,9 +325,28 @@ export class Viewport {
       tangents: this.#tangents,
       distance: this.#controls.distance,
     };
-    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, eye }, this.#transfer);
+    const notch = this.#isMoving ? this.#pace.moving : null;
+    this.#notches.set(this.#sent, notch);
+    const resolution = notch?.resolution ?? 1;
+    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, eye, resolution }, this.#transfer);
     this.#commands = [];
     this.#transfer = [];
+  }
+
+  /** Until the camera has rested for a moment, pictures are drawn as the machine can. */
+  #moves(): void {
+    this.#isMoving = true;
+    this.events.onDetail(this.#pace.moving.levels);
+    clearTimeout(this.#rest);
+    this.#rest = setTimeout(() => this.#rests(), REST_MS);
+  }
+
+  #rests(): void {
+    clearTimeout(this.#rest);
+    if (!this.#isMoving) return;
+    this.#isMoving = false;
+    this.events.onDetail(0);
+    this.invalidate();
   }
 
   /** Half the picture's width and height at distance 1. */
@@ -346,6 +384,8 @@ export class Viewport {
         // Of two pictures the GPU may be found to be through with the later one first.
         this.#drawn = Math.max(this.#drawn, reply.number);
         this.#gpu = reply.gpu;
+        this.#pace.drawn(reply.ms, this.#notches.get(reply.number) ?? null);
+        for (const number of this.#notches.keys()) if (number <= reply.number) this.#notches.delete(number);
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
         this.invalidate();

@@ -82,6 +82,7 @@ export class Session {
       onResize: () => this.#look.pictureIs(null),
       onUserMove: () => this.#look.userMoved(),
       beforeRender: () => this.#bringIn(),
+      onDetail: (levels) => this.tiles.leaveOut(levels),
       onContext: (isLost) => {
         store.graphicsLostAt = isLost ? performance.now() : null;
       },
