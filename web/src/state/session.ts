@@ -22,7 +22,7 @@ import {
 import type { Insets, UpAxis, View } from '../scene/first_view';
 import { FrameIntake } from '../scene/frame_intake';
 import { TileSet } from '../scene/tile_set';
-import { Viewport, type ViewportEvents } from '../scene/viewport';
+import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
@@ -98,9 +98,17 @@ export class Session {
         store.upAxis = up;
       },
     );
-    this.#markers = new Markers(this.viewport, (marks) => {
-      store.marks = marks;
-    });
+    this.#markers = new Markers(
+      this.viewport,
+      (depth) => {
+        const drawn_m = Math.max(store.quality?.position_step_mm ?? 0, store.position_error_mm ?? 0) / 1000;
+        const pixel_m = (2 * depth * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.viewport.size[1];
+        return Math.max(2 * drawn_m, pixel_m);
+      },
+      (marks) => {
+        store.marks = marks;
+      },
+    );
     this.#intake = new FrameIntake(this.tiles, new DecodePool(createDecodeWorker), {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { cardPlace, isNarrow } from './layout';
+import { cardPlace, isNarrow, labelPlaces } from './layout';
 
 describe('isNarrow', () => {
   it.each([
@@ -38,5 +38,27 @@ describe('cardPlace', () => {
 
   it('begins at the left and the top of a room that is too small', () => {
     expect(cardPlace({ x: 100, y: 10 }, { width: 400, height: 500 }, room)).toEqual({ left: 92, top: 0 });
+  });
+});
+
+describe('labelPlaces', () => {
+  const room = { left: 100, top: 0, right: 500, bottom: 300 };
+  const label = (x: number, y: number) => ({ x, y, width: 80, height: 20 });
+
+  it('stands right of its place, or left of it where the room ends', () => {
+    expect(labelPlaces([label(200, 100), label(480, 200)], room, 13)).toEqual([
+      { left: 213, top: 90 },
+      { left: 387, top: 190 },
+    ]);
+  });
+
+  it('lies over no other label and over no place', () => {
+    const [first, second] = labelPlaces([label(200, 100), label(250, 104)], room, 13);
+    expect(first).toEqual({ left: 107, top: 90 });
+    expect(second).toEqual({ left: 263, top: 94 });
+  });
+
+  it('is left out where there is no room', () => {
+    expect(labelPlaces([label(110, 10)], { ...room, right: 150, bottom: 20 }, 13)).toEqual([null]);
   });
 });

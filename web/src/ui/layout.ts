@@ -42,3 +42,43 @@ export function cardPlace(
 function clamp(value: number, low: number, high: number): number {
   return Math.max(low, Math.min(high, value));
 }
+
+/**
+ * Left and top of labels beside their places, in order: right, left, above or below, wherever a label is within `room` and lies over
+ * none that has been set before; null where there is no such place.
+ */
+export function labelPlaces(
+  labels: readonly { x: number; y: number; width: number; height: number }[],
+  room: Box,
+  gap: number,
+): ({ left: number; top: number } | null)[] {
+  const taken: Box[] = labels.map(({ x, y }) => ({
+    left: x - gap / 2,
+    top: y - gap / 2,
+    right: x + gap / 2,
+    bottom: y + gap / 2,
+  }));
+  return labels.map(({ x, y, width, height }) => {
+    const sides = [
+      { left: x + gap, top: y - height / 2 },
+      { left: x - gap - width, top: y - height / 2 },
+      { left: x - width / 2, top: y - gap - height },
+      { left: x - width / 2, top: y + gap },
+    ];
+    const free = sides.find(({ left, top }) => {
+      const box = { left, top, right: left + width, bottom: top + height };
+      return isWithin(box, room) && !taken.some((other) => overlap(box, other));
+    });
+    if (free === undefined) return null;
+    taken.push({ ...free, right: free.left + width, bottom: free.top + height });
+    return free;
+  });
+}
+
+function isWithin(box: Box, room: Box): boolean {
+  return box.left >= room.left && box.top >= room.top && box.right <= room.right && box.bottom <= room.bottom;
+}
+
+function overlap(a: Box, b: Box): boolean {
+  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}

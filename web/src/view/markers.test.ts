@@ -13,13 +13,14 @@ function setUp(front: () => number | null) {
     {
       pose: { eye: [0, 0, 10], target: [0, 0, 0] },
       size: [100, 100],
-      project: ([x, y, z]: Vec3) => (z > 10 ? null : { x: 50 + x, y: 50 - y }),
+      project: ([x, y, z]: Vec3) => (z > 10 ? null : { x: 50 + x, y: 50 - y, depth: 10 - z }),
       pick: (x: number, y: number) => {
         picks += 1;
         const depth = front();
         return Promise.resolve(depth === null ? null : [x - 50, 50 - y, 10 - depth]);
       },
     },
+    (depth) => depth / 500,
     (next) => {
       marks = next;
     },
@@ -52,11 +53,16 @@ describe('Markers', () => {
     expect(picks()).toBe(0);
     await vi.advanceTimersByTimeAsync(100);
     expect(marks()[0]?.isHidden).toBe(true);
-    front = 10;
+    // 2.6 cm is another surface, 1 cm may be the same.
+    front = 9.974;
+    markers.update();
+    await vi.advanceTimersByTimeAsync(300);
+    expect(marks()[0]?.isHidden).toBe(true);
+    front = 9.99;
     markers.update();
     expect(marks()[0]?.isHidden).toBe(true);
     await vi.advanceTimersByTimeAsync(300);
     expect(marks()[0]?.isHidden).toBe(false);
-    expect(picks()).toBe(2);
+    expect(picks()).toBe(3);
   });
 });

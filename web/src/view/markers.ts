@@ -4,9 +4,12 @@ import type { Extreme, Extremes, Vec3 } from '../protocol/messages';
 export interface Marking {
   readonly pose: { eye: Vec3; target: Vec3 };
   readonly size: [number, number];
-  project(point: Vec3): { x: number; y: number } | null;
+  project(point: Vec3): { x: number; y: number; depth: number } | null;
   pick(x: number, y: number): Promise<Vec3 | null>;
 }
+
+/** How far what is drawn at a place may be from the place itself, metres; `depth`: distance from the camera. */
+export type Tolerance = (depth: number) => number;
 
 /** The hottest or the coldest place of the scene, as it stands on the screen. */
 export interface Mark {
@@ -20,8 +23,6 @@ export interface Mark {
 
 /** Casting rays through the scene is work: it waits until the camera rests. */
 const REST_MS = 250;
-/** Surfaces that are as near to each other as this share of the distance are one. */
-const SAME_SHARE = 0.02;
 
 /** Marks the hottest and the coldest place of the scene on the screen. */
 export class Markers {
@@ -32,6 +33,7 @@ export class Markers {
 
   constructor(
     private readonly viewport: Marking,
+    private readonly tolerance_m: Tolerance,
     private readonly onMarks: (marks: Mark[]) => void,
   ) {}
 
@@ -54,14 +56,14 @@ export class Markers {
     this.#check += 1;
   }
 
-  #places(): { kind: keyof Extremes; extreme: Extreme; x: number; y: number }[] {
+  #places(): { kind: keyof Extremes; extreme: Extreme; x: number; y: number; depth: number }[] {
     const [width, height] = this.viewport.size;
     return (['hottest', 'coldest'] as const).flatMap((kind) => {
       const extreme = this.#extremes?.[kind] ?? null;
       const place = extreme === null ? null : this.viewport.project(extreme.position);
       if (extreme === null || place === null) return [];
       if (place.x < 0 || place.y < 0 || place.x > width || place.y > height) return [];
-      return [{ kind, extreme, x: place.x, y: place.y }];
+      return [{ kind, extreme, ...place }];
     });
   }
 
@@ -78,12 +80,12 @@ export class Markers {
   async #look(): Promise<void> {
     const check = this.#check;
     const hidden = new Set<keyof Extremes>();
-    for (const { kind, extreme, x, y } of this.#places()) {
+    for (const { kind, extreme, x, y, depth } of this.#places()) {
       const hit = await this.viewport.pick(x, y);
       if (check !== this.#check) return;
       const { eye } = this.viewport.pose;
       const away = (point: Vec3) => Math.hypot(point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]);
-      if (hit !== null && away(hit) < away(extreme.position) * (1 - SAME_SHARE)) hidden.add(kind);
+      if (hit !== null && away(hit) < away(extreme.position) - this.tolerance_m(depth)) hidden.add(kind);
     }
     this.#hidden = hidden;
     this.onMarks(this.#marks());
