@@ -42,6 +42,16 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.require("distance", message.distance >= 0, "a number not below 0");
 }
 
+static void describe(auto& fields, Is<ExtremesRequest> auto& message) {
+  fields.optional("camera", message.camera);
+  fields.optional("window", message.window);
+  const auto is_part = [](const std::array<double, 4>& w) {
+    return w[0] >= 0 && w[0] < w[2] && w[2] <= 1 && w[1] >= 0 && w[1] < w[3] && w[3] <= 1;
+  };
+  fields.require("window", !message.window || is_part(*message.window),
+                 "left, top, right and bottom from 0 to 1, left below right and top below bottom");
+}
+
 static void describe(auto& fields, Is<Extreme> auto& message) {
   fields.field("position", message.position);
   fields.field("temperature", message.temperature);
@@ -83,6 +93,14 @@ Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path)
   return read_message<ProbeReply>(value, path);
 }
 nlohmann::json to_json(const ProbeReply& message) {
+  return written_message(message);
+}
+
+template <>
+Result<ExtremesRequest> from_json(const nlohmann::json& value, std::string_view path) {
+  return read_message<ExtremesRequest>(value, path);
+}
+nlohmann::json to_json(const ExtremesRequest& message) {
   return written_message(message);
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/stream_messages.hpp"
 
 namespace spectra::protocol {
 
@@ -51,6 +52,13 @@ struct Extreme {
   double temperature = 0;
 };
 
+/// Params of scene.extremes: of the whole scene, or of what a camera sees with nothing in between.
+struct ExtremesRequest {
+  std::optional<CameraSet> camera;
+  /// Left, top, right and bottom of the part of the picture that counts, shares of its width and height; absent: all of it.
+  std::optional<std::array<double, 4>> window;
+};
+
 /// Result of scene.extremes; null without thermal data.
 struct ExtremesReply {
   std::optional<Extreme> hottest;  ///< Of what the sensor could tell.
@@ -71,6 +79,9 @@ Result<ProbeRequest> from_json(const nlohmann::json& value, std::string_view pat
 nlohmann::json to_json(const ProbeReply& message);
 template <>
 Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json to_json(const ExtremesRequest& message);
+template <>
+Result<ExtremesRequest> from_json(const nlohmann::json& value, std::string_view path);
 nlohmann::json to_json(const Extreme& message);
 template <>
 Result<Extreme> from_json(const nlohmann::json& value, std::string_view path);

@@ -7,6 +7,7 @@
 
 #include "fusion/registry.hpp"
 #include "server/app/settings_text.hpp"
+#include "server/stream/extremes_in_view.hpp"
 
 namespace spectra::server {
 namespace {
@@ -298,13 +299,22 @@ protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
   return message;
 }
 
-protocol::ExtremesReply extremes_message(const SceneSnapshot& scene) {
+static protocol::ExtremesReply to_message(const ExtremesInView& extremes) {
   const auto place_of = [](const std::optional<Extreme>& extreme) -> std::optional<protocol::Vector3> {
     if (!extreme) return std::nullopt;
     return to_message(extreme->position);
   };
-  return {to_message(scene.hottest()), to_message(scene.coldest()), place_of(scene.over_range()),
-          place_of(scene.under_range())};
+  return {to_message(extremes.hottest), to_message(extremes.coldest), place_of(extremes.over_range),
+          place_of(extremes.under_range)};
+}
+
+protocol::ExtremesReply extremes_message(const SceneSnapshot& scene) {
+  return to_message(ExtremesInView{scene.hottest(), scene.coldest(), scene.over_range(), scene.under_range()});
+}
+
+protocol::ExtremesReply extremes_message(const SceneSnapshot& scene, const protocol::ExtremesRequest& request) {
+  if (!request.camera) return extremes_message(scene);
+  return to_message(extremes_in_view(scene, from_message(*request.camera), request.window.value_or(kWholePicture)));
 }
 
 protocol::QualityState to_message(const StreamQuality& quality) {

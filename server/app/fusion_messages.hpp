@@ -48,6 +48,8 @@ protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fu
                                     std::optional<double> highlighted_share);
 protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused);
 protocol::ExtremesReply extremes_message(const SceneSnapshot& scene);
+/// Of what the camera of the request sees, where it has one.
+protocol::ExtremesReply extremes_message(const SceneSnapshot& scene, const protocol::ExtremesRequest& request);
 
 protocol::QualityState to_message(const StreamQuality& quality);
 

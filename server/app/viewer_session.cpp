@@ -126,7 +126,8 @@ void ViewerSession::opened() {
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
   hello.role = protocol::Role::Operator;
-  hello.capabilities = {"histogram", "probe", "extremes", "exports", "subtract_green", "resume", "cache_bytes"};
+  hello.capabilities = {"histogram", "probe",          "extremes", "extremes_in_view",
+                        "exports",   "subtract_green", "resume",   "cache_bytes"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -183,7 +184,7 @@ void ViewerSession::handle(const protocol::IncomingMessage& message) {
   if (method == "quality.set") return answer(id, set_quality(params));
   if (method == "scene.histogram") return histogram(id, params);
   if (method == "scene.probe") return probe(id, params);
-  if (method == "scene.extremes") return extremes(id);
+  if (method == "scene.extremes") return extremes(id, params);
   answer(id, refusal(RpcErrorCode::MethodNotFound, "there is no method \"" + method.substr(0, 64) + "\"", "method"));
 }
 
@@ -340,9 +341,13 @@ void ViewerSession::probe(const Id& id, const json& params) {
   });
 }
 
-void ViewerSession::extremes(const Id& id) {
+void ViewerSession::extremes(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::ExtremesRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
   if (!scene_) return answer(id, no_scene());
-  answer_from_pool(id, [scene = scene_]() -> Answer { return protocol::to_json(extremes_message(*scene)); });
+  answer_from_pool(id, [scene = scene_, request = request.value()]() -> Answer {
+    return protocol::to_json(extremes_message(*scene, request));
+  });
 }
 
 void ViewerSession::take_scene(const std::shared_ptr<const SceneSnapshot>& scene) {

@@ -60,7 +60,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void fusion_set(const Id& id, const nlohmann::json& params);
   void histogram(const Id& id, const nlohmann::json& params);
   void probe(const Id& id, const nlohmann::json& params);
-  void extremes(const Id& id);
+  void extremes(const Id& id, const nlohmann::json& params);
 
   /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
   void answer_from_pool(const Id& id, std::function<Answer()> compute);

@@ -404,6 +404,14 @@ TEST_F(ViewerSessionTest, AnswersQuestionsAboutTheScene) {
 
   const auto extremes = viewer.call("scene.extremes")["result"];
   EXPECT_GT(extremes["hottest"]["temperature"], extremes["coldest"]["temperature"]);
+  // From afar everything is in view, with the back to it nothing is.
+  const json back{
+      {"eye", {0, 0, 50}}, {"target", {0, 0, 60}}, {"up", {0, 1, 0}}, {"fov_y_deg", 45}, {"viewport", {900, 600}}};
+  json whole = back;
+  whole["target"] = {0, 0, 0};
+  EXPECT_EQ(viewer.call("scene.extremes", {{"camera", whole}})["result"], extremes);
+  EXPECT_TRUE(viewer.call("scene.extremes", {{"camera", back}})["result"]["hottest"].is_null());
+  EXPECT_EQ(viewer.call("scene.extremes", {{"window", {0.5, 0, 0.5, 1}}})["error"]["data"]["field"], "window");
 
   const auto quality = viewer.call("quality.set", {{"colour_bits", 6}, {"position_step_mm", 3}})["result"]["quality"];
   EXPECT_EQ(quality["colour_bits"], 6);

@@ -312,8 +312,26 @@ test('The axis leads to the hottest and to the coldest place, from where they ar
       seen.away !== null && seen.away < Math.min(0.01, 4 * step_m + 0.002),
       `${kind}: what is seen there is ${seen.away} m away`,
     );
-    await page.locator(`[data-mark="${kind}"]:not(.hidden)`).waitFor();
-    assert.match(await page.locator(`[data-mark="${kind}"]`).getAttribute('aria-label'), /^(hottest|coldest) [−\d.]+\s°C$/);
+    const mark = page.locator(`[data-mark="${kind}"][data-of="scene"]`);
+    await page.waitForFunction(
+      (of) => document.querySelector(`[data-mark="${of}"][data-of="scene"]:not(.hidden)`) !== null,
+      kind,
+    );
+    assert.match(await mark.getAttribute('aria-label'), /^(hottest|coldest) [−\d.]+\s°C$/);
+    // The other one is nowhere here: what is on the screen has its own, and it is what is read there.
+    const other = kind === 'hottest' ? 'coldest' : 'hottest';
+    await page.locator(`[data-mark="${other}"][data-of="view"]`).waitFor();
+    const { marked, read } = await page.evaluate(async (of) => {
+      const session = globalThis.spectra;
+      const found = session.store.marks.find((one) => one.kind === of && one.of === 'view');
+      await session.pin({ x: found.x, y: found.y });
+      const reading = session.store.pinned.reading.probe;
+      session.unpin();
+      return { marked: found.temperature, read: reading.temperature };
+    }, other);
+    assert.ok(Math.abs(marked - read) < 0.5, `the ${other} in view is ${marked}, read there is ${read}`);
+    const { temperature } = extremes[other];
+    assert.ok(other === 'coldest' ? marked > temperature : marked < temperature);
     await screenshot(page, `fly-${kind}`);
   }
   await page.locator('canvas').first().focus();

@@ -70,6 +70,7 @@ export interface ProtocolDefinitions {
   Empty: Empty;
   Extreme: Extreme;
   ExtremesReply: ExtremesReply;
+  ExtremesRequest: ExtremesRequest;
   FusionChange: FusionChange;
   FusionRange: FusionRange;
   FusionReply: FusionReply;
@@ -159,6 +160,19 @@ export interface ExtremesReply {
   coldest: Extreme | null;
   over_range?: Vector31;
   under_range?: Vector32;
+}
+/**
+ * Params of scene.extremes. With a camera: of what it sees with nothing in between; where the server has the capability extremes_in_view.
+ */
+export interface ExtremesRequest {
+  camera?: CameraSet;
+  /**
+   * Left, top, right and bottom of the part of the picture that counts, as shares of its width and height; absent: all of it.
+   *
+   * @minItems 4
+   * @maxItems 4
+   */
+  window?: [number, number, number, number];
 }
 /**
  * Params of fusion.set: any part of FUSION; what is absent stays.

@@ -2,6 +2,7 @@ import { DecodePool, Superseded } from '../decode/pool';
 import { decodeTileFrame, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
+  type Extremes,
   extremes,
   type FusionChange,
   fusionState,
@@ -26,7 +27,7 @@ import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewp
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
-import { Markers } from '../view/markers';
+import { Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
 import { cacheBytes } from './cache_bytes';
 import { Settings } from './settings';
@@ -105,6 +106,7 @@ export class Session {
         const pixel_m = (2 * depth * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.viewport.size[1];
         return Math.max(2 * drawn_m, pixel_m);
       },
+      (camera, window) => this.#extremesInView(camera, window),
       (marks) => {
         store.marks = marks;
       },
@@ -203,6 +205,11 @@ export class Session {
     this.#look.pictureIs(insets);
   }
 
+  /** The part of the picture that no control covers. */
+  setWindow(window: Window): void {
+    this.#markers.windowIs(window);
+  }
+
   /** `fit` keeps the direction of the camera, `reset` goes back to the first view. */
   fitView(mode: 'fit' | 'reset'): void {
     if (mode === 'fit') this.#look.fit();
@@ -238,6 +245,18 @@ export class Session {
     }
     this.#look.userMoved();
     this.viewport.setView({ eye: found, target }, true);
+  }
+
+  async #extremesInView(camera: CameraPose, window: Window): Promise<Extremes | null> {
+    const { store } = this;
+    if (!store.connected || !store.marksShown || store.server?.capabilities.includes('extremes_in_view') !== true) return null;
+    try {
+      return extremes(await this.#connection.request('scene.extremes', { camera, window }), 'scene.extremes');
+    } catch (error) {
+      // A server that is busy with other things: nothing is marked.
+      if (!(error instanceof RpcError)) this.#say(error);
+      return null;
+    }
   }
 
   retryNow(): void {

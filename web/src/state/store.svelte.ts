@@ -66,7 +66,7 @@ export class Store {
 
   histogram = $state.raw<Histogram | null>(null);
   extremes = $state.raw<Extremes | null>(null);
-  /** The hottest and the coldest place of the scene, as they stand on the screen. */
+  /** The hottest and the coldest place of the scene, and of what is on the screen, as they stand on it. */
   marks = $state.raw<readonly Mark[]>([]);
   marksShown = $state(true);
   /** Under the pointer. */
