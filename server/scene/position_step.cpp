@@ -29,7 +29,7 @@ constexpr std::uint32_t kWeldVertexCount = 512;
 /// for pieces, and for what is so dense that the usual step halved would not keep it apart. Of other cells, which a patch is larger
 /// than, a little more: what half the vertices of a scan pay for.
 constexpr double kStepOfPieceSide = 0.1;
-constexpr double kStepOfCellSide = 0.24;
+constexpr double kStepOfCellSide = 0.4;
 
 /// One in so many vertices of a cell may fall together with another.
 constexpr std::size_t kVerticesToMerged = 5;
@@ -39,6 +39,14 @@ constexpr std::size_t kVerticesToMerged = 5;
 constexpr double kReach = 0.25;
 constexpr double kTouch = 0.05;
 
+/// Balls of so many vertices are looked at, around every vertex (of more than the fewest: around every fourth) of cells that are
+/// thin; what they may reach beyond the cell, in parts of its longest side; and the change of a side that is left to them.
+constexpr std::array<std::size_t, 2> kBalls{50, 100};
+constexpr std::uint32_t kSeedsToLargerBall = 4;
+constexpr double kBallReach = 0.8;
+constexpr double kMostSideChange = 0.095;
+constexpr int kRounds = 3;
+
 /// What is thinner beside its breadth is flat.
 constexpr double kFlat = 0x1p-12;
 
@@ -46,7 +54,7 @@ constexpr double kFlat = 0x1p-12;
 constexpr std::uint32_t kSmallPieceVertexCount = 64;
 
 /// More than a tile has steps from end to end.
-constexpr int kMostHalvings = 24;
+constexpr std::uint8_t kMostHalvings = 24;
 
 /// A scene may be rounded finer everywhere for so many bits; by no more than a thousandth of the step.
 constexpr std::size_t kNegligibleBits = 8 * 4096;
@@ -145,14 +153,18 @@ struct Shape {
     return halvings;
   }
 
-  /// So that no side that is one changes by more than a tenth.
-  StepHalvings for_sides(double step_of_side, double step_m) const {
+  /// Whether what the points span there is no flatness or rounding of floats.
+  bool has_side(std::size_t axis) const {
     std::array<double, 3> sorted = side;
     std::sort(sorted.begin(), sorted.end());
+    return side[axis] > 8 * float_spacing[axis] && side[axis] >= kFlat * sorted[1];
+  }
+
+  /// So that no side that is one changes by more than a tenth.
+  StepHalvings for_sides(double step_of_side, double step_m) const {
     StepHalvings halvings{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (side[axis] <= 8 * float_spacing[axis] || side[axis] < kFlat * sorted[1]) continue;
-      halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
+      if (has_side(axis)) halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
     }
     return halvings;
   }
@@ -160,6 +172,14 @@ struct Shape {
 
 StepHalvings finer(const StepHalvings& a, const StepHalvings& b) {
   return {std::max(a[0], b[0]), std::max(a[1], b[1]), std::max(a[2], b[2])};
+}
+
+/// Never less than `to`, whoever else raises it.
+void raise(std::uint8_t& value, std::uint8_t to) {
+  const std::atomic_ref<std::uint8_t> shared(value);
+  std::uint8_t now = shared.load(std::memory_order_relaxed);
+  while (now < to && !shared.compare_exchange_weak(now, to, std::memory_order_relaxed)) {
+  }
 }
 
 /// How often `step_m` is halved until all but `may_merge` of these distinct positions stay distinct.
@@ -199,6 +219,54 @@ class Pieces {
 };
 
 }  // namespace
+
+/// The vertices around a cell, seen from a corner of it.
+struct PositionSteps::Neighbourhood {
+  std::array<float, 3> corner{};
+  std::vector<std::uint32_t> points;
+  std::vector<std::array<float, 3>> place, rounded;
+  std::vector<float> distance;  ///< To a vertex of the cell, squared.
+  std::vector<std::uint32_t> near;
+  std::vector<float> near_distance;
+
+  void resize(std::size_t count) {
+    place.resize(count);
+    rounded.resize(count);
+    distance.resize(count);
+    near.resize(count);
+    near_distance.resize(count);
+  }
+
+  /// Puts those within a radius (squared) into `near`; returns how many.
+  std::size_t gather(float radius) {
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < distance.size(); ++n) {
+      near[kept] = static_cast<std::uint32_t>(n);
+      kept += distance[n] <= radius ? 1u : 0u;
+    }
+    return kept;
+  }
+
+  /// Of the first `near_count` of `near` (at least `count`): a radius that has `count` of them, or more where several are equally far.
+  /// Bisection; several times faster here than std::nth_element.
+  float radius_of(std::size_t count, std::size_t near_count) {
+    float most = 0;
+    for (std::size_t n = 0; n < near_count; ++n) {
+      near_distance[n] = distance[near[n]];
+      most = std::max(most, near_distance[n]);
+    }
+    if (near_count == count) return most;
+    float least = 0;
+    for (;;) {
+      const float middle = (least + most) / 2;
+      if (!(middle > least && middle < most)) return most;
+      std::uint32_t within = 0;
+      for (std::size_t n = 0; n < near_count; ++n) within += near_distance[n] <= middle ? 1u : 0u;
+      if (within == count) return middle;
+      (within < count ? least : most) = middle;
+    }
+  }
+};
 
 /// A part of the tree while it is made.
 struct PositionSteps::Branch {
@@ -301,10 +369,11 @@ PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, Work
   ask_cells(pool);
   ask_pieces(leaves);
   ask_neighbours(pool);
+  most_halvings_ = kMostHalvings;
   const bool has_triangles =
       std::any_of(leaves.begin(), leaves.end(), [](const auto& leaf) { return !leaf->triangles.empty(); });
   if (has_triangles) limit_to_one_tile();
-  points_ = {};
+  keep_sides(pool);
   coincident_ = {};
 }
 
@@ -444,17 +513,25 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
   }
 }
 
+template <class Visit>
+void PositionSteps::for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit) {
+  std::vector<std::uint32_t> open{0};
+  while (!open.empty()) {
+    const Node& node = nodes_[open.back()];
+    open.pop_back();
+    if (node.axis == kNoAxis) {
+      visit(cells_[node.below]);
+      continue;
+    }
+    if (low[node.axis] < double{node.split}) open.push_back(node.below);
+    if (high[node.axis] >= double{node.split}) open.push_back(node.below + 1);
+  }
+}
+
 void PositionSteps::ask_neighbours(WorkerPool& pool) {
   constexpr std::size_t kChunk = 4096;
-  const auto raise = [](std::uint8_t& value, std::uint8_t to) {
-    const std::atomic_ref<std::uint8_t> shared(value);
-    std::uint8_t now = shared.load(std::memory_order_relaxed);
-    while (now < to && !shared.compare_exchange_weak(now, to, std::memory_order_relaxed)) {
-    }
-  };
   for (Cell& cell : cells_) cell.halvings = finer(cell.halvings, cell.own);
   pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    std::vector<std::uint32_t> open;
     for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
       const Cell& cell = cells_[c];
       if (cell.own == StepHalvings{}) continue;
@@ -464,27 +541,18 @@ void PositionSteps::ask_neighbours(WorkerPool& pool) {
         low[axis] = double{coordinates(cell.bounds.min)[axis]} - longest * kReach;
         high[axis] = double{coordinates(cell.bounds.max)[axis]} + longest * kReach;
       }
-      open.assign(1, 0);
-      while (!open.empty()) {
-        const Node node = nodes_[open.back()];
-        open.pop_back();
-        if (node.axis != kNoAxis) {
-          if (low[node.axis] < double{node.split}) open.push_back(node.below);
-          if (high[node.axis] >= double{node.split}) open.push_back(node.below + 1);
-          continue;
-        }
-        Cell& other = cells_[node.below];
+      for_each_cell(low, high, [&](Cell& other) {
         double gap = 0;  // Along the axis on which they are farthest apart.
         for (std::size_t axis = 0; axis < 3; ++axis) {
           gap = std::max({gap, double{coordinates(other.bounds.min)[axis]} - double{coordinates(cell.bounds.max)[axis]},
                           double{coordinates(cell.bounds.min)[axis]} - double{coordinates(other.bounds.max)[axis]}});
         }
-        if (gap > longest * kReach) continue;
+        if (gap > longest * kReach) return;
         const int fewer = cell.is_dense || gap <= longest * kTouch ? 0 : 1;
         for (std::size_t axis = 0; axis < 3; ++axis) {
           raise(other.halvings[axis], static_cast<std::uint8_t>(std::max(0, cell.own[axis] - fewer)));
         }
-      }
+      });
     }
   });
 }
@@ -499,17 +567,168 @@ void PositionSteps::limit_to_one_tile() {
   const double most = std::floor(std::log2(static_cast<double>(largest_step_m_) * 0x1.fffffcp23 / extent));
   // A triangle to a stray vertex coarsens the tiles that have it, no others.
   if (!(most >= 1 && most < kMostHalvings)) return;
-  const auto limit = static_cast<std::uint8_t>(most);
+  most_halvings_ = static_cast<std::uint8_t>(most);
   for (Cell& cell : cells_) {
-    for (std::uint8_t& halvings : cell.halvings) halvings = std::min(halvings, limit);
+    for (std::uint8_t& halvings : cell.halvings) halvings = std::min(halvings, most_halvings_);
   }
 }
 
-const PositionSteps::Cell& PositionSteps::cell_at(const Vec3f& position) const {
+void PositionSteps::keep_sides(WorkerPool& pool) {
+  constexpr std::size_t kChunk = 256;
+  const auto step_m = static_cast<double>(largest_step_m_);
+  halvings_.resize(points_.size());
+  std::vector<std::uint32_t> thin;  // Cells with a side of few steps.
+  for (std::uint32_t c = 0; c < cells_.size(); ++c) {
+    const Cell& cell = cells_[c];
+    std::fill(halvings_.begin() + cell.begin, halvings_.begin() + cell.end, cell.halvings);
+    const Shape shape(cell.bounds);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!shape.has_side(axis) || shape.side[axis] * kMostSideChange >= 4 * std::ldexp(step_m, -cell.halvings[axis]))
+        continue;
+      thin.push_back(c);
+      break;
+    }
+  }
+  std::vector<std::uint8_t> is_changed(cells_.size(), 1);
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<StepHalvings> wanted = halvings_;
+    pool.for_each((thin.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      Neighbourhood around;
+      for (std::size_t i = chunk * kChunk; i < std::min(thin.size(), (chunk + 1) * kChunk); ++i) {
+        keep_sides_in(cells_[thin[i]], is_changed, around, wanted);
+      }
+    });
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      const auto begin = static_cast<std::ptrdiff_t>(cells_[c].begin), end = static_cast<std::ptrdiff_t>(cells_[c].end);
+      is_changed[c] = std::equal(halvings_.begin() + begin, halvings_.begin() + end, wanted.begin() + begin) ? 0 : 1;
+    }
+    halvings_ = std::move(wanted);
+  }
+}
+
+void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t> is_changed, Neighbourhood& around,
+                                  std::vector<StepHalvings>& wanted) {
+  const auto step_m = static_cast<double>(largest_step_m_);
+  const double reach = longest_side(cell.bounds) * kBallReach;
+  around.corner = coordinates(cell.bounds.min);
+  std::array<double, 3> from{}, to{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    from[axis] = double{around.corner[axis]} - reach;
+    to[axis] = double{coordinates(cell.bounds.max)[axis]} + reach;
+  }
+  around.points.clear();
+  bool is_any_changed = false;
+  for_each_cell(from, to, [&](const Cell& other) {
+    is_any_changed = is_any_changed || is_changed[static_cast<std::size_t>(&other - cells_.data())] != 0;
+    for (std::uint32_t i = other.begin; i < other.end; ++i) around.points.push_back(i);
+  });
+  if (!is_any_changed) return;
+  const std::size_t count = around.points.size();
+  around.resize(count);
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::uint32_t point = around.points[n];
+    const auto p = coordinates(points_[point].position);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double step = std::ldexp(step_m, -halvings_[point][axis]);
+      around.place[n][axis] = static_cast<float>(double{p[axis]} - double{around.corner[axis]});
+      around.rounded[n][axis] =
+          static_cast<float>(std::floor(double{p[axis]} / step + 0.5) * step - double{around.corner[axis]});
+    }
+  }
+  constexpr float kEverywhere = std::numeric_limits<float>::infinity();
+  float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
+  for (std::uint32_t seed = cell.begin; seed < cell.end; ++seed) {
+    std::array<float, 3> center = coordinates(points_[seed].position);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      center[axis] = static_cast<float>(double{center[axis]} - double{around.corner[axis]});
+    for (std::size_t n = 0; n < count; ++n) {
+      const std::array<float, 3>& p = around.place[n];
+      const float x = p[0] - center[0], y = p[1] - center[1], z = p[2] - center[2];
+      around.distance[n] = x * x + y * y + z * z;
+    }
+    for (const std::size_t ball : kBalls) {
+      if (ball > count || (ball != kBalls.front() && seed % kSeedsToLargerBall != 0)) break;
+      // Among few, if it is about as large as the one before.
+      std::size_t near_count = around.gather(radius * (ball == kBalls.front() ? 1.5F : 4.0F));
+      if (near_count < ball) near_count = around.gather(kEverywhere);
+      const float ball_radius = around.radius_of(ball, near_count);
+      if (ball == kBalls.front()) radius = ball_radius;
+      std::size_t kept = 0;
+      for (std::size_t n = 0; n < near_count; ++n) {
+        const std::uint32_t point = around.near[n];
+        around.near[kept] = point;
+        kept += around.distance[point] <= ball_radius ? 1u : 0u;
+      }
+      keep_sides_of(around, std::span(around.near).first(kept), wanted);
+    }
+  }
+}
+
+void PositionSteps::keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
+                                  std::vector<StepHalvings>& wanted) {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  constexpr auto kMost = static_cast<float>(kMostSideChange);
+  std::array<float, 3> low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar}, rounded_low = low, rounded_high = high;
+  for (const std::uint32_t n : ball) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], around.place[n][axis]);
+      high[axis] = std::max(high[axis], around.place[n][axis]);
+      rounded_low[axis] = std::min(rounded_low[axis], around.rounded[n][axis]);
+      rounded_high[axis] = std::max(rounded_high[axis], around.rounded[n][axis]);
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float side = high[axis] - low[axis];
+    const float at_low = low[axis] - rounded_low[axis], at_high = rounded_high[axis] - high[axis];
+    if (std::abs(at_low + at_high) <= kMost * side) continue;
+    const auto absolute = [&](const std::array<float, 3>& p) {
+      return Vec3f{p[0] + around.corner[0], p[1] + around.corner[1], p[2] + around.corner[2]};
+    };
+    if (!Shape({absolute(low), absolute(high)}).has_side(axis)) continue;
+    // One end where that is enough: the worse one.
+    const float most = kMost * side;
+    const bool is_low_worse = std::abs(at_low) > std::abs(at_high);
+    const float other = is_low_worse ? at_high : at_low;
+    const bool are_both = std::abs(other) > 0.75F * most;
+    if (is_low_worse || are_both)
+      keep_end(around, ball, axis, low[axis], -1, are_both ? -most / 2 : -most - other,
+               are_both ? most / 2 : most - other, wanted);
+    if (!is_low_worse || are_both)
+      keep_end(around, ball, axis, high[axis], 1, are_both ? -most / 2 : -most - other,
+               are_both ? most / 2 : most - other, wanted);
+  }
+}
+
+void PositionSteps::keep_end(const Neighbourhood& around, std::span<const std::uint32_t> ball, std::size_t axis,
+                             float end, int direction, float least, float most, std::vector<StepHalvings>& wanted) {
+  const auto step_m = static_cast<double>(largest_step_m_);
+  const auto sign = static_cast<float>(direction);
+  // How far beyond the end.
+  const auto beyond = [&](float there) { return sign * (there - end); };
+  const bool is_lost =
+      std::none_of(ball.begin(), ball.end(), [&](std::uint32_t n) { return beyond(around.rounded[n][axis]) >= least; });
+  for (const std::uint32_t n : ball) {
+    const bool is_end = is_lost && around.place[n][axis] == end;
+    const std::uint32_t point = around.points[n];
+    const double at = double{coordinates(points_[point].position)[axis]};
+    int halvings = halvings_[point][axis];
+    float there = around.rounded[n][axis];
+    while ((beyond(there) > most || (is_end && beyond(there) < least)) && halvings < int{most_halvings_}) {
+      const double step = std::ldexp(step_m, -++halvings);
+      there = static_cast<float>(std::floor(at / step + 0.5) * step - double{around.corner[axis]});
+    }
+    raise(wanted[point][axis], static_cast<std::uint8_t>(halvings));
+  }
+}
+
+StepHalvings PositionSteps::halvings_at(const Vec3f& position) const {
   const auto p = coordinates(position);
   const Node* node = &nodes_[0];
   while (node->axis != kNoAxis) node = &nodes_[node->below + (p[node->axis] < node->split ? 0 : 1)];
-  return cells_[node->below];
+  const Cell& cell = cells_[node->below];
+  std::uint32_t i = cell.begin;
+  while (i + 1 < cell.end && points_[i].position != position) ++i;
+  return halvings_[i];
 }
 
 void PositionSteps::apply(Tile& tile) const {
@@ -520,7 +739,7 @@ void PositionSteps::apply(Tile& tile) const {
   bool is_any = false;
   for (std::size_t v = 0; v < halvings.size(); ++v) {
     if (!is_drawn[v]) continue;
-    halvings[v] = cell_at(tile.positions[v]).halvings;
+    halvings[v] = halvings_at(tile.positions[v]);
     is_any = is_any || halvings[v] != StepHalvings{};
   }
   if (is_any) tile.step_halvings = std::move(halvings);

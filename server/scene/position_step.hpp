@@ -21,7 +21,8 @@ namespace spectra::server {
 /// - what they span along an axis is at least four steps (what is thinner than a 4,096th of its breadth, or than eight times
 ///   what floats tell apart there, counts as flat),
 /// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps.
-/// Neighbours get the finer of their steps. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
+/// Neighbours get the finer of their steps. Where a ball of neighbours would still have a side off by more than a tenth, the few
+/// vertices that its box stands on are rounded finer by themselves. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
 /// Vertices of no triangle in a scene with triangles are not drawn and have no say.
 class PositionSteps {
  public:
@@ -39,7 +40,7 @@ class PositionSteps {
   struct Cell {
     Bounds bounds;
     std::uint32_t begin = 0, end = 0;  ///< In points_.
-    StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood.
+    StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood. Of all its vertices.
     bool is_dense = false;             ///< Its vertices would fall together at the usual step.
   };
   struct Point {
@@ -53,6 +54,7 @@ class PositionSteps {
     std::uint32_t below = 0;
   };
   struct Branch;
+  struct Neighbourhood;
   static constexpr std::uint8_t kNoAxis = 3;
 
   void gather(std::span<const std::shared_ptr<Tile>> leaves);
@@ -60,14 +62,28 @@ class PositionSteps {
   void ask_cells(WorkerPool& pool);
   void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
   void ask_neighbours(WorkerPool& pool);
+  /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
+  void keep_sides(WorkerPool& pool);
+  void keep_sides_in(const Cell& cell, std::span<const std::uint8_t> is_changed, Neighbourhood& around,
+                     std::vector<StepHalvings>& wanted);
+  void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
+                     std::vector<StepHalvings>& wanted);
+  /// So that the ball ends at `least` to `most` beyond where it does.
+  void keep_end(const Neighbourhood& around, std::span<const std::uint32_t> ball, std::size_t axis, float end,
+                int direction, float least, float most, std::vector<StepHalvings>& wanted);
   /// No step is finer than a tile of half the scene can have: neighbours would differ on their border.
   void limit_to_one_tile();
-  const Cell& cell_at(const fusion::Vec3f& position) const;
+  StepHalvings halvings_at(const fusion::Vec3f& position) const;
+  /// Calls `visit(cell)` for the cells that reach into a box.
+  template <class Visit>
+  void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
 
   float largest_step_m_ = 0;
+  std::uint8_t most_halvings_ = 0;  ///< That any vertex may have.
   std::vector<Point> points_;
   std::vector<Node> nodes_;
   std::vector<Cell> cells_;
+  std::vector<StepHalvings> halvings_;                               ///< Of each of points_.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident_;  ///< Vertices in the same place.
 };
 

@@ -193,7 +193,10 @@ FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count) {
   for (std::size_t seed = 0; seed < before.size(); seed += stride) {
     for (const std::size_t count : {50u, 100u, 1000u}) {
       if (before.size() < count) break;
-      const auto ball = places.nearest(before[seed], count);
+      // All that are as near as the last.
+      auto ball = places.nearest(before[seed], 2 * count);
+      const double radius = squared(before[ball[count - 1]], before[seed]);
+      while (squared(before[ball.back()], before[seed]) > radius) ball.pop_back();
       if (std::sqrt(squared(before[ball.back()], before[seed])) < smallest_radius) continue;
       const Loss loss = loss_of(ball, before, after);
       ++report.patch_count;

@@ -195,6 +195,19 @@ TEST(PositionSteps, KeepHeapsOfSmallPieces) {
   expect_kept(scene.mesh());
 }
 
+TEST(PositionSteps, KeepTheThicknessOfRoughWallsAlongAnAxis) {
+  // A wall of a scan is as thick as its roughness, which is a few steps.
+  Parts scene;
+  std::mt19937 random(11);
+  std::normal_distribution<double> roughness(0, 0.004);
+  scene.grid(180, 180, {3, 1, 2}, {0.01F, 0, 0}, {0, 0.01F, 0}, [&](int, int) { return roughness(random); });
+  const auto snapshot = scene_of(scene.mesh());
+  const FormReport form = form_of(*snapshot, 2'000);
+  ASSERT_GT(form.patch_count, 5'000u);
+  EXPECT_LE(form.flattened_patch_count * 1'000, form.patch_count) << described(form);
+  EXPECT_LT(form.worst_side_change, 0.2) << described(form);
+}
+
 TEST(PositionSteps, AreTheSameForATriangleSoup) {
   const MultispectralMesh terrain = spectra::testing::terrain({.columns = 110, .rows = 110});
   const auto shared = scene_of(spectra::testing::copy_of(terrain)), soup = scene_of(spectra::testing::soup_of(terrain));
