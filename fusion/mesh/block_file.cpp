@@ -63,10 +63,13 @@ BlockFile& BlockFile::operator=(BlockFile&& other) noexcept {
   std::swap(end_, other.end_);
   std::swap(read_error_, other.read_error_);
   std::swap(buffer_, other.buffer_);
+  std::swap(watcher_, other.watcher_);
   return *this;
 }
 
 void BlockFile::fill() {
+  if (watcher_)
+    watcher_(static_cast<double>(position()) / static_cast<double>(std::max<std::uint64_t>(size_bytes_, 1)));
   std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_), buffer_.begin() + static_cast<std::ptrdiff_t>(end_),
             buffer_.begin());
   buffer_position_ += begin_;

@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "fusion/error.hpp"
@@ -45,6 +47,9 @@ class BlockFile {
   void skip(std::uint64_t count);
   void seek(std::uint64_t position);
 
+  /// `watcher` is told, at every read of a block, the share of the file that lies before its end.
+  void set_watcher(std::function<void(double share)> watcher) { watcher_ = std::move(watcher); }
+
   /// errno of the read that failed, or 0.
   int read_error() const { return read_error_; }
 
@@ -61,6 +66,7 @@ class BlockFile {
   std::size_t end_ = 0;
   int read_error_ = 0;
   std::vector<unsigned char> buffer_;
+  std::function<void(double)> watcher_;
 };
 
 }  // namespace spectra::fusion

@@ -123,12 +123,18 @@ std::uint8_t level(double albedo, double light, double glow, double grain) {
 
 }  // namespace
 
-LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options) {
+LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Progress& progress) {
+  report(progress, kModellingPhase, 0);
   const std::uint64_t wanted = std::clamp(options.vertex_count, kDemoSceneLeastVertices, kDemoSceneMostVertices);
   const std::uint64_t seed = demo::scramble(options.seed);
   const SurfaceMesh stand_in = surfaces(kStandInVertices, seed);
   const demo::BakedLight light(stand_in);
   const demo::ThermalSensor sensor(stand_in, seed + 900);
+  // The stand-in takes as long as so many vertices of the scene, and three quarters of those go into the surfaces.
+  constexpr double kStandInWork = 600'000;
+  const double stand_in_share = kStandInWork / (kStandInWork + static_cast<double>(wanted));
+  const double surfaces_share = stand_in_share + 0.75 * (1 - stand_in_share);
+  report(progress, kModellingPhase, stand_in_share);
 
   SurfaceMesh scene = seen_surfaces(wanted, seed, demo::ScanCoverage(stand_in), stand_in);
   const std::vector<Vec3f> normals = demo::vertex_normals(scene);
@@ -142,6 +148,11 @@ LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options) {
   const std::span<Rgb8> visible = mesh.visible();
   const std::span<float> celsius = mesh.temperature_celsius();
   for (std::size_t i = 0; i < scene.positions.size(); ++i) {
+    if (i % 16'384 == 0) {
+      report(
+          progress, kModellingPhase,
+          surfaces_share + (1 - surfaces_share) * static_cast<double>(i) / static_cast<double>(scene.positions.size()));
+    }
     const Vec p{scene.positions[i].x, scene.positions[i].y, scene.positions[i].z};
     const Vec n{normals[i].x, normals[i].y, normals[i].z};
     celsius[i] = sensor.celsius_at(p, n);
@@ -159,8 +170,8 @@ LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options) {
   return {std::move(mesh), std::move(scene.is_skin)};
 }
 
-MultispectralMesh demo_scene(const DemoSceneOptions& options) {
-  return labelled_demo_scene(options).mesh;
+MultispectralMesh demo_scene(const DemoSceneOptions& options, const Progress& progress) {
+  return labelled_demo_scene(options, progress).mesh;
 }
 
 std::vector<DemoLandmark> demo_landmarks() {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 
@@ -25,14 +26,15 @@ struct DemoSceneOptions {
 /// About 7.6 x 5.6 x 2.9 m, in metres: x to the right, y up, z towards the viewer; floor at y = 0, back wall at
 /// z = -2.8, open at the front. A good first camera: from (-0.50, 2.00, 4.75) to (-0.05, 0.65, -0.60), up (0, 1, 0), a
 /// vertical angle of 45 to 50 degrees.
-MultispectralMesh demo_scene(const DemoSceneOptions& options);
+/// `progress` is told of kModellingPhase.
+MultispectralMesh demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
 
 /// The demo scene and which of its vertices are the bare skin of the person, for those who ask whether it is found.
 struct LabelledDemoScene {
   MultispectralMesh mesh;
   std::vector<std::uint8_t> is_skin;  ///< One a vertex: 1 or 0.
 };
-LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options);
+LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
 
 /// A place in the demo scene whose temperature is known, for tests and for trying out the tools.
 struct DemoLandmark {

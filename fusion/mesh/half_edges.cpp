@@ -145,7 +145,8 @@ void fill_kernel(std::size_t vertex_count, const std::vector<Triangle>& faces,
 
 }  // namespace
 
-HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles) {
+HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles, const Progress& progress) {
+  report(progress, kTopologyPhase, 0);
   HalfEdges result;
   std::vector<Triangle> faces;
   faces.reserve(triangles.size());
@@ -154,7 +155,9 @@ HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangl
     return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
   });
   const std::vector<std::uint32_t> opposite = paired_sides(vertex_count, faces, result);
+  report(progress, kTopologyPhase, 0.4);
   cut_vertices(vertex_count, opposite, faces, result);
+  report(progress, kTopologyPhase, 0.5);
   fill_kernel(vertex_count + result.source_vertex.size(), faces, opposite, result.kernel);
   return result;
 }

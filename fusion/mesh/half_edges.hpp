@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fusion/mesh/openmesh_kernel.hpp"
+#include "fusion/progress.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
@@ -28,6 +29,7 @@ struct HalfEdges {
 /// Pairs all edges at once and fills OpenMesh's arrays directly: linear time, about 150 bytes a triangle while it runs.
 /// Triangles with a vertex twice or an index that is not below `vertex_count` take no part. At most 350 million triangles:
 /// OpenMesh counts half-edges in an int.
-HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles);
+/// `progress` is told of kTopologyPhase.
+HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles, const Progress& progress = {});
 
 }  // namespace spectra::fusion

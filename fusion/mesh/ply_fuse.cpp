@@ -134,18 +134,42 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
 
 Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
                             const FusionSettings& settings, const PaletteTable* palette, const ReadOptions& options) {
-  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, options));
+  std::string_view phase = kReadingPhase;
+  double begin_share = 0;
+  double end_share = 1;
+  ReadOptions watched = options;
+  if (options.progress) {
+    watched.progress = [&](std::string_view, double share) {
+      options.progress(phase, begin_share + (end_share - begin_share) * share);
+    };
+  }
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, watched));
   BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
   std::optional<Error> pass_error;
   SceneTemperature scene;
   scene.summary = pass.temperature;
-  scene.histogram = [&](std::uint32_t bins) { return file_histogram(stream, pass.temperature, bins, pass_error); };
-  scene.hues = [&] { return file_hues(stream, pass_error); };
+  // Nobody knows how many passes the plan will ask for, so each is half of what remains of their phase.
+  const auto count_again = [&] {
+    begin_share = phase == kHistogramPhase ? end_share : 0;
+    end_share = (begin_share + 1) / 2;
+    phase = kHistogramPhase;
+  };
+  scene.histogram = [&](std::uint32_t bins) {
+    count_again();
+    return file_histogram(stream, pass.temperature, bins, pass_error);
+  };
+  scene.hues = [&] {
+    count_again();
+    return file_hues(stream, pass_error);
+  };
   auto plan =
       palette == nullptr ? FusionPlan::prepare(settings, scene) : FusionPlan::prepare(settings, scene, *palette);
   if (pass_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*pass_error));
   BOOST_OUTCOME_TRY(plan);
 
+  phase = kFusingPhase;
+  begin_share = 0;
+  end_share = 1;
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
   BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(),
                                    [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));

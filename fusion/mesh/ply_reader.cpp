@@ -28,7 +28,14 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
                             const ReadOptions& options) {
   ReadOptions scene_options;  // those about temperature belong to the thermal file
   scene_options.metres_per_unit = options.metres_per_unit;
-  BOOST_OUTCOME_TRY(LoadedScene thermal, read_ply(thermal_path, options));
+  scene_options.progress = options.progress;
+  ReadOptions thermal_options = options;
+  if (options.progress) {
+    thermal_options.progress = [&options](std::string_view, double share) {
+      options.progress(kReadingThermalPhase, share);
+    };
+  }
+  BOOST_OUTCOME_TRY(LoadedScene thermal, read_ply(thermal_path, thermal_options));
   if (!thermal.mesh.has_temperature) {
     return failure(
         ErrorCode::Unsupported,
@@ -179,6 +186,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
                            "The file's own temperatures replaced by those of the thermal file"});
   }
   scene.mesh.has_temperature = true;
+  report(options.progress, kJoiningPhase, 0);
   BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene));
   const auto missing_count = static_cast<std::uint64_t>(
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),

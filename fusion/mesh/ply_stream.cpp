@@ -47,6 +47,9 @@ Result<PlyStream> PlyStream::open(const std::filesystem::path& path, const ReadO
   const std::string name = path.filename().empty() ? path.string() : path.filename().string();
   BOOST_OUTCOME_TRY(auto file, located(BlockFile::open(path), name));
   PlyStream stream(std::move(file), name, options);
+  if (options.progress) {
+    stream.file_.set_watcher([progress = options.progress](double share) { progress(kReadingPhase, share); });
+  }
   BOOST_OUTCOME_TRY(located(stream.interpret(), name));
   return stream;
 }

@@ -1,5 +1,6 @@
 #include "fusion/mesh/ply_writer.hpp"
 
+#include <algorithm>
 #include <ostream>
 #include <vector>
 
@@ -72,10 +73,20 @@ Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::sp
 }
 
 Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours,
-                       const std::string& comment) {
+                       const std::string& comment, const Progress& progress) {
+  report(progress, kWritingPhase, 0);
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(path));
-  BOOST_OUTCOME_TRY(
-      encode(mesh, colours, comment, [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
+  const std::size_t vertex_bytes = (mesh.double_positions ? 24U : 12U) + 3U + (mesh.has_temperature ? 4U : 0U);
+  const std::size_t whole_bytes =
+      (mesh.vertex_count() + mesh.left_out.size()) * vertex_bytes + mesh.triangle_count() * 13 + 1;
+  std::size_t written_bytes = 0;
+  BOOST_OUTCOME_TRY(encode(mesh, colours, comment, [&](std::span<const std::byte> bytes) {
+    written_bytes += bytes.size();
+    // The header comes on top, so a small file would be told to be more than whole.
+    report(progress, kWritingPhase,
+           std::min(1.0, static_cast<double>(written_bytes) / static_cast<double>(whole_bytes)));
+    return file.write(bytes);
+  }));
   return file.commit();
 }
 

@@ -7,6 +7,7 @@
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 
@@ -16,8 +17,8 @@ namespace spectra::fusion {
 Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours);
 
 /// The same into a file that appears whole or not at all: written beside it, synced, then renamed. `comment`: one more line
-/// of the header.
+/// of the header. `progress` is told of kWritingPhase.
 Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours,
-                       const std::string& comment = {});
+                       const std::string& comment = {}, const Progress& progress = {});
 
 }  // namespace spectra::fusion

@@ -7,6 +7,7 @@
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/up_axis.hpp"
+#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 
@@ -36,6 +37,8 @@ struct ReadOptions {
   double metres_per_unit = 1;
   /// Which way is up; absent: found out. Reading does not need it, survey() does.
   std::optional<UpAxis> up;
+  /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.
+  Progress progress;
 
   /// How the temperature is scaled; nullopt: nobody said so, it is taken for degrees Celsius.
   std::optional<CelsiusScale> celsius_scale() const;

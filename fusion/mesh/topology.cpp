@@ -8,10 +8,11 @@
 
 namespace spectra::fusion {
 
-TopologyFacts topology_facts(const MultispectralMesh& mesh) {
+TopologyFacts topology_facts(const MultispectralMesh& mesh, const Progress& progress) {
   TopologyFacts facts;
   if (mesh.is_point_cloud()) return facts;
-  const HalfEdges topology = half_edges(mesh.vertex_count(), mesh.triangles());
+  const HalfEdges topology = half_edges(mesh.vertex_count(), mesh.triangles(), progress);
+  report(progress, kTopologyPhase, 0.9);
   const MeshKernel& kernel = topology.kernel;
   facts.non_manifold_edge_count = topology.non_manifold_edge_count;
   facts.flipped_edge_count = topology.flipped_edge_count;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 
@@ -16,7 +17,8 @@ struct TopologyFacts {
   std::uint64_t component_count = 0;            ///< Pieces of surface connected over edges, flipped or not.
 };
 
-/// Builds the half-edge connectivity of the mesh with OpenMesh (see half_edges.hpp) and reads the facts off it.
-TopologyFacts topology_facts(const MultispectralMesh& mesh);
+/// Builds the half-edge connectivity of the mesh with OpenMesh (see half_edges.hpp) and reads the facts off it. `progress` is told
+/// of kTopologyPhase.
+TopologyFacts topology_facts(const MultispectralMesh& mesh, const Progress& progress = {});
 
 }  // namespace spectra::fusion

@@ -1,10 +1,12 @@
 #include "server/app/command_output.hpp"
 
 #include <cstdio>
+#include <iterator>
 #include <string>
 
 #include "fusion/mesh/scene_survey.hpp"
 #include "server/app/commands.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 namespace {
@@ -17,6 +19,7 @@ void print_line(std::string_view kind, std::string_view message) {
     if (c == '\n' || c == '\r') c = ' ';
   }
   line += '\n';
+  ProgressLine::make_way();
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -40,10 +43,28 @@ void print_notes(const std::vector<fusion::Note>& notes) {
   for (const auto& note : notes) print_line("note: ", note.message);
 }
 
+std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
+                                        const std::optional<std::filesystem::path>& thermal,
+                                        std::vector<ProgressStage> next) {
+  std::vector<ProgressStage> stages;
+  if (thermal) stages.push_back({fusion::kReadingThermalPhase, "reading " + thermal->filename().string(), 1});
+  stages.push_back({fusion::kReadingPhase, "reading " + scene.filename().string(), 1});
+  if (thermal) stages.push_back({fusion::kJoiningPhase, "joining temperatures", 2});
+  stages.push_back({fusion::kSurveyPhase, "surveying " + scene.filename().string(), 0.3});
+  stages.insert(stages.end(), std::move_iterator(next.begin()), std::move_iterator(next.end()));
+  return stages;
+}
+
+fusion::ReadOptions watched(fusion::ReadOptions options, ProgressLine& line) {
+  options.progress = line.sink();
+  return options;
+}
+
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
                                                const std::optional<std::filesystem::path>& thermal,
                                                const fusion::ReadOptions& options) {
   auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal, options) : fusion::read_ply(scene, options);
+  fusion::report(options.progress, fusion::kSurveyPhase, 0);
   if (loaded) fusion::survey(loaded.value(), options);
   return loaded;
 }

@@ -7,6 +7,7 @@
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 
@@ -21,6 +22,14 @@ void warn(std::string_view message);
 
 /// Writes what was repaired, left out or interpreted to standard error, one line each.
 void print_notes(const std::vector<fusion::Note>& notes);
+
+/// The stages of reading a scene, and those that follow.
+std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
+                                        const std::optional<std::filesystem::path>& thermal,
+                                        std::vector<ProgressStage> next);
+
+/// The options, with their progress told to the line.
+fusion::ReadOptions watched(fusion::ReadOptions options, ProgressLine& line);
 
 /// Reads a scene, with the temperatures of a second file where one is given, and surveys it.
 fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,

@@ -6,13 +6,18 @@
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 
 int run_demo_scene(const DemoSceneFileOptions& options) {
   const Interruption interruption;
-  const auto mesh = fusion::demo_scene({options.vertex_count, options.seed});
-  const auto written = fusion::write_ply(options.output, mesh, mesh.visible(), "up " + std::string(to_string(mesh.up)));
+  ProgressLine line({{fusion::kModellingPhase, "modelling the demo scene", 14},
+                     {fusion::kWritingPhase, "writing " + options.output.filename().string(), 1}});
+  const auto mesh = fusion::demo_scene({options.vertex_count, options.seed}, line.sink());
+  const auto written =
+      fusion::write_ply(options.output, mesh, mesh.visible(), "up " + std::string(to_string(mesh.up)), line.sink());
+  line.end();
   return written ? kDone : fail(written.error());
 }
 

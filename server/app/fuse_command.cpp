@@ -10,6 +10,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
 #include "server/app/interruption.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 namespace {
@@ -19,34 +20,48 @@ struct FusedFacts {
   bool has_temperature = false;
 };
 
+ProgressStage writing(const FuseOptions& options, double weight) {
+  return {fusion::kWritingPhase, "writing " + options.output.filename().string(), weight};
+}
+
 /// PLY to PLY, in constant memory whatever the size of the scene.
 fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fusion::FusionSettings& settings) {
-  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings, options.read));
+  ProgressLine line({{fusion::kReadingPhase, "reading " + options.input.filename().string(), 1},
+                     {fusion::kHistogramPhase, "counting temperatures and hues", 0.5},
+                     {fusion::kFusingPhase, "fusing to " + options.output.filename().string(), 2}});
+  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings, watched(options.read, line)));
   return FusedFacts{std::move(fused.notes), fused.temperature.has_temperature()};
 }
 
-/// To a GLB, or with a second file of temperatures.
+/// To a file that needs no lattice.
 fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
                                            const SceneFileOptions& file) {
-  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, options.read));
+  ProgressLine line(with_loading(options.input, options.thermal, {writing(options, 8)}));
+  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
   const auto temperature = temperature_of(loaded.mesh);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
-  BOOST_OUTCOME_TRYV(write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), file));
+  BOOST_OUTCOME_TRYV(
+      write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), file, line.sink()));
   return FusedFacts{std::move(loaded.notes), temperature.summary.has_temperature()};
 }
 
-/// To a Draco file, on the lattice of the scene.
+/// To a Draco file on the lattice of the scene.
 fusion::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
                                             SceneFileOptions file) {
-  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, options.read));
+  ProgressLine line(
+      with_loading(options.input, options.thermal, {{kTilingPhase, "cutting into tiles", 10}, writing(options, 20)}));
+  BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
+  auto notes = loaded.notes;
   WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
-  const auto scene = SceneSnapshot::build(std::move(loaded.mesh), 1, pool);
+  const auto scene =
+      SceneSnapshot::build(std::move(loaded), 1, pool, kLeafVertexCount, LevelsOfDetail::LeavesOnly, line.sink());
   file.position_step_m = file_position_step_m(*scene);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene->temperature()));
   const auto mesh = scene->whole_mesh();
-  BOOST_OUTCOME_TRY(const auto losses, write_scene_file(options.output, mesh, fused_colours(mesh, plan), file));
-  loaded.notes.insert(loaded.notes.end(), losses.begin(), losses.end());
-  return FusedFacts{std::move(loaded.notes), scene->temperature().summary.has_temperature()};
+  BOOST_OUTCOME_TRY(const auto losses,
+                    write_scene_file(options.output, mesh, fused_colours(mesh, plan), file, line.sink()));
+  notes.insert(notes.end(), losses.begin(), losses.end());
+  return FusedFacts{std::move(notes), scene->temperature().summary.has_temperature()};
 }
 
 fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::FusionSettings& settings,
@@ -54,7 +69,8 @@ fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::Fusio
   SceneFileOptions file;
   file.format = format;
   file.keeping = options.keeping;
-  if (format == SceneFileFormat::Draco) return fused_on_lattice(options, settings, file);
+  const bool is_lossless = format != SceneFileFormat::Draco || file.keeping == protocol::DracoKeeping::Everything;
+  if (!is_lossless) return fused_on_lattice(options, settings, file);
   if (format == SceneFileFormat::Ply && !options.thermal) return fused_in_blocks(options, settings);
   return fused_in_memory(options, settings, file);
 }

@@ -136,13 +136,16 @@ fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std:
 fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
                                                            const fusion::MultispectralMesh& mesh,
                                                            std::span<const fusion::Rgb8> colours,
-                                                           const SceneFileOptions& options) {
+                                                           const SceneFileOptions& options,
+                                                           const fusion::Progress& progress) {
   if (options.format == SceneFileFormat::Ply) {
-    BOOST_OUTCOME_TRYV(fusion::write_ply(path, mesh, colours));
+    BOOST_OUTCOME_TRYV(fusion::write_ply(path, mesh, colours, {}, progress));
     return std::vector<fusion::Note>{};
   }
+  fusion::report(progress, fusion::kWritingPhase, 0);
   BOOST_OUTCOME_TRY(auto output, fusion::OutputFile::create(path));
   BOOST_OUTCOME_TRY(auto file, scene_file(mesh, colours, options));
+  fusion::report(progress, fusion::kWritingPhase, 0.9);
   BOOST_OUTCOME_TRYV(output.write(std::as_bytes(std::span(file.bytes))));
   BOOST_OUTCOME_TRYV(output.commit());
   return std::move(file.losses);

@@ -11,6 +11,7 @@
 #include "fusion/fusion_plan.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/progress.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
 #include "protocol/draco_file.hpp"
@@ -52,11 +53,12 @@ struct SceneFile {
 fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
                                      const SceneFileOptions& options);
 
-/// The same into a file that appears whole or not at all; returns the losses.
+/// The same into a file that appears whole or not at all; returns the losses. `progress` is told of kWritingPhase.
 fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
                                                            const fusion::MultispectralMesh& mesh,
                                                            std::span<const fusion::Rgb8> colours,
-                                                           const SceneFileOptions& options);
+                                                           const SceneFileOptions& options,
+                                                           const fusion::Progress& progress = {});
 
 /// The position step that a Draco file of a scene has: the one that the scene is streamed with.
 float file_position_step_m(const SceneSnapshot& scene);

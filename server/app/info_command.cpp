@@ -12,6 +12,7 @@
 #include "server/app/fused_file.hpp"
 #include "server/app/fusion_messages.hpp"
 #include "server/app/interruption.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 namespace {
@@ -111,12 +112,15 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
 
 int run_info(const InfoOptions& options) {
   const Interruption interruption;
-  const auto loaded = load_scene(options.input, options.thermal, options.read);
+  ProgressLine line(
+      with_loading(options.input, options.thermal, {{fusion::kTopologyPhase, "examining the topology", 12}}));
+  const auto loaded = load_scene(options.input, options.thermal, watched(options.read, line));
   if (!loaded) return fail(loaded.error());
   const auto& mesh = loaded.value().mesh;
   const auto temperature = temperature_of(mesh).summary;
   const auto bounds = bounds_of(mesh.positions());
-  const auto topology = fusion::topology_facts(mesh);
+  const auto topology = fusion::topology_facts(mesh, line.sink());
+  line.end();
   if (options.as_json) {
     const auto json = info_json(loaded.value(), temperature, bounds, topology);
     fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "fusion/mesh/output_file.hpp"
+#include "server/app/progress_line.hpp"
 
 namespace spectra::server {
 namespace {
@@ -48,6 +49,7 @@ void Interruption::wait() {
   while (!is_over_) {
     if (sigwait(&signals_, &signal) != 0 || signal == kWakeUp) continue;
     fusion::OutputFile::abandon_all();
+    ProgressLine::make_way(true);
     end_by(signal);
   }
 }

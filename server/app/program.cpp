@@ -8,6 +8,7 @@
 #include "fusion/mesh/demo_scene.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
+#include "server/app/progress_line.hpp"
 #include "server/app/version.hpp"
 
 namespace spectra::server {
@@ -150,6 +151,10 @@ int parse_and_run(int argc, const char* const* argv) {
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);
   add_tradeoff(app, tradeoff, run);
+  bool is_quiet = false;
+  constexpr auto* kQuietHelp = "No progress on the terminal";
+  app.add_flag("--quiet", is_quiet, kQuietHelp);
+  for (auto* command : app.get_subcommands({})) command->add_flag("--quiet", is_quiet, kQuietHelp);
   // CLI11 would say that a command is missing, but not which word it did not know.
   const auto is_first_word = [argc, argv](const CLI::App* command) {
     return argc > 1 && command->get_name() == argv[1];
@@ -165,6 +170,7 @@ int parse_and_run(int argc, const char* const* argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return fail(kWrongUsage, std::string(error.what()) + " (see: spectra --help)");
   }
+  if (is_quiet) ProgressLine::keep_quiet();
   return run();
 }
 

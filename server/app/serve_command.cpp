@@ -16,6 +16,7 @@
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/http_api.hpp"
+#include "server/app/progress_line.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/app/viewer_session.hpp"
 #include "server/net/http_server.hpp"
@@ -37,6 +38,15 @@ fs::path web_root(const ServeOptions& options) {
   }
   return fs::path(SPECTRA_WEB_DIST);
 }
+
+/// Standard error, where the line of progress makes way.
+class LogSink final : public spdlog::sinks::stderr_color_sink_mt {
+ public:
+  void log(const spdlog::details::log_msg& message) override {
+    ProgressLine::make_way();
+    spdlog::sinks::stderr_color_sink_mt::log(message);
+  }
+};
 
 /// Every viewer needs a descriptor, and the usual limit of 1024 is only a default.
 void raise_descriptor_limit() {
@@ -74,18 +84,24 @@ class SceneLoader {
     const std::string name = options.scene ? options.scene->filename().string() : "the demo scene";
     served.progress.set("Reading " + name);
     fusion::LoadedScene loaded;
+    std::vector<ProgressStage> tiling{{kTilingPhase, "cutting " + name + " into tiles", 10}};
+    ProgressLine line(options.scene
+                          ? with_loading(*options.scene, options.thermal, tiling)
+                          : std::vector<ProgressStage>{{fusion::kModellingPhase, "modelling " + name, 10}, tiling[0]});
     if (options.scene) {
-      auto read = load_scene(*options.scene, options.thermal, options.read);
+      auto read = load_scene(*options.scene, options.thermal, watched(options.read, line));
       if (!read) throw std::runtime_error(read.error().message);
       loaded = std::move(read).value();
     } else {
-      loaded.mesh = fusion::demo_scene({});
+      loaded.mesh = fusion::demo_scene({}, line.sink());
     }
     print_notes(loaded.notes);
     served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
                         " vertices)");
-    const auto scene = served.scenes.replace(std::move(loaded), served.pool, LevelsOfDetail::All,
-                                             [&served](const auto& next) { encode_first_picture(next, served.cache); });
+    const auto scene = served.scenes.replace(
+        std::move(loaded), served.pool, LevelsOfDetail::All,
+        [&served](const auto& next) { encode_first_picture(next, served.cache); }, line.sink());
+    line.end();
     served.progress.set(std::nullopt);
     spdlog::info("serving {}: {} vertices, {} triangles, {} tiles", scene->name(), scene->vertex_count(),
                  scene->triangle_count(), scene->tiles().size());
@@ -99,7 +115,7 @@ class SceneLoader {
 }  // namespace
 
 int run_serve(const ServeOptions& options) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("spectra"));
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("spectra", std::make_shared<LogSink>()));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
   const auto listen = parsed_listen_address(options.listen);
   if (!listen) {
@@ -142,6 +158,7 @@ int run_serve(const ServeOptions& options) {
   server->run();
   if (!loader.is_done()) {
     // Reading cannot be interrupted, and nothing of it needs to be put in order.
+    ProgressLine::make_way(true);
     spdlog::default_logger()->flush();
     std::_Exit(kDone);
   }

@@ -9,6 +9,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/fused_file.hpp"
 #include "server/app/interruption.hpp"
+#include "server/app/progress_line.hpp"
 #include "server/tradeoff/measure.hpp"
 #include "server/tradeoff/report.hpp"
 
@@ -16,15 +17,18 @@ namespace spectra::server {
 
 int run_tradeoff(const TradeoffCommandOptions& options) {
   const Interruption interruption;
-  auto loaded = load_scene(options.input, options.thermal, options.read);
+  ProgressLine line(with_loading(options.input, options.thermal,
+                                 {{kTilingPhase, "cutting into tiles", 4}, {kMeasuringPhase, "measuring", 200}}));
+  auto loaded = load_scene(options.input, options.thermal, watched(options.read, line));
   if (!loaded) return fail(loaded.error());
   print_notes(loaded.value().notes);
   WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
-  const auto scene = SceneSnapshot::build(std::move(loaded.value()), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
-  const auto progress = [](const std::string& step) { fmt::print(stderr, "{}\n", step); };
+  const auto scene =
+      SceneSnapshot::build(std::move(loaded.value()), 1, pool, kLeafVertexCount, LevelsOfDetail::All, line.sink());
   TradeoffOptions measured;
   if (!options.palette.empty()) measured.palette = options.palette;
-  const auto measurement = measured_tradeoff(*scene, measured, progress);
+  const auto measurement = measured_tradeoff(*scene, measured, line.sink());
+  line.end();
   if (!measurement) return fail(measurement.error());
   const auto recommended = recommended_points(measurement.value(), {1, 5, 20, 100});
   const auto written = write_report(options.folder, measurement.value(), recommended);

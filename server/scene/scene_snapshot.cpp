@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <list>
@@ -187,10 +188,15 @@ class FreedMemoryGoesBack {
   }
 };
 
+/// About what share of the making is done with the leaves; and of that, when they are cut and when the steps are known.
+constexpr double kLeavesShare = 0.25;
+constexpr double kCutShare = 0.6;
+constexpr double kStepsShare = 0.9;
+
 class TiledSnapshot final : public SceneSnapshot {
  public:
   TiledSnapshot(fusion::LoadedScene scene, std::uint32_t revision, WorkerPool& pool, std::uint32_t leaf_vertex_count,
-                LevelsOfDetail levels)
+                LevelsOfDetail levels, const fusion::Progress& progress)
       : name_(scene.mesh.name),
         revision_(revision),
         vertex_count_(scene.mesh.vertex_count()),
@@ -204,18 +210,28 @@ class TiledSnapshot final : public SceneSnapshot {
         up_(scene.mesh.up),
         notes_(std::move(scene.notes)) {
     std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
+    const double leaves_share = levels == LevelsOfDetail::All ? kLeavesShare : 1;
+    fusion::report(progress, kTilingPhase, leaves_share * kCutShare);
     const PositionSteps position_steps(leaves, pool);
+    fusion::report(progress, kTilingPhase, leaves_share * kStepsShare);
     position_step_m_ = position_steps.largest_step_m();
     pool.for_each(leaves.size(), [&](std::size_t i) { position_steps.apply(*leaves[i]); });
     std::vector<LeafFacts> facts(leaves.size());
-    pool.for_each(leaves.size(), [&](std::size_t i) { facts[i] = leaf_facts(*leaves[i]); });
+    std::atomic<std::size_t> done_count{0};
+    pool.for_each(leaves.size(), [&](std::size_t i) {
+      facts[i] = leaf_facts(*leaves[i]);
+      const double done_share = static_cast<double>(++done_count) / static_cast<double>(leaves.size());
+      fusion::report(progress, kTilingPhase, leaves_share * (kStepsShare + (1 - kStepsShare) * done_share));
+    });
     leaves_.assign(leaves.begin(), leaves.end());
     gather(std::move(facts));
     core_bounds_ = scene.core_bounds.value_or(bounds_);
     if (levels == LevelsOfDetail::All) {
       const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius(),
                                 &position_steps};
-      tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool);
+      tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool, [&](double made_share) {
+        fusion::report(progress, kTilingPhase, leaves_share + (1 - leaves_share) * made_share);
+      });
     } else {
       tiles_ = leaves_;
     }
@@ -395,9 +411,10 @@ class TiledSnapshot final : public SceneSnapshot {
 
 std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::LoadedScene scene, std::uint32_t revision,
                                                           WorkerPool& pool, std::uint32_t leaf_vertex_count,
-                                                          LevelsOfDetail levels) {
+                                                          LevelsOfDetail levels, const fusion::Progress& progress) {
+  fusion::report(progress, kTilingPhase, 0);
   const FreedMemoryGoesBack scope;
-  return std::make_shared<TiledSnapshot>(std::move(scene), revision, pool, leaf_vertex_count, levels);
+  return std::make_shared<TiledSnapshot>(std::move(scene), revision, pool, leaf_vertex_count, levels, progress);
 }
 
 }  // namespace spectra::server

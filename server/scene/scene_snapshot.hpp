@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "fusion/mesh/bounds.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/progress.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
 #include "protocol/tile_frame.hpp"
@@ -64,6 +66,9 @@ struct Extreme {
 /// About how many vertices a leaf has unless said otherwise.
 inline constexpr std::uint32_t kLeafVertexCount = 32'000;
 
+/// What a snapshot tells of its making.
+inline constexpr std::string_view kTilingPhase = "tiling";
+
 /// Which tiles a snapshot has.
 enum class LevelsOfDetail {
   LeavesOnly,  ///< The full mesh alone.
@@ -76,10 +81,11 @@ class SceneSnapshot {
  public:
   /// Cuts the mesh into octree leaves of about `leaf_vertex_count` vertices (small ones merged with a neighbour).
   /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
-  /// for any number of threads. Must not be called from a job of the pool.
+  /// for any number of threads. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
   static std::shared_ptr<const SceneSnapshot> build(fusion::LoadedScene scene, std::uint32_t revision, WorkerPool& pool,
                                                     std::uint32_t leaf_vertex_count = kLeafVertexCount,
-                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly);
+                                                    LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
+                                                    const fusion::Progress& progress = {});
   /// The same for a mesh of which nothing has to be said.
   static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
                                                     WorkerPool& pool,

@@ -10,11 +10,12 @@ std::shared_ptr<const SceneSnapshot> SceneStore::current() const {
 }
 
 std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene scene, WorkerPool& pool,
-                                                         LevelsOfDetail levels, const Listener& before) {
+                                                         LevelsOfDetail levels, const Listener& before,
+                                                         const fusion::Progress& progress) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   const std::uint32_t revision = previous ? previous->revision() + 1 : 1;
-  const auto snapshot = SceneSnapshot::build(std::move(scene), revision, pool, kLeafVertexCount, levels);
+  const auto snapshot = SceneSnapshot::build(std::move(scene), revision, pool, kLeafVertexCount, levels, progress);
   if (before) before(snapshot);
   std::vector<std::shared_ptr<Listener>> listeners;
   {

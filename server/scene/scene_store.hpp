@@ -33,10 +33,10 @@ class SceneStore {
 
   /// Builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
   /// from several threads are served one after the other, so that revisions only rise. Must not be called from a job of
-  /// the pool or from a listener. `before` is called with the snapshot before it becomes current.
+  /// the pool or from a listener. `before` is called with the snapshot before it becomes current, `progress` as by build().
   std::shared_ptr<const SceneSnapshot> replace(fusion::LoadedScene scene, WorkerPool& pool,
                                                LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
-                                               const Listener& before = {});
+                                               const Listener& before = {}, const fusion::Progress& progress = {});
   /// The same for a mesh of which nothing has to be said.
   std::shared_ptr<const SceneSnapshot> replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
                                                LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -486,7 +488,13 @@ void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
 }  // namespace
 
 std::vector<std::shared_ptr<const Tile>> tile_tree(std::vector<std::shared_ptr<Tile>> leaves, bool is_point_cloud,
-                                                   const TreeOptions& options, WorkerPool& pool) {
+                                                   const TreeOptions& options, WorkerPool& pool,
+                                                   const std::function<void(double)>& made_share) {
+  std::set<TileId> wanted;
+  for (const auto& leaf : leaves) {
+    for (TileId id = leaf->id; id.level > 0 && wanted.insert(parent_of(id)).second;) id = parent_of(id);
+  }
+  std::atomic<std::size_t> made_count{0};
   std::map<TileId, Node> nodes;
   std::vector<Node*> leaf_nodes;
   int deepest = 0;
@@ -509,7 +517,10 @@ std::vector<std::shared_ptr<const Tile>> tile_tree(std::vector<std::shared_ptr<T
       }
       parent.children.push_back(&node);
     }
-    pool.for_each(parents.size(), [&](std::size_t i) { make_parent(*parents[i], is_point_cloud, options); });
+    pool.for_each(parents.size(), [&](std::size_t i) {
+      make_parent(*parents[i], is_point_cloud, options);
+      if (made_share) made_share(static_cast<double>(++made_count) / static_cast<double>(wanted.size()));
+    });
   }
   std::vector<std::shared_ptr<const Tile>> tiles;
   tiles.reserve(nodes.size());

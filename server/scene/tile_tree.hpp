@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -30,8 +31,10 @@ struct TreeOptions {
 /// parent are chosen so that no point of its children is far from one.
 ///
 /// geometric_error_m bounds the distance between tile and full mesh, both ways: the largest one measured against the
-/// children, with a margin, on top of the children's own. The same tiles for any number of threads.
+/// children, with a margin, on top of the children's own. The same tiles for any number of threads. `made_share` is told from
+/// any thread what share of the tiles above the leaves is made.
 std::vector<std::shared_ptr<const Tile>> tile_tree(std::vector<std::shared_ptr<Tile>> leaves, bool is_point_cloud,
-                                                   const TreeOptions& options, WorkerPool& pool);
+                                                   const TreeOptions& options, WorkerPool& pool,
+                                                   const std::function<void(double)>& made_share = {});
 
 }  // namespace spectra::server

@@ -35,10 +35,16 @@ Tiles tiles_at_level(const SceneSnapshot& scene, int level) {
   return chosen;
 }
 
+std::uint64_t vertex_count_of(const Tiles& tiles) {
+  std::uint64_t count = 0;
+  for (const auto& tile : tiles) count += tile->positions.size();
+  return count;
+}
+
 }  // namespace
 
 fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,
-                                                      const std::function<void(const std::string&)>& progress) {
+                                                      const fusion::Progress& progress) {
   BOOST_OUTCOME_TRY(const auto samples, ErrorSamples::take(scene, options.sample_count, options.palette));
   const float suggested_m = scene.suggested_position_step_m();
   TradeoffMeasurement result{scene.name(),
@@ -51,15 +57,23 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
   const auto append = [](auto& all, auto more) {
     all.insert(all.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
   };
-  for (const int level : drawn_levels(scene)) {
+  const std::vector<int> levels = drawn_levels(scene);
+  double whole = 0;
+  for (const int level : levels) whole += static_cast<double>(vertex_count_of(tiles_at_level(scene, level)));
+  double done = 0;
+  for (const int level : levels) {
     const Tiles tiles = tiles_at_level(scene, level);
     GeometryPoint base;
     base.level = level;
-    for (const auto& tile : tiles) base.vertex_count += tile->positions.size();
+    base.vertex_count = vertex_count_of(tiles);
+    // The colours take about as long as a position step.
+    const double step_share =
+        static_cast<double>(base.vertex_count) / whole / static_cast<double>(options.step_factors.size() + 1);
     for (const double factor : options.step_factors) {
       const float step_m = position_step_in_force(lattice_step(factor * static_cast<double>(suggested_m)), suggested_m);
       base.position_step_mm = 1000 * static_cast<double>(step_m);
-      progress("level " + std::to_string(level) + ", position step " + std::to_string(base.position_step_mm) + " mm");
+      fusion::report(progress, kMeasuringPhase, done);
+      done += step_share;
       BOOST_OUTCOME_TRY(const PositionError error, samples.position_error(tiles, step_m));
       base.error_rms_mm = error.rms_mm;
       base.error_worst_mm = error.worst_mm;
@@ -67,7 +81,8 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
       append(result.geometry, std::move(points));
     }
 
-    progress("level " + std::to_string(level) + ", colours");
+    fusion::report(progress, kMeasuringPhase, done);
+    done += step_share;
     std::vector<ColourPoint> bases;
     const auto errors = samples.colour_errors(tiles, options.colour_bits);
     for (std::size_t i = 0; i < errors.size(); ++i) {

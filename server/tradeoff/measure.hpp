@@ -1,13 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "fusion/error.hpp"
+#include "fusion/progress.hpp"
 #include "server/scene/scene_snapshot.hpp"
 
 namespace spectra::server {
@@ -65,9 +65,11 @@ struct TradeoffMeasurement {
   std::vector<ColourPoint> colours;
 };
 
-/// Measures on one thread, as one core of the server would work; progress goes to `progress` (one line a step).
+/// Measures on one thread, as one core of the server would work; `progress` is told of kMeasuringPhase.
 fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,
-                                                      const std::function<void(const std::string&)>& progress);
+                                                      const fusion::Progress& progress = {});
+
+inline constexpr std::string_view kMeasuringPhase = "measuring";
 
 /// One knob setting that a link of some rate deserves.
 struct Recommendation {

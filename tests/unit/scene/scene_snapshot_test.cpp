@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <mutex>
 #include <random>
 #include <set>
 #include <thread>
@@ -138,6 +139,25 @@ MultispectralMesh points(const std::vector<Vec3f>& positions) {
 TEST(SceneSnapshot, LeavesOfATerrainAreExact) {
   expect_all(testing::terrain({}));
   expect_all(testing::terrain({.columns = 1000, .rows = 7, .seed = 2}));
+}
+
+TEST(SceneSnapshot, TellsHowFarItsMakingIs) {
+  for (const auto levels : {LevelsOfDetail::LeavesOnly, LevelsOfDetail::All}) {
+    std::vector<double> shares;
+    std::mutex mutex;
+    const auto progress = [&](std::string_view phase, double share) {
+      EXPECT_EQ(phase, kTilingPhase);
+      const std::lock_guard lock(mutex);
+      shares.push_back(share);
+    };
+    WorkerPool pool(2);
+    fusion::LoadedScene scene;
+    scene.mesh = testing::terrain({});
+    SceneSnapshot::build(std::move(scene), 1, pool, kLeafSize, levels, progress);
+    ASSERT_GT(shares.size(), 5U);
+    EXPECT_EQ(shares.front(), 0);
+    EXPECT_DOUBLE_EQ(*std::max_element(shares.begin(), shares.end()), 1);
+  }
 }
 
 TEST(SceneSnapshot, OwnsVerticesOfNoTriangle) {

@@ -44,10 +44,15 @@ class Tradeoff : public testing::Test {
     options.sample_count = 500;
     options.encoder_speeds = {0, 10};
     options.step_factors = {0.5, 4};
-    measurement_ = new TradeoffMeasurement(measured_tradeoff(*scene, options, [](const std::string&) {}).value());
+    const auto progress = [](std::string_view phase, double share) {
+      EXPECT_EQ(phase, kMeasuringPhase);
+      shares_.push_back(share);
+    };
+    measurement_ = new TradeoffMeasurement(measured_tradeoff(*scene, options, progress).value());
   }
   static void TearDownTestSuite() { delete measurement_; }
   static TradeoffMeasurement* measurement_;
+  static std::vector<double> shares_;
 
   static int full_level() {
     int level = 0;
@@ -56,6 +61,15 @@ class Tradeoff : public testing::Test {
   }
 };
 TradeoffMeasurement* Tradeoff::measurement_ = nullptr;
+std::vector<double> Tradeoff::shares_;
+
+TEST_F(Tradeoff, TellsHowFarItIs) {
+  EXPECT_TRUE(std::is_sorted(shares_.begin(), shares_.end()));
+  ASSERT_GE(shares_.size(), 3U);
+  EXPECT_EQ(shares_.front(), 0);
+  EXPECT_LT(shares_.back(), 1);
+  EXPECT_GT(shares_.back(), 0.4);
+}
 
 TEST_F(Tradeoff, FullDetailIsWithinHalfAStepPerAxis) {
   int seen = 0;
