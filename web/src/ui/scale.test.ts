@@ -13,6 +13,10 @@ describe('sharesBeyond', () => {
     expect(sharesBeyond(histogram, 50, 60)).toEqual({ below: 1, above: 0 });
     expect(sharesBeyond(histogram, -9, -5)).toEqual({ below: 0, above: 1 });
   });
+  it('counts nobody in the sliver between an end and the hottest', () => {
+    const room = { edges: [18, 20, 31], counts: [16, 8] };
+    expect(sharesBeyond(room, 18.002, 30.99)).toEqual({ below: 0, above: 0 });
+  });
   it('knows a scene of one temperature, and one of none', () => {
     const one = { edges: [20, 20, 20], counts: [7, 0] };
     expect(sharesBeyond(one, 20, 20)).toEqual({ below: 0, above: 0 });

@@ -78,8 +78,9 @@ export function sharesBeyond(
     // In a scene of one temperature the bin has no width: it is inside where its value is.
     const part = (end: number) => (to > from ? Math.min(1, Math.max(0, (end - from) / (to - from))) : end > from ? 1 : 0);
     all += count;
-    below += count * part(lo);
-    above += count * (1 - (to > from ? part(hi) : hi >= from ? 1 : 0));
+    // Whole vertices: a sliver of a bin that an end cuts is nobody.
+    below += Math.floor(count * part(lo));
+    above += Math.floor(count * (1 - (to > from ? part(hi) : hi >= from ? 1 : 0)));
   });
   return all > 0 ? { below: below / all, above: above / all } : { below: 0, above: 0 };
 }
