@@ -1,10 +1,11 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vitest/config';
+import { precompressed } from './scripts/precompressed';
 
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [svelte()],
+  plugins: [svelte(), precompressed()],
   base: './',
   build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0 },
   worker: { format: 'es' },

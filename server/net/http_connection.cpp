@@ -44,6 +44,17 @@ std::size_t count_of(const http::fields& fields, http::field name) {
   return static_cast<std::size_t>(std::distance(begin, end));
 }
 
+/// The values of a header, which may be there several times.
+std::string joined(const http::fields& fields, http::field name) {
+  std::string all;
+  const auto [begin, end] = fields.equal_range(name);
+  for (auto it = begin; it != end; ++it) {
+    if (it != begin) all += ',';
+    all += view(it->value());
+  }
+  return all;
+}
+
 /// Where a handler leaves its answer; outlives both the connection and the handler.
 struct PendingReply {
   explicit PendingReply(const asio::any_io_executor& executor)
@@ -144,7 +155,8 @@ asio::awaitable<bool> HttpConnection::serve_one() {
     co_return false;
   }
 
-  const HttpRequest checked{std::move(target), std::string(view(request[http::field::if_none_match]))};
+  const HttpRequest checked{std::move(target), joined(request, http::field::if_none_match),
+                            joined(request, http::field::accept_encoding)};
   const HttpReply reply = co_await answer(checked);
   co_return co_await write(reply, request.version(), is_head, request.keep_alive() && !is_stopping_);
 }
@@ -193,15 +205,19 @@ HttpReply HttpConnection::static_reply(const HttpRequest& request) const {
     if (path == "/") return text_reply(200, std::string(kNoWebClient), "text/html; charset=utf-8");
     return text_reply(404, "not found\n");
   }
-  HttpReply reply;
-  reply.headers = {{"ETag", file->etag},
-                   {"Cache-Control", file->immutable ? "public, max-age=31536000, immutable" : "no-cache"}};
-  if (request.if_none_match == file->etag) {
+  const StaticVersion* const version = file->version_for(request.accept_encoding);
+  HttpReply reply = version ? HttpReply{} : text_reply(406, "there is no version in such a content coding\n");
+  if (file->versions.size() > 1) reply.headers.emplace_back("Vary", "Accept-Encoding");
+  if (!version) return reply;
+  reply.headers.emplace_back("ETag", version->etag);
+  reply.headers.emplace_back("Cache-Control", file->immutable ? "public, max-age=31536000, immutable" : "no-cache");
+  if (names_etag(request.if_none_match, version->etag)) {
     reply.status = 304;
     return reply;
   }
+  if (!version->coding.empty()) reply.headers.emplace_back("Content-Encoding", version->coding);
   reply.content_type = file->content_type;
-  reply.body = std::shared_ptr<const std::string>(file, &file->content);
+  reply.body = std::shared_ptr<const std::string>(file, &version->content);
   return reply;
 }
 

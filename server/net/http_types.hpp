@@ -13,7 +13,8 @@ namespace spectra::server {
 /// A GET or HEAD request that has passed every check of the network side.
 struct HttpRequest {
   RequestTarget target;
-  std::string if_none_match;  ///< Empty when absent.
+  std::string if_none_match = {};    ///< Empty when absent.
+  std::string accept_encoding = {};  ///< All of them, joined by commas; empty when absent.
 };
 
 /// An answer; the network side adds length, date and the security headers, and leaves the body away for HEAD.

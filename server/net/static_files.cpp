@@ -2,10 +2,15 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
+#include <boost/beast/core/string.hpp>
+#include <charconv>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 namespace spectra::server {
@@ -37,19 +42,116 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 17> kContent
     {".txt", "text/plain; charset=utf-8"},
 }};
 
-std::shared_ptr<const StaticFile> read_file(const fs::path& path, const std::string& name) {
+constexpr std::string_view kAssets = "/assets/";
+
+/// Names of content codings and the ends of the files' names.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kCodings{{{"br", ".br"}, {"gzip", ".gz"}}};
+
+/// How well "identity" is liked by who does not speak of it: less than what is named.
+constexpr double kUnnamedIdentity = 1e-6;
+
+std::optional<StaticVersion> read_version(const fs::path& path, std::string_view coding) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) return nullptr;
+  if (!in) return std::nullopt;
+  StaticVersion version;
+  version.coding = coding;
+  version.content.assign(std::istreambuf_iterator<char>(in), {});
+  version.etag = '"' + std::to_string(version.content.size()) + '-' +
+                 std::to_string(std::hash<std::string>{}(version.content)) + '"';
+  return version;
+}
+
+/// Whether a file is another one in a content coding.
+bool is_coded(const fs::path& path, std::string_view name) {
+  return name.starts_with(kAssets) && std::any_of(kCodings.begin(), kCodings.end(), [&](const auto& coding) {
+           return name.ends_with(coding.second) && fs::exists(fs::path(path).replace_extension());
+         });
+}
+
+std::shared_ptr<const StaticFile> read_file(const fs::path& path, const std::string& name) {
+  auto plain = read_version(path, {});
+  if (!plain) return nullptr;
   auto file = std::make_shared<StaticFile>();
-  file->content.assign(std::istreambuf_iterator<char>(in), {});
   file->content_type = content_type_of(name);
-  file->etag =
-      '"' + std::to_string(file->content.size()) + '-' + std::to_string(std::hash<std::string>{}(file->content)) + '"';
-  file->immutable = name.starts_with("/assets/");
+  file->immutable = name.starts_with(kAssets);
+  file->versions.push_back(std::move(*plain));
+  // Only these names change with the content, so that a version cannot be one of an older file.
+  for (const auto& [coding, ending] : kCodings) {
+    if (!file->immutable) break;
+    if (auto version = read_version(path.string() + std::string(ending), coding)) {
+      file->versions.push_back(std::move(*version));
+    }
+  }
+  std::stable_sort(file->versions.begin(), file->versions.end(),
+                   [](const auto& a, const auto& b) { return a.content.size() < b.content.size(); });
   return file;
 }
 
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const auto begin = text.find_first_not_of(kBlank);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
+/// What stands before the first `separator`, which is cut off with it.
+std::string_view cut_part(std::string_view& text, char separator) {
+  const auto end = text.find(separator);
+  const std::string_view part = trimmed(text.substr(0, end));
+  text = end == std::string_view::npos ? std::string_view() : text.substr(end + 1);
+  return part;
+}
+
+/// A weight, such as "0.5"; what is none weighs nothing.
+double quality(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_weight = error == std::errc() && end == text.data() + text.size() && value >= 0 && value <= 1;
+  return is_weight ? value : 0;
+}
+
+bool same_word(std::string_view a, std::string_view b) {
+  return boost::beast::iequals({a.data(), a.size()}, {b.data(), b.size()});
+}
+
 }  // namespace
+
+double liking(std::string_view accept_encoding, std::string_view coding) {
+  std::optional<double> of_others;
+  while (!accept_encoding.empty()) {
+    std::string_view entry = cut_part(accept_encoding, ',');
+    const std::string_view name = cut_part(entry, ';');
+    double weight = 1;
+    while (!entry.empty()) {
+      std::string_view value = cut_part(entry, ';');
+      if (same_word(cut_part(value, '='), "q")) weight = quality(trimmed(value));
+    }
+    if (same_word(name, coding)) return weight;
+    if (name == "*") of_others = weight;
+  }
+  return of_others.value_or(coding == "identity" ? kUnnamedIdentity : 0);
+}
+
+bool names_etag(std::string_view if_none_match, std::string_view etag) {
+  while (!if_none_match.empty()) {
+    std::string_view tag = cut_part(if_none_match, ',');
+    if (tag.starts_with("W/")) tag.remove_prefix(2);
+    if (tag == etag || tag == "*") return true;
+  }
+  return false;
+}
+
+const StaticVersion* StaticFile::version_for(std::string_view accept_encoding) const {
+  const StaticVersion* best = nullptr;
+  double best_liking = 0;
+  for (const StaticVersion& version : versions) {
+    const double its_liking = liking(accept_encoding, version.coding.empty() ? "identity" : version.coding);
+    if (its_liking <= best_liking) continue;
+    best = &version;
+    best_liking = its_liking;
+  }
+  return best;
+}
 
 std::string_view content_type_of(std::string_view file_name) {
   for (const auto& [extension, type] : kContentTypes) {
@@ -78,6 +180,7 @@ void StaticFiles::load(bool even_if_unchanged) {
       break;
     }
     const std::string name = '/' + it->path().lexically_relative(root_).generic_string();
+    if (is_coded(it->path(), name)) continue;
     if (auto file = read_file(it->path(), name)) files.emplace(name, std::move(file));
   }
   if (error) {

@@ -93,6 +93,40 @@ TEST_F(HttpServerTest, HeadHasTheHeadersOfGetAndNoBody) {
   EXPECT_TRUE(response.ends_with("\r\n\r\n"));
 }
 
+TEST_F(HttpServerTest, ServesAnAssetInTheCodingThatIsAccepted) {
+  std::ofstream(web_ / "assets/app-1a2b3c.js.br") << "br()";
+  const auto ask = [&](const std::string& method, const std::string& headers) {
+    return http_exchange(server_->port(), method + " /assets/app-1a2b3c.js HTTP/1.1\r\nHost: localhost\r\n" + headers +
+                                              "Connection: close\r\n\r\n");
+  };
+  const auto coded = ask("GET", "Accept-Encoding: gzip\r\nAccept-Encoding: br\r\n");
+  EXPECT_EQ(status_of(coded), 200);
+  EXPECT_TRUE(coded.ends_with("\r\n\r\nbr()"));
+  for (const auto* header : {"Content-Encoding: br", "Vary: Accept-Encoding", "Content-Length: 4", "immutable",
+                             "Content-Type: text/javascript"}) {
+    EXPECT_NE(coded.find(header), std::string::npos) << header;
+  }
+  const auto plain = ask("GET", "Accept-Encoding: br;q=0\r\n");
+  EXPECT_TRUE(plain.ends_with("\r\n\r\nrun()"));
+  EXPECT_EQ(plain.find("Content-Encoding"), std::string::npos);
+  EXPECT_NE(plain.find("Vary: Accept-Encoding"), std::string::npos);
+  const auto tag_of = [](const std::string& reply) {
+    const auto begin = reply.find("ETag: ") + 6;
+    return reply.substr(begin, reply.find("\r\n", begin) - begin);
+  };
+  EXPECT_NE(tag_of(coded), tag_of(plain));
+
+  const auto head = ask("HEAD", "Accept-Encoding: br\r\n");
+  EXPECT_TRUE(head.ends_with("\r\n\r\n"));
+  EXPECT_NE(head.find("Content-Length: 4"), std::string::npos);
+  EXPECT_NE(head.find("Content-Encoding: br"), std::string::npos);
+  const auto same = ask("GET", "Accept-Encoding: br\r\nIf-None-Match: " + tag_of(coded) + "\r\n");
+  EXPECT_EQ(status_of(same), 304);
+  EXPECT_NE(same.find("Vary: Accept-Encoding"), std::string::npos);
+  EXPECT_EQ(status_of(ask("GET", "If-None-Match: " + tag_of(coded) + "\r\n")), 200) << "a tag of another version";
+  EXPECT_EQ(status_of(ask("GET", "Accept-Encoding: identity;q=0, gzip\r\n")), 406);
+}
+
 TEST_F(HttpServerTest, RefusesOtherMethods) {
   for (const auto* method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "CONNECT", "FROBNICATE"}) {
     const auto response = get("/", "localhost", method);

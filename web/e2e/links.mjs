@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 import { startLink } from './link.mjs';
+import { linkProxy } from '../../tests/integration/node/link_proxy.mjs';
 
 const GEOMETRY = 1;
 const COLOURS = [2, 6];
@@ -12,6 +13,9 @@ function sample(image) {
   for (let x = 200; x < 1100; x += 9) for (let y = 40; y < 860; y += 9) pixels.push(image.at(x, y).join());
   return pixels;
 }
+
+/** Of the client itself, everything up to the first picture, headers with it. */
+const LARGEST_CLIENT_BYTES = 400_000;
 
 const shownTiles = (page) => page.evaluate(() => globalThis.spectra.store.shown.tiles);
 
@@ -56,6 +60,34 @@ export function addLinkTests(browser) {
     assert.deepEqual(problems, []);
     await page.close();
     await link.stop();
+    await server.stop();
+  });
+
+  test('The client is small: over a thin link it leaves the line to the scene', async () => {
+    // 1 Mbit/s, 200 ms there and back. How long it takes is said, not judged: drawing without a GPU takes the larger part of it.
+    const server = await startServer(['--demo']);
+    const proxy = await linkProxy(server.url, { rate_bytes_per_s: 125_000, delay_ms: 100 });
+    const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
+    await context.addInitScript(() => {
+      const look = () => {
+        if (globalThis.spectra?.store.shown.tiles > 0) globalThis.firstPicture_ms = performance.now();
+        else requestAnimationFrame(look);
+      };
+      look();
+    });
+    const page = await context.newPage();
+    await page.goto(proxy.url);
+    await page.waitForFunction(() => globalThis.firstPicture_ms, null, { timeout: 120_000 });
+    const first_ms = await page.evaluate(() => globalThis.firstPicture_ms);
+    const sum = (wanted) => proxy.connections.filter(wanted).reduce((all, { received_bytes }) => all + received_bytes, 0);
+    const client_bytes = sum(({ path }) => path !== '/ws');
+    console.log(
+      `        first picture after ${Math.round(first_ms)} ms: client ${client_bytes} bytes, scene ${sum(({ path }) => path === '/ws')} bytes so far`,
+    );
+    assert.ok(client_bytes > 50_000, `${client_bytes} bytes are no client`);
+    assert.ok(client_bytes < LARGEST_CLIENT_BYTES, `the client takes ${client_bytes} bytes`);
+    await context.close();
+    await proxy.close();
     await server.stop();
   });
 

@@ -1,15 +1,18 @@
-// A radio link on loopback: a TCP proxy that gives each direction a rate, a delay, jitter, and stalls. Like a modem with a
-// bounded queue, it stops reading when its queue is full, so that the sender feels the link.
+// A radio link on loopback: a TCP proxy that gives each direction a rate (shared by all connections), a delay (which a new connection
+// has to bear for its handshake too), jitter, and stalls. Like a modem with a bounded queue, it stops reading when its queue is full, so
+// that the sender feels the link.
 import net from "node:net";
 
 /** One direction of one connection. */
 class Lane {
-  constructor(from, to, link) {
+  constructor(from, to, link, line, connection) {
     this.from = from;
     this.to = to;
     this.link = link;
+    this.line = line;
+    this.connection = connection;
+    this.openAt = performance.now() + 2 * link.delay_ms;
     this.queued_bytes = 0;
-    this.lineFreeAt = 0;
     this.lastDelivery = 0;
     from.on("data", (chunk) => this.#accept(chunk));
     from.on("end", () => this.#after(this.lastDelivery, () => to.end()));
@@ -29,15 +32,17 @@ class Lane {
     const { rate_bytes_per_s, delay_ms, jitter_ms, stalledUntil } = this.link;
     const now = performance.now();
     this.queued_bytes += packet.length;
-    this.lineFreeAt = Math.max(this.lineFreeAt, now, stalledUntil) + (packet.length / rate_bytes_per_s) * 1000;
-    const delivery = this.lineFreeAt + delay_ms + this.link.random() * jitter_ms;
+    const { line } = this;
+    line.freeAt = Math.max(line.freeAt, now, this.openAt, stalledUntil) + (packet.length / rate_bytes_per_s) * 1000;
+    const delivery = line.freeAt + delay_ms + this.link.random() * jitter_ms;
     this.lastDelivery = Math.max(this.lastDelivery, delivery);
-    this.#after(this.lineFreeAt, () => {
+    this.#after(line.freeAt, () => {
       this.queued_bytes -= packet.length;
       if (this.queued_bytes <= this.link.queue_bytes / 2) this.from.resume();
     });
     this.#after(this.lastDelivery, () => {
       this.link.delivered_bytes += packet.length;
+      if (this.connection) this.connection.received_bytes += packet.length;
       if (!this.to.destroyed) this.to.write(packet);
     });
   }
@@ -83,19 +88,26 @@ export async function linkProxy(target_url, { rate_bytes_per_s = Infinity, delay
   }, 1);
 
   const sockets = new Set();
+  const connections = [];
+  const lines = { up: { freeAt: 0 }, down: { freeAt: 0 } };
   const proxy = net.createServer({ noDelay: true }, (near) => {
     const far = net.connect({ host: target.hostname, port: Number(target.port), noDelay: true });
     for (const socket of [near, far]) {
       sockets.add(socket);
       socket.on("close", () => sockets.delete(socket));
     }
-    new Lane(near, far, link);
-    new Lane(far, near, link);
+    const connection = { path: "", received_bytes: 0 };
+    connections.push(connection);
+    near.once("data", (chunk) => (connection.path = chunk.toString("latin1").split(" ")[1]));
+    new Lane(near, far, link, lines.up);
+    new Lane(far, near, link, lines.down, connection);
   });
   await new Promise((resolve) => proxy.listen(0, "127.0.0.1", resolve));
   return {
     url: `http://127.0.0.1:${proxy.address().port}`,
     link,
+    /** Every connection so far: the path that it asked for first, and how much has come back. */
+    connections,
     /** Nothing passes for that long. */
     stall(duration_ms) {
       link.stalledUntil = performance.now() + duration_ms;
