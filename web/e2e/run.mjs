@@ -122,6 +122,28 @@ test('Visible and fused are one key away', async () => {
   assert.equal((await state()).fusion.method, 'histogram_distribution', 'the first view shows what is unusual');
 });
 
+test('What has no temperature is seen as such in the thermal view, and keeps its visible colour in fused ones', async () => {
+  await settled(page);
+  await page.keyboard.press('f');
+  await page.keyboard.press('1');
+  await settled(page);
+  const { fusion, scene, palette } = await state();
+  assert.ok(scene.temperature.missing_count > 0);
+  const wanted = [1, 3, 5].map((at) => parseInt(fusion.missing.slice(at, at + 2), 16));
+  const nearest = Math.min(...palette.colours.map((colour) => Math.hypot(...colour.map((level, i) => level - wanted[i]))));
+  assert.ok(nearest > 40, `${fusion.missing} is ${nearest} from the palette`);
+  const image = await screenshot(page, 'unmeasured');
+  let count = 0;
+  for (let x = 200; x < 1100; x += 3)
+    for (let y = 50; y < 850; y += 3) count += image.at(x, y).every((level, i) => level === wanted[i]) ? 1 : 0;
+  assert.ok(count > 100, `${count} places are grey`);
+  assert.equal(await page.locator('[data-unmeasured]').innerText(), 'no temperature');
+  await page.keyboard.press('3');
+  await settled(page);
+  assert.equal((await state()).fusion.missing, 'visible');
+  assert.equal(await page.locator('[data-unmeasured]').count(), 0);
+});
+
 test('A threshold handle on the axis turns the hot place from palette to visible colour', async () => {
   await page.locator('[data-method="colour_mapped_threshold"]').click();
   await settled(page);

@@ -162,6 +162,36 @@ describe('Settings', () => {
     expect(asked.at(-1)?.change).toEqual({ method: 'blend', params: { alpha: 0.5 } });
   });
 
+  it('gives what has no temperature a colour in the thermal view alone, until the user says how it is shown', async () => {
+    const { store, settings, asked } = setUp();
+    const grey = Array.from({ length: 256 }, (_, i): [number, number, number] => [i, i, i]);
+    const red = grey.map(([i]): [number, number, number] => [i, 0, 0]);
+    store.scene = { temperature: { min: 1, max: 2 } } as unknown as NonNullable<Store['scene']>;
+    store.palettes = [
+      { id: 'iron', label: 'Iron', fusion_safe: true, colours: red },
+      { id: 'grey', label: 'Grey', fusion_safe: true, colours: grey },
+    ];
+    const force = async (generation: number, method: string, missing: string, palette = 'iron') =>
+      await asked.at(-1)?.answer(generation, { ...fusionWith(1, method), missing, palette });
+    settings.setViewMode('thermal');
+    expect(asked.at(-1)?.change).toEqual({ method: 'thermal_only', missing: '#808080' });
+    await force(1, 'thermal_only', '#808080');
+    settings.setPalette('grey');
+    const { missing } = asked.at(-1)!.change;
+    expect(missing).not.toBe('#808080');
+    await force(2, 'thermal_only', missing!, 'grey');
+    settings.setViewMode('fused');
+    expect(asked.at(-1)?.change.missing).toBe('visible');
+    await force(3, 'blend', 'visible');
+    settings.setMissing('#ff00ff', true);
+    await force(4, 'blend', '#ff00ff');
+    settings.setViewMode('thermal');
+    expect(asked.at(-1)?.change.missing).toBeUndefined();
+    await force(5, 'thermal_only', '#ff00ff');
+    settings.setMissing('automatic', true);
+    expect(asked.at(-1)?.change).toEqual({ missing: '#808080' });
+  });
+
   it('holds the range where it is and lets it go again', async () => {
     const { settings, asked } = setUp();
     settings.toggleRangeLock();

@@ -2,6 +2,7 @@ import { type Fusion, type FusionChange, fusionState, type ParameterValue, type 
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, RpcError } from '../transport/connection';
 import { mergedChange, rangeChange, wholeChange } from './fusion_change';
+import { unmeasuredColour } from './unmeasured';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
 
 /** Least time between two changes of the settings. */
@@ -63,7 +64,8 @@ export class Settings {
     if (current === null || current.method === method) return;
     this.#rememberedParams.set(current.method, current.params);
     const remembered = this.#rememberedParams.get(method);
-    this.#change(remembered === undefined ? { method } : { method, params: remembered }, true);
+    const params = remembered === undefined ? {} : { params: remembered };
+    this.#change({ method, ...params, ...this.#missingFor(method, current.palette) }, true);
   }
 
   setViewMode(mode: ViewMode): void {
@@ -82,11 +84,18 @@ export class Settings {
   }
 
   setPalette(palette: string): void {
-    this.#change({ palette }, true);
+    const method = this.store.fusion?.method ?? '';
+    this.#change({ palette, ...this.#missingFor(method, palette) }, true);
   }
 
+  /** A colour, "visible", or "automatic": a colour in the view of temperatures alone, where a visible colour would be read as one of them. */
   setMissing(missing: string, settled: boolean): void {
-    this.#change({ missing }, settled);
+    this.store.missingIsAutomatic = missing === 'automatic';
+    if (!this.store.missingIsAutomatic) this.#change({ missing }, settled);
+    else if (this.store.fusion !== null) {
+      const change = this.#missingFor(this.store.fusion.method, this.store.fusion.palette);
+      if (change.missing !== undefined) this.#change(change, settled);
+    }
   }
 
   setRange(min: number, max: number, settled: boolean): void {
@@ -173,6 +182,14 @@ export class Settings {
     this.session.onChange();
     this.#sender.push(change);
     if (isSettled) this.#sender.flush();
+  }
+
+  /** What is to be said of vertices without temperature beside another method or palette. */
+  #missingFor(method: string, palette_id: string): Pick<FusionChange, 'missing'> {
+    const palette = this.store.palettes.find(({ id }) => id === palette_id);
+    if (!this.store.missingIsAutomatic || palette === undefined) return {};
+    const missing = viewModeOf(method) === 'thermal' ? unmeasuredColour(palette) : 'visible';
+    return missing === this.store.fusion?.missing ? {} : { missing };
   }
 
   #rememberFused(fusion: Fusion): void {

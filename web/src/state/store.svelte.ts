@@ -58,6 +58,8 @@ export class Store {
   /** As the server last said it. */
   fusionInForce = $state.raw<Fusion | null>(null);
   generation = $state(0);
+  /** How vertices without temperature are shown follows the view, until the user says it. */
+  missingIsAutomatic = $state(true);
   /** What the user has asked for and the server has not answered yet. */
   wanted = $state.raw<FusionChange | null>(null);
   quality = $state.raw<Quality | null>(null);
