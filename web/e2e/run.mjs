@@ -64,7 +64,9 @@ function lookAt(position) {
       const ring = Math.sqrt(1 - z * z);
       const eye = [ring * Math.cos(angle), z, ring * Math.sin(angle)].map((value, axis) => target[axis] + value * distance);
       session.setView({ eye, target });
-      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+      // The camera goes there with the next picture, which waits for those before it.
+      const away = () => Math.hypot(...viewport.pose.eye.map((value, axis) => value - eye[axis]));
+      while (away() > distance / 1000) await new Promise((resolve) => requestAnimationFrame(resolve));
       const place = viewport.project(target);
       const hit = await viewport.pick(place.x, place.y);
       if (hit !== null && Math.hypot(hit[0] - target[0], hit[1] - target[1], hit[2] - target[2]) < distance / 200) return place;

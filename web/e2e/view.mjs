@@ -241,12 +241,57 @@ export function addViewTests(browser, scratch) {
     await server.stop();
   });
 
+  test('A threshold goes along to the other method, also beyond the data, and the scale and the palette say what they show', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const { max } = await page.evaluate(() => globalThis.spectra.store.scene.temperature);
+    await page.locator('[data-method="monochrome_threshold"]').click();
+    await settled(page);
+    const field = page.locator('[data-parameter="threshold"] input[type=number]');
+    await field.fill('31.5');
+    await field.press('Enter');
+    await settled(page);
+    await page.locator('[data-method="colour_mapped_threshold"]').click();
+    await settled(page);
+    assert.equal(await field.inputValue(), '31.5');
+    assert.match(await page.locator('.axis').innerText(), /colours before blending/);
+    assert.match(await page.locator('[data-fares]').innerText(), /^With all colours: .+\nRed-green blind: .+\nIn grey: .+$/);
+    await field.fill('99');
+    await field.press('Enter');
+    await settled(page);
+    const inForce = await page.evaluate(() => globalThis.spectra.store.fusionInForce.params_in_force.threshold);
+    assert.equal(inForce, 99);
+    assert.match(
+      await page.locator('[data-highlight]').innerText(),
+      new RegExp(`^Nothing is highlighted\\. .*99\\.0.*above the hottest, ${max.toFixed(1)}`),
+    );
+    await page.evaluate(() => globalThis.spectra.settings.setViewMode('thermal'));
+    await settled(page);
+    assert.doesNotMatch(await page.locator('.axis').innerText(), /blending/);
+
+    // A wish that is not in force yet is marked at its control.
+    await page.evaluate(() => globalThis.spectra.settings.setMethod('colour_mapped_threshold'));
+    await settled(page);
+    await server.stop();
+    await page.getByText('Reconnecting', { exact: true }).waitFor();
+    await field.fill('25');
+    await field.press('Enter');
+    await page.locator('[data-parameter="threshold"] .waits').waitFor();
+    assert.equal(await page.locator('.waits').count(), 1);
+    await screenshot(page, 'pending-control');
+    await page.close();
+  });
+
   test('A slow machine draws less while the camera moves, and everything at rest', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);
     await settled(page);
     const pose = await page.evaluate(() => globalThis.spectra.viewport.pose);
-    await page.evaluate(({ eye, target }) => globalThis.spectra.setView({ eye, target }), pose);
+    await page.evaluate(({ eye, target }) => {
+      globalThis.spectra.store.marksShown = false;
+      globalThis.spectra.setView({ eye, target });
+    }, pose);
     await settled(page);
     const before = await screenshot(page, 'pace-before');
     const { triangles } = await page.evaluate(() => globalThis.spectra.viewport.gpuObjects);
@@ -268,6 +313,11 @@ export function addViewTests(browser, scratch) {
     }
     const [last, end] = await pictures();
     await page.mouse.up();
+    // The picture at rest comes while the pointer goes on.
+    for (let i = 0; i < 60; i += 1) {
+      await page.mouse.move(600 + 5 * i, 500);
+      await page.waitForTimeout(30);
+    }
     const { waits, notches } = await page.evaluate(() => ({ waits: globalThis.waits, notches: globalThis.notches }));
     const used = notches.filter((notch) => notch !== null);
     waits.sort((a, b) => a - b);
@@ -276,6 +326,11 @@ export function addViewTests(browser, scratch) {
         ` an input waited ${waits[waits.length >> 1].toFixed(0)} ms (median), ${waits.at(-1).toFixed(0)} ms (longest)`,
     );
     assert.ok(used.at(-1).resolution < 1, 'drawing by software is a slow machine');
+    await drawn(page);
+    const picture_ms = await page.evaluate(() => globalThis.spectra.viewport.picture_ms);
+    console.log(`        at rest: ${picture_ms.toFixed(0)} ms a picture`);
+    // Both grow with whatever else the machine has to do.
+    assert.ok(waits.at(-1) < picture_ms / 2, 'input waits until a picture is drawn');
     await page.evaluate(({ eye, target }) => globalThis.spectra.setView({ eye, target }), pose);
     await settled(page);
     await page.mouse.move(20, 890);

@@ -9,26 +9,43 @@ import {
   Points,
   Scene,
   Sphere,
-  Vector2,
   Vector3,
   WebGLRenderer,
 } from 'three';
 import type { Vec3 } from '../protocol/messages';
 import { clearSight } from './clear_sight';
 import { depthRange } from './depth_range';
+import { PictureBuffer } from './picture_buffer';
 import { nearestHit } from './picking';
 import type { Eye, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
+import { SlicePace, Slices } from './slices';
 import { TileMaterials } from './tile_materials';
 
 // Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
 ColorManagement.enabled = false;
 
 const FENCE_INTERVAL_MS = 3;
+/** Samples a pixel of a picture at rest; one while the camera moves at less than the screen's resolution. */
+const SAMPLES = 4;
 
 interface Tile {
+  /** Visible only while it is being drawn. */
   object: Mesh | Points;
+  isShown: boolean;
   colours: BufferAttribute;
   arrays: Omit<TileArrays, 'rgba'>;
+}
+
+/** A picture that is being drawn. */
+interface Picture {
+  number: number;
+  start: number;
+  buffer: PictureBuffer;
+  tiles: Tile[];
+  slices: Slices;
+  isInParts: boolean;
+  /** What is drawn now is drawn within a frame of the browser's. */
+  isInFrame: boolean;
 }
 
 /** Draws pictures on a canvas. It owns everything that is on the GPU; the page tells it what to draw by messages. */
@@ -40,11 +57,17 @@ export class PictureRenderer {
   readonly #tiles = new Map<number, Tile>();
   #eye: Eye = { world_from_camera: new Matrix4().toArray(), tangents: [1, 1], distance: 1 };
   #background = 0;
+  #size: [number, number] = [1, 1];
   #fullPixelRatio = 1;
   #resolution = 1;
-  #pixelRatio = 1;
+  /** Drawn in parts, so that input gets in between: at rest. While the camera moves the newest picture is wanted at once. */
+  #isInParts = false;
+  readonly #slicePace = new SlicePace();
+  /** For pictures in full, and for those while the camera moves. */
+  #buffers: { full: PictureBuffer | null; coarse: PictureBuffer | null } = { full: null, coarse: null };
+  /** Under way; a newer one takes its place. */
+  #picture: Picture | null = null;
   #pointDiameter: number | null = null;
-  #isResized = false;
   #frame = 0;
   #newest = 0;
 
@@ -52,18 +75,21 @@ export class PictureRenderer {
     private readonly canvas: HTMLCanvasElement | OffscreenCanvas,
     private readonly reply: (message: RenderReply, transfer?: Transferable[]) => void,
   ) {
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
+    this.#renderer = new WebGLRenderer({ canvas, antialias: false, depth: false, powerPreference: 'high-performance' });
+    this.#renderer.autoClear = false;
+    this.#renderer.info.autoReset = false;
     this.#renderer.debug.checkShaderErrors = import.meta.env.DEV;
     this.#renderer.outputColorSpace = LinearSRGBColorSpace;
     this.#scene.matrixAutoUpdate = false;
     this.#camera.matrixAutoUpdate = false;
     this.#drawSpecimens();
     canvas.addEventListener('webglcontextlost', () => this.reply({ kind: 'context', isLost: true }));
-    // The renderer makes its objects anew from the arrays as they are drawn; what it keeps as state is to be set again.
+    // The renderer makes its objects anew from the arrays as they are drawn.
     canvas.addEventListener('webglcontextrestored', () => {
-      this.#renderer.setClearColor(this.#background, 1);
+      // What it held went with the context.
+      this.#buffers = { full: null, coarse: null };
       // Only with a picture on it is the canvas shown again.
-      this.#draw();
+      this.#drawWhole();
       this.reply({ kind: 'context', isLost: false });
     });
   }
@@ -79,7 +105,8 @@ export class PictureRenderer {
         this.#eye = request.eye;
         for (const command of request.commands) this.#apply(command);
         this.#newest = request.number;
-        this.#resolve(request.resolution);
+        this.#resolution = request.resolution;
+        this.#isInParts = !request.isMoving;
         this.#drawSoon();
         break;
       case 'pick':
@@ -114,7 +141,7 @@ export class PictureRenderer {
       }
       case 'visible': {
         const tile = this.#tiles.get(command.tile);
-        if (tile !== undefined) tile.object.visible = command.visible;
+        if (tile !== undefined) tile.isShown = command.visible;
         break;
       }
       case 'dispose': {
@@ -127,23 +154,18 @@ export class PictureRenderer {
       }
       case 'background':
         this.#background = command.colour;
-        this.#renderer.setClearColor(command.colour, 1);
         break;
       case 'points':
         this.#pointDiameter = command.diameter;
         break;
       case 'size':
         this.#fullPixelRatio = command.pixel_ratio;
-        this.#pixelRatio = command.pixel_ratio * this.#resolution;
-        this.#renderer.setPixelRatio(this.#pixelRatio);
-        this.#renderer.setSize(command.width, command.height, false);
-        // Resizing empties the canvas: draw in the same task, so that no blank picture is shown.
-        this.#draw();
+        this.#size = [command.width, command.height];
     }
   }
 
   #drawn(): Tile['arrays'][] {
-    return [...this.#tiles.values()].filter(({ object }) => object.visible).map(({ arrays }) => arrays);
+    return [...this.#tiles.values()].filter(({ isShown }) => isShown).map(({ arrays }) => arrays);
   }
 
   #create(arrays: TileArrays): Tile {
@@ -162,7 +184,7 @@ export class PictureRenderer {
     object.matrixAutoUpdate = false;
     object.visible = false;
     this.#scene.add(object);
-    return { object, colours, arrays: { positions, indices, centre, radius, point_spacing } };
+    return { object, isShown: false, colours, arrays: { positions, indices, centre, radius, point_spacing } };
   }
 
   /** Draws an empty tile of each kind in each way, so that the shaders are compiled before the first real one comes. */
@@ -189,17 +211,98 @@ export class PictureRenderer {
   }
 
   #drawSoon(): void {
+    this.#picture = null;
     if (this.#frame !== 0) return;
     this.#frame = requestAnimationFrame(() => {
       this.#frame = 0;
-      const start = performance.now();
-      this.#draw();
-      this.#whenDone(this.#newest, start);
+      this.#picture = this.#begin();
+      this.#goOn(this.#picture);
     });
   }
 
-  /** Tells the page that a picture has been drawn once the GPU is through with it, so that a slow one is not given more and more. */
-  #whenDone(number: number, start: number): void {
+  /** Draws the next part, or all in one, and shows the picture when it is complete: in a frame, for the browser takes it from there. */
+  #goOn(picture: Picture): void {
+    const start = performance.now();
+    const budget = picture.isInParts ? this.#slicePace.budget : Infinity;
+    const count = this.#drawPart(picture, budget);
+    const isShown = picture.slices.isDone && picture.isInFrame;
+    if (isShown) this.#finish(picture);
+    this.#afterGpu(() => {
+      if (picture.isInParts) this.#slicePace.took(count, performance.now() - start);
+      if (isShown) return;
+      if (picture !== this.#picture) return;
+      picture.isInFrame = false;
+      if (!picture.slices.isDone) this.#goOn(picture);
+      else
+        requestAnimationFrame(() => {
+          if (picture === this.#picture) this.#finish(picture);
+        });
+    });
+  }
+
+  #finish(picture: Picture): void {
+    this.#show(picture);
+    this.#afterGpu(() =>
+      this.reply({ kind: 'drawn', number: picture.number, gpu: this.#gpuObjects, ms: performance.now() - picture.start }),
+    );
+  }
+
+  #begin(): Picture {
+    const buffer = this.#bufferFor(this.#resolution);
+    const tiles = this.#lookFrom(this.#eye, buffer.height);
+    this.#renderer.info.reset();
+    this.#renderer.setRenderTarget(buffer.target);
+    this.#renderer.setClearColor(this.#background, 1);
+    this.#renderer.clear();
+    const slices = new Slices(tiles.map(({ arrays }) => (arrays.indices ?? arrays.positions).length / 3));
+    return { number: this.#newest, start: performance.now(), buffer, tiles, slices, isInParts: this.#isInParts, isInFrame: true };
+  }
+
+  /** Returns how many triangles, or points, it has drawn. */
+  #drawPart({ buffer, tiles, slices }: Picture, budget: number): number {
+    const parts = slices.next(budget);
+    for (const { object: index, start, count } of parts) {
+      const { object, arrays } = tiles[index]!;
+      object.visible = true;
+      const corners = arrays.indices === null ? 1 : 3;
+      object.geometry.setDrawRange(start * corners, count * corners);
+    }
+    this.#renderer.setRenderTarget(buffer.target);
+    this.#renderer.render(this.#scene, this.#camera);
+    for (const { object: index } of parts) tiles[index]!.object.visible = false;
+    return parts.reduce((sum, { count }) => sum + count, 0);
+  }
+
+  #show({ buffer }: Picture): void {
+    if (this.canvas.width !== buffer.width) this.canvas.width = buffer.width;
+    if (this.canvas.height !== buffer.height) this.canvas.height = buffer.height;
+    buffer.present();
+  }
+
+  #drawWhole(): void {
+    this.#picture = null;
+    const picture = this.#begin();
+    this.#drawPart(picture, Infinity);
+    this.#show(picture);
+  }
+
+  get #pixelRatio(): number {
+    return this.#fullPixelRatio * this.#resolution;
+  }
+
+  #bufferFor(resolution: number): PictureBuffer {
+    const kind = resolution < 1 ? 'coarse' : 'full';
+    const [width, height] = this.#size.map((side) => Math.max(1, Math.floor(side * this.#pixelRatio))) as [number, number];
+    const known = this.#buffers[kind];
+    if (known?.width === width && known.height === height) return known;
+    known?.dispose();
+    const buffer = new PictureBuffer(this.#renderer, width, height, kind === 'full' ? SAMPLES : 1);
+    this.#buffers[kind] = buffer;
+    return buffer;
+  }
+
+  /** Once the GPU is through with what it has been given, so that a slow one is not given more and more. */
+  #afterGpu(next: () => void): void {
     const gl = this.context;
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -210,31 +313,14 @@ export class PictureRenderer {
         return;
       }
       gl.deleteSync(fence);
-      this.reply({ kind: 'drawn', number, gpu: this.#gpuObjects, ms: performance.now() - start });
+      next();
     };
     check();
   }
 
-  /** Another size of the canvas empties it; the picture that asked for it is drawn in the frame to come. */
-  #resolve(resolution: number): void {
-    if (resolution === this.#resolution) return;
-    this.#resolution = resolution;
-    this.#isResized = true;
-  }
-
-  #draw(): void {
-    if (this.#isResized) {
-      this.#isResized = false;
-      this.#pixelRatio = this.#fullPixelRatio * this.#resolution;
-      this.#renderer.setPixelRatio(this.#pixelRatio);
-    }
-    this.#lookFrom(this.#eye);
-    this.#renderer.render(this.#scene, this.#camera);
-  }
-
-  /** The planes of near and far follow what is drawn, and with them the way in which depth is kept. */
-  #lookFrom({ world_from_camera, tangents, distance }: Eye): void {
-    const shown = [...this.#tiles.values()].filter(({ object }) => object.visible);
+  /** The planes of near and far follow what is drawn, and with them the way in which depth is kept. Returns the tiles that are shown. */
+  #lookFrom({ world_from_camera, tangents, distance }: Eye, height: number): Tile[] {
+    const shown = [...this.#tiles.values()].filter(({ isShown }) => isShown);
     const m = world_from_camera;
     const eye: Vec3 = [m[12]!, m[13]!, m[14]!];
     const range = depthRange(
@@ -249,9 +335,10 @@ export class PictureRenderer {
     this.#camera.matrixWorldNeedsUpdate = true;
     this.#camera.projectionMatrix.makePerspective(-right * near, right * near, top * near, -top * near, near, far);
     this.#camera.projectionMatrixInverse.copy(this.#camera.projectionMatrix).invert();
-    this.#materials.lookFrom(eye, range, this.#renderer.getDrawingBufferSize(new Vector2()).height / (2 * top));
+    this.#materials.lookFrom(eye, range, height / (2 * top));
     const { surface, cloud } = this.#materials;
     for (const { object, arrays } of shown) object.material = arrays.indices === null ? cloud : surface;
+    return shown;
   }
 
   async #copy(id: number): Promise<void> {
@@ -260,7 +347,7 @@ export class PictureRenderer {
       return;
     }
     // The canvas holds the picture only until the task that drew it ends.
-    this.#draw();
+    this.#drawWhole();
     const picture = await createImageBitmap(this.canvas);
     this.reply({ kind: 'copied', id, picture }, [picture]);
   }

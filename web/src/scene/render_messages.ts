@@ -40,7 +40,7 @@ export interface Eye {
 export type RenderRequest =
   | { kind: 'start'; canvas: OffscreenCanvas }
   /** Apply the changes, then draw from there; of several that come before the screen takes one, the last is drawn. `resolution`: share of the screen's, along each side. */
-  | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye; resolution: number }
+  | { kind: 'picture'; number: number; commands: RenderCommand[]; eye: Eye; resolution: number; isMoving: boolean }
   | { kind: 'pick'; id: number; ray: Ray; cone: number }
   /** Where the target of the wish is seen from. */
   | { kind: 'sight'; id: number; wish: SightWish }

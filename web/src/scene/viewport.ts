@@ -49,6 +49,9 @@ export class Viewport {
   /** How pictures that have been sent and not drawn are drawn; null: in full. */
   #notches = new Map<number, Notch | null>();
   #isMoving = false;
+  /** The next picture is from another place, which the camera did not travel to: it is drawn in full. */
+  #isJump = false;
+  #picture_ms = 0;
   #rest: ReturnType<typeof setTimeout> | undefined;
 
   /** Changes that the next picture takes along, and the buffers that move with them. */
@@ -105,6 +108,11 @@ export class Viewport {
   /** How pictures are drawn while the camera moves; null at rest. */
   get notch(): Notch | null {
     return this.#isMoving ? this.#pace.moving : null;
+  }
+
+  /** What the last picture at rest took to be drawn. */
+  get picture_ms(): number {
+    return this.#picture_ms;
   }
 
   /** Objects held on the GPU when the last picture was drawn. */
@@ -198,7 +206,9 @@ export class Viewport {
   }
 
   setView(view: View, animated: boolean): void {
-    void this.#controls.setLookAt(...view.eye, ...view.target, animated && !this.#reducedMotion.matches);
+    const isTravel = animated && !this.#reducedMotion.matches;
+    this.#isJump = !isTravel;
+    void this.#controls.setLookAt(...view.eye, ...view.target, isTravel);
     this.invalidate();
   }
 
@@ -303,14 +313,17 @@ export class Viewport {
 
   #tick(now: number): void {
     this.#frame = 0;
-    if (this.#sent - this.#drawn >= MOST_UNDRAWN) {
+    const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
+    // A picture at rest is given up for the first one of a movement: only those while moving hold each other up.
+    const undrawn = [...this.#notches.values()].filter((notch) => !this.#isMoving || notch !== null).length;
+    if (undrawn >= MOST_UNDRAWN && (this.#isMoving || !this.#controls.active)) {
       this.#isHeldUp = true;
       return;
     }
-    const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
     this.#lastFrameAt = now;
     const moved = this.#controls.update(elapsed_s);
-    if (moved) this.#moves();
+    if (moved && !this.#isJump) this.#moves();
+    this.#isJump = false;
     const more = this.events.beforeRender();
     this.#send();
     if (moved) this.events.onCamera(this.pose);
@@ -328,7 +341,8 @@ export class Viewport {
     const notch = this.#isMoving ? this.#pace.moving : null;
     this.#notches.set(this.#sent, notch);
     const resolution = notch?.resolution ?? 1;
-    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, eye, resolution }, this.#transfer);
+    const isMoving = notch !== null;
+    this.#port.send({ kind: 'picture', number: this.#sent, commands: this.#commands, eye, resolution, isMoving }, this.#transfer);
     this.#commands = [];
     this.#transfer = [];
   }
@@ -378,13 +392,18 @@ export class Viewport {
     });
   }
 
+  #drawnIn(ms: number, notch: Notch | null): void {
+    this.#pace.drawn(ms, notch);
+    if (notch === null) this.#picture_ms = ms;
+  }
+
   #replied(reply: RenderReply): void {
     switch (reply.kind) {
       case 'drawn':
         // Of two pictures the GPU may be found to be through with the later one first.
         this.#drawn = Math.max(this.#drawn, reply.number);
         this.#gpu = reply.gpu;
-        this.#pace.drawn(reply.ms, this.#notches.get(reply.number) ?? null);
+        this.#drawnIn(reply.ms, this.#notches.get(reply.number) ?? null);
         for (const number of this.#notches.keys()) if (number <= reply.number) this.#notches.delete(number);
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
