@@ -58,6 +58,38 @@ function setUp() {
 }
 
 describe('Settings', () => {
+  it('takes a threshold along to the other method that has one, and nothing else', async () => {
+    const { store, settings, asked } = setUp();
+    const parameter = (name: string, kind: string) => ({ name, kind, label: name, help: '', default: null });
+    const method = (id: string, params: ReturnType<typeof parameter>[]) => ({
+      id,
+      label: id,
+      summary: '',
+      needs_temperature: true,
+      uses_palette: true,
+      wants_fusion_safe_palette: false,
+      params,
+    });
+    store.methods = [
+      method('one', [parameter('threshold', 'temperature'), parameter('alpha', 'number')]),
+      method('other', [parameter('threshold', 'temperature'), parameter('alpha', 'number')]),
+      method('blend', [parameter('alpha', 'number')]),
+    ];
+    store.fusionInForce = { ...fusionWith(0.5, 'one'), params: { threshold: 31.5, alpha: 0.5 } };
+    settings.setMethod('other');
+    expect(asked[0]?.change).toEqual({ method: 'other', params: { threshold: 31.5 } });
+    await asked[0]?.answer(1, { ...fusionWith(0.5, 'other'), params: { threshold: 31.5, alpha: 0.5 } });
+    // Changed there, it comes back with its new value; the opacity is the method's own.
+    store.fusionInForce = { ...fusionWith(0.5, 'other'), params: { threshold: null, alpha: 0.9 } };
+    settings.setMethod('one');
+    await vi.advanceTimersByTimeAsync(100);
+    expect(asked[1]?.change).toEqual({ method: 'one', params: { threshold: null, alpha: 0.5 } });
+    await asked[1]?.answer(2, fusionWith(0.5, 'one'));
+    settings.setMethod('blend');
+    await vi.advanceTimersByTimeAsync(100);
+    expect(asked[2]?.change).toEqual({ method: 'blend' });
+  });
+
   beforeEach(() => vi.useFakeTimers());
   afterEach(() => vi.useRealTimers());
 

@@ -63,9 +63,9 @@ export class Settings {
     const current = this.store.fusion;
     if (current === null || current.method === method) return;
     this.#rememberedParams.set(current.method, current.params);
-    const remembered = this.#rememberedParams.get(method);
-    const params = remembered === undefined ? {} : { params: remembered };
-    this.#change({ method, ...params, ...this.#missingFor(method, current.palette) }, true);
+    const params = { ...this.#rememberedParams.get(method), ...this.#sharedTemperatures(current, method) };
+    const own = Object.keys(params).length === 0 ? {} : { params };
+    this.#change({ method, ...own, ...this.#missingFor(method, current.palette) }, true);
   }
 
   setViewMode(mode: ViewMode): void {
@@ -190,6 +190,16 @@ export class Settings {
     if (!this.store.missingIsAutomatic || palette === undefined) return {};
     const missing = viewModeOf(method) === 'thermal' ? unmeasuredColour(palette) : 'visible';
     return missing === this.store.fusion?.missing ? {} : { missing };
+  }
+
+  /** A temperature that both methods have by the same name is the user's, not the method's: it goes along. */
+  #sharedTemperatures(current: Fusion, method: string): Record<string, ParameterValue> {
+    const { methods } = this.store;
+    const temperatures = (id: string) =>
+      (methods.find((one) => one.id === id)?.params ?? []).filter(({ kind }) => kind === 'temperature').map(({ name }) => name);
+    const theirs = temperatures(method);
+    const shared = temperatures(current.method).filter((name) => theirs.includes(name) && name in current.params);
+    return Object.fromEntries(shared.map((name) => [name, current.params[name] ?? null]));
   }
 
   #rememberFused(fusion: Fusion): void {

@@ -130,6 +130,12 @@ export class Store {
   );
   readonly connected = $derived(this.link.phase === 'open');
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
+  /** What is on its way for longer than a moment, or waits for a connection. */
+  readonly unconfirmed = $derived<FusionChange | null>(
+    this.wanted !== null && (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS))
+      ? this.wanted
+      : null,
+  );
   /** The picture does not show the method that is named, or not everywhere, and that for longer than a moment. */
   readonly methodIsPending = $derived(
     this.pictureMethod !== null &&

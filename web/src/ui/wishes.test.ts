@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Method } from '../protocol/messages';
-import { wishWords } from './wishes';
+import { wishPaths, wishWords } from './wishes';
 
 const parameter = (name: string, label: string, kind: string) => ({ name, label, kind, help: '', default: null });
 const methods = [
@@ -39,5 +39,17 @@ describe('wishWords', () => {
       'range by itself',
     ]);
     expect(wishWords(null, methods, [], 'blend')).toEqual([]);
+  });
+});
+
+describe('wishPaths', () => {
+  it('names each control that waits', () => {
+    expect(wishPaths(null)).toEqual([]);
+    expect(wishPaths({ method: 'x', params: { alpha: 1, hue: null }, palette: 'iron' })).toEqual([
+      'method',
+      'palette',
+      'params.alpha',
+      'params.hue',
+    ]);
   });
 });

@@ -33,3 +33,10 @@ export function wishWords(
   if (change.missing !== undefined) words.push('colour of what has no temperature');
   return words;
 }
+
+/** Paths of the settings that a change asks for, such as `params.alpha`: where each stands among the controls. */
+export function wishPaths(change: FusionChange | null): string[] {
+  if (change === null) return [];
+  const { params, ...others } = change;
+  return [...Object.keys(others), ...Object.keys(params ?? {}).map((name) => `params.${name}`)];
+}
