@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <concepts>
+#include <limits>
 #include <string>
 
 namespace spectra::protocol {
@@ -65,6 +66,8 @@ std::array<std::byte, kTileFrameHeaderSize> encoded_header(const TileFrameHeader
   out.put(header.lowest_celsius);
   out.put(header.highest_celsius);
   out.put(header.payload_size_bytes);
+  out.put(header.colour_error_levels);
+  out.put(header.temperature_error_celsius);
   return bytes;
 }
 
@@ -72,9 +75,9 @@ Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
   const auto malformed = [](std::string field, std::string what) {
     return refusal(RpcErrorCode::InvalidRequest, "tile frame: " + what, std::move(field));
   };
-  if (message.size() < kTileFrameHeaderSize)
-    return malformed("", "message of " + std::to_string(message.size()) + " bytes, a header has " +
-                             std::to_string(kTileFrameHeaderSize));
+  if (message.size() < kSmallestTileFrameHeaderSize)
+    return malformed("", "message of " + std::to_string(message.size()) + " bytes, a header has at least " +
+                             std::to_string(kSmallestTileFrameHeaderSize));
   Reader in(message);
   if (in.get<std::uint32_t>() != kTileFrameMagic) return malformed("magic", "does not start with \"SPC1\"");
 
@@ -83,9 +86,9 @@ Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
   header.kind = static_cast<FrameKind>(in.get<std::uint8_t>());
   header.child_mask = in.get<std::uint8_t>();
   const std::size_t header_size = in.get<std::uint16_t>();
-  if (header_size < kTileFrameHeaderSize || header_size > message.size())
+  if (header_size < kSmallestTileFrameHeaderSize || header_size > message.size())
     return malformed("header_size", "header size " + std::to_string(header_size) + " is not between " +
-                                        std::to_string(kTileFrameHeaderSize) + " and the message's " +
+                                        std::to_string(kSmallestTileFrameHeaderSize) + " and the message's " +
                                         std::to_string(message.size()) + " bytes");
   header.sequence = in.get<std::uint32_t>();
   header.generation = in.get<std::uint32_t>();
@@ -101,6 +104,11 @@ Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
   header.lowest_celsius = in.get_float();
   header.highest_celsius = in.get_float();
   header.payload_size_bytes = in.get<std::uint32_t>();
+  header.colour_error_levels = header.temperature_error_celsius = std::numeric_limits<float>::quiet_NaN();
+  if (header_size >= kTileFrameHeaderSize) {
+    header.colour_error_levels = in.get_float();
+    header.temperature_error_celsius = in.get_float();
+  }
 
   view.payload = message.subspan(header_size);
   if (view.payload.size() != header.payload_size_bytes)

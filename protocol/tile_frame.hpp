@@ -53,14 +53,18 @@ struct TileFrameHeader {
   float lowest_celsius = 0;  ///< NaN = none.
   float highest_celsius = 0;
   std::uint32_t payload_size_bytes = 0;
+  float colour_error_levels = 0;        ///< Of a channel, 95th percentile; NaN = the sender did not say.
+  float temperature_error_celsius = 0;  ///< 95th percentile; NaN = none, or the sender did not say.
 };
 
-inline constexpr std::size_t kTileFrameHeaderSize = 72;
+inline constexpr std::size_t kTileFrameHeaderSize = 80;
+/// Headers of the first senders end before the two errors.
+inline constexpr std::size_t kSmallestTileFrameHeaderSize = 72;
 inline constexpr std::uint32_t kTileFrameMagic = 0x31435053;
 /// Where `sequence` stands, so that a shared frame can be given a connection's own number.
 inline constexpr std::size_t kTileFrameSequenceOffset = 8;
 
-/// The 72 bytes of a header, little-endian on every machine.
+/// The 80 bytes of a header, little-endian on every machine.
 std::array<std::byte, kTileFrameHeaderSize> encoded_header(const TileFrameHeader& header);
 
 /// A received frame: the header and the payload inside `message`. Safe on untrusted input. Errors: too short, wrong magic,

@@ -89,6 +89,7 @@ static void describe(auto& fields, Is<StreamAccuracy> auto& message) {
   fields.nullable("position_mm", message.position_mm);
   fields.field("colour_levels", message.colour_levels);
   fields.nullable("pixel_error", message.pixel_error);
+  fields.nullable("temperature_celsius", message.temperature_celsius);
 }
 
 static void describe(auto& fields, Is<StreamStats> auto& message) {

@@ -60,6 +60,7 @@ struct StreamAccuracy {
   std::optional<double> position_mm;
   int colour_levels = 256;
   std::optional<double> pixel_error;
+  std::optional<double> temperature_celsius;
 };
 
 /// Params of stream.stats; nullopt = null: not measured yet.

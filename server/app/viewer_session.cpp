@@ -492,6 +492,7 @@ void ViewerSession::ticked() {
   message.viewers = served_.viewer_count;
   message.accuracy.position_mm = if_positive(stats.position_mm);
   message.accuracy.colour_levels = stats.colour_levels;
+  message.accuracy.temperature_celsius = stats.temperature_celsius;
   if (message.accuracy.position_mm) message.accuracy.pixel_error = stats.pixel_error;
   notify("stream.stats", protocol::to_json(message));
   set_status("tiles_failed", protocol::StatusLevel::Error,

@@ -494,6 +494,7 @@ std::shared_ptr<Tile> leaf_tile(const fusion::MultispectralMesh& mesh, const Lea
       temperature_range(std::span(tile->temperature_celsius).first(lone_begin))
           .joined(temperature_range(std::span(tile->temperature_celsius).subspan(owned_count)));
   tile->lowest_celsius = range.lowest_celsius;
+  if (std::isnan(range.lowest_celsius)) tile->temperature_error_celsius = range.lowest_celsius;
   tile->highest_celsius = range.highest_celsius;
   return tile;
 }

@@ -227,8 +227,12 @@ class TiledSnapshot final : public SceneSnapshot {
     gather(std::move(facts));
     core_bounds_ = scene.core_bounds.value_or(bounds_);
     if (levels == LevelsOfDetail::All) {
-      const TreeOptions options{leaf_vertex_count, root_vertex_count(leaf_vertex_count), median_celsius(),
-                                &position_steps};
+      const auto [median_celsius, span_celsius] = temperature_spread();
+      const TreeOptions options{.tile_vertex_count = leaf_vertex_count,
+                                .root_vertex_count = root_vertex_count(leaf_vertex_count),
+                                .median_celsius = median_celsius,
+                                .span_celsius = span_celsius,
+                                .position_steps = &position_steps};
       tiles_ = tile_tree(std::move(leaves), is_point_cloud_, options, pool, [&](double made_share) {
         fusion::report(progress, kTilingPhase, leaves_share + (1 - leaves_share) * made_share);
       });
@@ -340,8 +344,9 @@ class TiledSnapshot final : public SceneSnapshot {
     return std::max(1u, leaf_vertex_count / 8 * 5);
   }
 
-  /// Of all finite temperatures, the lower one of an even number; NaN without any.
-  float median_celsius() const {
+  /// The median of all finite temperatures, the lower one of an even number, NaN without any; and between which nearly all
+  /// lie, at least a degree apart: noise of a scene of one temperature is no contrast.
+  std::pair<float, double> temperature_spread() const {
     std::vector<float> finite;
     finite.reserve(static_cast<std::size_t>(temperature_.summary.finite_count));
     for (const auto& leaf : leaves_) {
@@ -349,10 +354,14 @@ class TiledSnapshot final : public SceneSnapshot {
         if (std::isfinite(t)) finite.push_back(t);
       }
     }
-    if (finite.empty()) return std::numeric_limits<float>::quiet_NaN();
-    const auto middle = finite.begin() + static_cast<std::ptrdiff_t>((finite.size() - 1) / 2);
-    std::nth_element(finite.begin(), middle, finite.end());
-    return *middle;
+    if (finite.empty()) return {std::numeric_limits<float>::quiet_NaN(), 1};
+    const auto at = [&](double share) {
+      const auto place = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
+      std::nth_element(finite.begin(), place, finite.end());
+      return *place;
+    };
+    const double low = static_cast<double>(at(0.005)), high = static_cast<double>(at(0.995));
+    return {at(0.5), std::max(high - low, 1.0)};
   }
 
   void gather(std::vector<LeafFacts> facts) {

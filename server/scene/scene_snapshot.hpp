@@ -33,7 +33,10 @@ using StepHalvings = std::array<std::uint8_t, 3>;
 struct Tile {
   protocol::TileId id;
   std::uint8_t child_mask = 0;
-  float geometric_error_m = 0;  ///< Against the full mesh; 0 at leaves.
+  float geometric_error_m = 0;    ///< Against the full mesh; 0 at leaves.
+  float colour_error_levels = 0;  ///< Largest difference of a channel from the full mesh, 95th percentile; 0 at leaves.
+  float temperature_error_celsius = 0;  ///< The same of the temperature; NaN = none has one.
+  float lost_detail_m = 0;              ///< Size of the largest detail that is seen wrong; 0 at leaves.
   Bounds bounds;
   /// Of the geometry under this tile in the full mesh; NaN = no temperature, infinite = beyond the sensor's range.
   float lowest_celsius = 0;

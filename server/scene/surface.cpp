@@ -139,6 +139,38 @@ double squared_distance_to_triangle(const Vec3f& p, const Vec3f& a, const Vec3f&
                    squared_distance_to_segment(p, c, a)});
 }
 
+double triangle_area(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const Vector n = cross(b - a, c - a);
+  return std::sqrt(dot(n, n)) / 2;
+}
+
+std::array<double, 3> nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const Vector ab = b - a, ac = c - a, ap = p - a;
+  const Vector normal = cross(ab, ac);
+  const double area = dot(normal, normal);
+  if (area > 0) {
+    const double of_c = dot(cross(ab, ap), normal) / area;
+    const double of_b = dot(cross(ap, ac), normal) / area;
+    if (of_b >= 0 && of_c >= 0 && of_b + of_c <= 1) return {1 - of_b - of_c, of_b, of_c};
+  }
+  std::array<double, 3> best{1, 0, 0};
+  double best_squared = std::numeric_limits<double>::infinity();
+  const std::array corners{a, b, c};
+  for (unsigned i = 0; i < 3; ++i) {
+    const unsigned j = (i + 1) % 3;
+    const Vector along = corners[j] - corners[i], to = p - corners[i];
+    const double length = dot(along, along);
+    const double s = length > 0 ? std::clamp(dot(to, along) / length, 0.0, 1.0) : 0;
+    const Vector rest{to.x - s * along.x, to.y - s * along.y, to.z - s * along.z};
+    if (dot(rest, rest) >= best_squared) continue;
+    best_squared = dot(rest, rest);
+    best = {};
+    best[i] = 1 - s;
+    best[j] = s;
+  }
+  return best;
+}
+
 Surface::Surface(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
     : positions_(positions), triangles_(triangles), offsets_(positions.size() + 1), around_(3 * triangles.size()) {
   for (const Triangle& triangle : triangles) {
@@ -182,6 +214,10 @@ std::uint32_t Surface::nearest_vertex_near(const Vec3f& p, std::uint32_t start) 
 }
 
 double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, double enough) const {
+  return triangle_near(p, start, enough).squared_distance;
+}
+
+NearTriangle Surface::triangle_near(const Vec3f& p, std::uint32_t start, double enough) const {
   constexpr std::size_t kMostSteps = 12;
   std::array<std::uint32_t, kMostSteps> visited{};
   double best = std::numeric_limits<double>::infinity();
@@ -198,7 +234,7 @@ double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, doubl
       if (squared < best) {
         best = squared;
         best_triangle = t;
-        if (best <= enough) return best;
+        if (best <= enough) return {best_triangle, best};
       }
     }
     if (!(best < before)) break;
@@ -213,7 +249,7 @@ double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, doubl
     }
     if (std::isinf(nearest)) break;
   }
-  return best;
+  return {best_triangle, best};
 }
 
 double Surface::squared_distance_anywhere(const Vec3f& p, double enough, double at_most) const {

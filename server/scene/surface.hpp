@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,6 +20,18 @@ double squared_distance_to_box(const fusion::Vec3f& p, const Bounds& box);
 double squared_distance_to_triangle(const fusion::Vec3f& p, const fusion::Vec3f& a, const fusion::Vec3f& b,
                                     const fusion::Vec3f& c);
 
+double triangle_area(const fusion::Vec3f& a, const fusion::Vec3f& b, const fusion::Vec3f& c);
+
+/// What each corner counts for at the point of a triangle that is nearest to `p`; they are not negative and their sum is 1.
+std::array<double, 3> nearest_weights(const fusion::Vec3f& p, const fusion::Vec3f& a, const fusion::Vec3f& b,
+                                      const fusion::Vec3f& c);
+
+/// A triangle of a surface, and how far it is.
+struct NearTriangle {
+  std::uint32_t triangle = 0xffffffffu;
+  double squared_distance = 0;
+};
+
 /// Triangles over shared vertices, with the triangles around each vertex. Keeps references to what it is made of.
 class Surface {
  public:
@@ -35,6 +48,9 @@ class Surface {
   /// An upper bound of the squared distance of `p`: walks from `start` along edges towards `p` and looks at the triangles
   /// around the vertices there, until that does not help any more or the bound is not above `enough`.
   double squared_distance_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
+
+  /// The triangle found on that walk; `start` has one.
+  NearTriangle triangle_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
 
   /// The squared distance of `p` itself, or some bound that is not above `enough`. `at_most` is a bound that is known.
   double squared_distance_anywhere(const fusion::Vec3f& p, double enough, double at_most) const;

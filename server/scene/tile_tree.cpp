@@ -1,7 +1,5 @@
 #include "server/scene/tile_tree.hpp"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,9 +12,10 @@
 #include <utility>
 
 #include "server/scene/octree_cut.hpp"
-#include "server/scene/point_groups.hpp"
 #include "server/scene/position_index.hpp"
+#include "server/scene/seen_error.hpp"
 #include "server/scene/surface.hpp"
+#include "server/scene/thinning.hpp"
 
 namespace spectra::server {
 namespace {
@@ -29,9 +28,6 @@ constexpr std::uint32_t kNone = Surface::kNone;
 
 /// Of a vertex that no other tile needs.
 constexpr std::uint8_t kUnshared = 255;
-
-/// What is between the measured samples may be farther away than they are.
-constexpr double kErrorMargin = 1.1;
 
 TileId parent_of(const TileId& id) {
   return {static_cast<std::uint8_t>(id.level - 1), id.x / 2, id.y / 2, id.z / 2};
@@ -53,7 +49,9 @@ struct Node {
   /// Per vertex: the level of the lowest tile that holds all leaves in which the vertex lies on an open edge. Locked
   /// in the tiles below that.
   std::vector<std::uint8_t> sharing_level;
-  std::vector<std::uint32_t> weight;  ///< Per vertex: how many vertices it stands for; empty: one each.
+  std::vector<std::uint32_t> weight;     ///< Per vertex: how many vertices it stands for; empty: one each.
+  std::vector<FullSample> samples;       ///< Of the full mesh under it.
+  std::vector<std::uint32_t> merged_of;  ///< Per vertex: its place in the merged mesh of the parent.
   std::vector<Node*> children;
 };
 
@@ -134,16 +132,7 @@ void find_sharing_levels(std::vector<Node*>& leaves, WorkerPool& pool) {
   });
 }
 
-/// The children of a tile as one piece.
-struct Merged {
-  std::vector<Vec3f> positions;
-  std::vector<fusion::Rgb8> visible;
-  std::vector<float> temperature_celsius;
-  std::vector<std::uint32_t> source_vertex;
-  std::vector<std::uint32_t> weight;
-  std::vector<std::uint8_t> sharing_level;
-  std::vector<Triangle> triangles;
-  Triangle any_triangle{};  ///< For a tile of degenerate triangles alone.
+struct Merged : MergedTiles {
   std::uint32_t lowest_at = kNone, highest_at = kNone;
 };
 
@@ -161,10 +150,10 @@ Merged merged(const std::vector<Node*>& children, const Tile& parent, bool is_po
   result.weight.reserve(vertex_count);
   result.sharing_level.reserve(vertex_count);
   result.triangles.reserve(triangle_count);
-  std::vector<std::uint32_t> merged_of;
-  for (const Node* child : children) {
+  for (Node* child : children) {
     const Tile& tile = *child->tile;
     const std::vector<bool> is_drawn = drawn_vertices(tile, is_point_cloud);
+    std::vector<std::uint32_t>& merged_of = child->merged_of;
     merged_of.assign(tile.positions.size(), kNone);
     for (std::size_t v = 0; v < tile.positions.size(); ++v) {
       if (!is_drawn[v]) continue;
@@ -190,177 +179,6 @@ Merged merged(const std::vector<Node*>& children, const Tile& parent, bool is_po
     }
   }
   result.positions = std::move(index).take_positions();
-  return result;
-}
-
-/// The triangles with each vertex replaced by what stands for it, without those that become degenerate.
-std::vector<Triangle> mapped(const std::vector<Triangle>& triangles, std::span<const std::uint32_t> standing) {
-  std::vector<Triangle> result;
-  for (const Triangle& t : triangles) {
-    const Triangle image{standing[t[0]], standing[t[1]], standing[t[2]]};
-    if (!is_degenerate(image)) result.push_back(image);
-  }
-  return result;
-}
-
-std::vector<std::uint32_t> used_vertices(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-  std::vector<bool> is_used(vertex_count);
-  for (const Triangle& t : triangles) {
-    for (const std::uint32_t v : t) is_used[v] = true;
-  }
-  std::vector<std::uint32_t> result;
-  for (std::uint32_t v = 0; v < vertex_count; ++v) {
-    if (is_used[v]) result.push_back(v);
-  }
-  return result;
-}
-
-/// Fewer triangles over the same vertices, some of which stay where they are.
-std::vector<Triangle> simplified(const Merged& mesh, const std::vector<bool>& is_locked, std::size_t wanted_count) {
-  const std::size_t vertex_count = mesh.positions.size();
-  std::vector<Triangle> result = mesh.triangles;
-  const Bounds bounds = bounds_of(mesh.positions);
-  const float extent =
-      std::max({bounds.max.x - bounds.min.x, bounds.max.y - bounds.min.y, bounds.max.z - bounds.min.z});
-  // meshopt computes with squares of floats.
-  if (std::isfinite(extent) && extent > 1e-30f && !result.empty()) {
-    // A position that three vertices have stays where it is: that is how version 0.18 is told to lock a vertex. Its own
-    // option would lock the edges of the scene too, and holes in a scan have many.
-    const auto locked_count = static_cast<std::size_t>(std::count(is_locked.begin(), is_locked.end(), true));
-    std::vector<Vec3f> positions;
-    positions.reserve(vertex_count + 2 * locked_count);
-    positions = mesh.positions;
-    for (std::size_t v = 0; v < vertex_count; ++v) {
-      if (is_locked[v]) positions.insert(positions.end(), 2, mesh.positions[v]);
-    }
-    // A closed surface has two triangles for each vertex; each vertex on an open edge costs one.
-    const std::size_t share = result.size() * wanted_count / vertex_count;
-    const std::size_t wanted_triangles = std::min(share, 2 * wanted_count - std::min(locked_count, wanted_count));
-    constexpr float kAnyError = 1e6f;
-    const std::size_t index_count =
-        meshopt_simplify(result[0].data(), result[0].data(), 3 * result.size(), &positions[0].x, positions.size(),
-                         sizeof(Vec3f), 3 * wanted_triangles, kAnyError, 0, nullptr);
-    result.resize(index_count / 3);
-  }
-  // Loose pieces, or places where many sheets meet, may have stopped it.
-  std::vector<std::uint32_t> used = used_vertices(result, vertex_count);
-  if (4 * used.size() > 5 * wanted_count) {
-    const std::size_t used_count = used.size();
-    std::erase_if(used, [&](std::uint32_t v) { return is_locked[v]; });
-    const std::size_t locked_count = used_count - used.size();
-    const std::size_t group_count = wanted_count > locked_count ? wanted_count - locked_count : 1;
-    result = mapped(result, group_representatives(mesh.positions, std::move(used), group_count));
-  }
-  if (result.empty()) result.push_back(mesh.any_triangle);
-  return result;
-}
-
-/// The nearest of some points, for the few vertices that no edge connects to one.
-class NearestPoint {
- public:
-  NearestPoint(std::span<const Vec3f> positions, std::vector<std::uint32_t> points)
-      : positions_(positions), points_(std::move(points)) {
-    std::sort(points_.begin(), points_.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(positions[a].x, a) < std::pair(positions[b].x, b);
-    });
-  }
-
-  std::uint32_t operator()(const Vec3f& p) const {
-    const auto middle = std::lower_bound(points_.begin(), points_.end(), p.x,
-                                         [&](std::uint32_t v, float x) { return positions_[v].x < x; });
-    std::uint32_t best = points_.front();
-    double best_squared = std::numeric_limits<double>::infinity();
-    const auto is_beyond = [&](std::uint32_t v) {
-      const double dx = static_cast<double>(positions_[v].x) - static_cast<double>(p.x);
-      if (dx * dx > best_squared) return true;
-      const double squared = squared_distance(p, positions_[v]);
-      if (squared < best_squared || (squared == best_squared && v < best)) {
-        best_squared = squared;
-        best = v;
-      }
-      return false;
-    };
-    for (auto up = middle; up != points_.end() && !is_beyond(*up); ++up) {
-    }
-    for (auto down = middle; down != points_.begin() && !is_beyond(*std::prev(down)); --down) {
-    }
-    return best;
-  }
-
- private:
-  std::span<const Vec3f> positions_;
-  std::vector<std::uint32_t> points_;
-};
-
-/// What becomes of the merged vertices.
-struct Thinning {
-  std::vector<Triangle> triangles;            ///< Over the kept vertices.
-  std::vector<std::uint32_t> kept;            ///< Merged vertices, ascending.
-  std::vector<std::uint32_t> kept_of_merged;  ///< For each merged vertex an index into `kept`, near it.
-  double distance_m = 0;
-};
-
-Thinning thinned_surface(const Merged& mesh, const std::vector<bool>& is_locked, std::size_t wanted_count) {
-  Thinning result;
-  result.triangles = simplified(mesh, is_locked, wanted_count);
-  result.kept = used_vertices(result.triangles, mesh.positions.size());
-  std::vector<std::uint32_t> index_of(mesh.positions.size(), kNone);
-  std::vector<bool> is_kept(mesh.positions.size());
-  std::vector<Vec3f> positions(result.kept.size());
-  for (std::uint32_t k = 0; k < result.kept.size(); ++k) {
-    index_of[result.kept[k]] = k;
-    is_kept[result.kept[k]] = true;
-    positions[k] = mesh.positions[result.kept[k]];
-  }
-  for (Triangle& t : result.triangles) t = {index_of[t[0]], index_of[t[1]], index_of[t[2]]};
-
-  const Surface fine(mesh.positions, mesh.triangles);
-  result.kept_of_merged = fine.nearest_seeds(is_kept);
-  const NearestPoint nearest(mesh.positions, result.kept);
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    std::uint32_t& k = result.kept_of_merged[v];
-    k = index_of[k != kNone ? k : nearest(mesh.positions[v])];
-  }
-  result.distance_m =
-      kErrorMargin * two_sided_distance(fine, Surface(positions, result.triangles), result.kept_of_merged, result.kept);
-  return result;
-}
-
-Thinning thinned_points(const Merged& cloud, std::size_t wanted_count) {
-  std::vector<std::uint32_t> all(cloud.positions.size());
-  std::iota(all.begin(), all.end(), 0u);
-  const std::vector<std::uint32_t> standing = group_representatives(cloud.positions, all, wanted_count);
-  Thinning result;
-  result.kept_of_merged.resize(all.size());
-  std::vector<std::uint32_t> index_of(all.size(), kNone);
-  for (std::uint32_t v = 0; v < all.size(); ++v) {
-    if (standing[v] != v) continue;
-    index_of[v] = static_cast<std::uint32_t>(result.kept.size());
-    result.kept.push_back(v);
-  }
-  double largest_squared = 0;
-  for (std::uint32_t v = 0; v < all.size(); ++v) {
-    result.kept_of_merged[v] = index_of[standing[v]];
-    largest_squared = std::max(largest_squared, squared_distance(cloud.positions[v], cloud.positions[standing[v]]));
-  }
-  result.distance_m = std::sqrt(largest_squared);
-  return result;
-}
-
-/// Where what a kept vertex stands for is shown: locked ones show themselves alone, so that a border has the same colours
-/// on both sides, and hand the rest on to the nearest that is not.
-std::vector<std::uint32_t> showing_vertices(const Thinning& thinning, const Merged& mesh,
-                                            const std::vector<bool>& is_kept_locked) {
-  std::vector<Vec3f> positions(thinning.kept.size());
-  std::vector<bool> is_free(thinning.kept.size());
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    positions[k] = mesh.positions[thinning.kept[k]];
-    is_free[k] = !is_kept_locked[k];
-  }
-  std::vector<std::uint32_t> result = Surface(positions, thinning.triangles).nearest_seeds(is_free);
-  for (std::uint32_t k = 0; k < result.size(); ++k) {
-    if (result[k] == kNone) result[k] = k;
-  }
   return result;
 }
 
@@ -393,72 +211,97 @@ void show_extreme(Tile& tile, std::uint32_t k, float celsius, float median_celsi
 }
 
 /// Fills the kept vertices with what they show.
-void show(Node& node, const Merged& mesh, const Thinning& thinning, const std::vector<bool>& is_locked,
+void show(Node& node, const Merged& mesh, Thinning& thinning, const std::vector<bool>& is_locked,
           float median_celsius) {
   Tile& tile = *node.tile;
-  const std::size_t count = thinning.kept.size();
-  std::vector<bool> is_kept_locked(count);
-  for (std::size_t k = 0; k < count; ++k) is_kept_locked[k] = is_locked[thinning.kept[k]];
-  const std::vector<std::uint32_t> showing = showing_vertices(thinning, mesh, is_kept_locked);
-  struct Colour {
-    std::uint64_t r = 0, g = 0, b = 0, weight = 0;
-  };
-  std::vector<Colour> colours(count);
-  tile.temperature_celsius.assign(count, std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    std::uint32_t k = thinning.kept_of_merged[v];
-    if (thinning.kept[k] != v) k = showing[k];  // a kept vertex always counts for itself
-    tile.temperature_celsius[k] =
-        further_from(median_celsius, tile.temperature_celsius[k], mesh.temperature_celsius[v]);
-    const std::uint64_t weight = mesh.weight[v];
-    Colour& colour = colours[k];
-    colour.r += weight * mesh.visible[v].r;
-    colour.g += weight * mesh.visible[v].g;
-    colour.b += weight * mesh.visible[v].b;
-    colour.weight += weight;
-  }
-  tile.positions.reserve(count);
-  tile.visible.reserve(count);
-  tile.source_vertex.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::uint32_t v = thinning.kept[k];
-    const Colour& colour = colours[k];
-    const auto mean = [&](std::uint64_t sum) {
-      return static_cast<std::uint8_t>((sum + colour.weight / 2) / colour.weight);
-    };
+  std::vector<bool> is_kept_locked;
+  for (const std::uint32_t v : thinning.kept) {
+    is_kept_locked.push_back(is_locked[v]);
     tile.positions.push_back(mesh.positions[v]);
-    tile.visible.push_back({mean(colour.r), mean(colour.g), mean(colour.b)});
     tile.source_vertex.push_back(mesh.source_vertex[v]);
     node.sharing_level.push_back(mesh.sharing_level[v]);
-    node.weight.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(colour.weight, 0xffffffffu)));
   }
-  tile.triangles = thinning.triangles;
+  tile.visible = std::move(thinning.visible);
+  tile.temperature_celsius = std::move(thinning.temperature_celsius);
+  tile.triangles = std::move(thinning.triangles);
+  node.weight = std::move(thinning.weight);
   for (const auto& [at, celsius] :
        {std::pair(mesh.lowest_at, tile.lowest_celsius), std::pair(mesh.highest_at, tile.highest_celsius)}) {
     if (at == kNone) continue;
-    show_extreme(tile, showing[thinning.kept_of_merged[at]], celsius, median_celsius, is_kept_locked);
+    show_extreme(tile, thinning.kept_of_merged[at], celsius, median_celsius, is_kept_locked);
   }
 }
 
-/// Makes the tile of a node from its children and lets go of what only this needed.
-void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
+/// What the children say of the tile above them.
+void take_from_children(Node& node) {
   Tile& tile = *node.tile;
   TemperatureRange range;
   std::vector<Vec3f> corners;
-  double children_error_m = 0;
+  tile.temperature_error_celsius = std::numeric_limits<float>::quiet_NaN();
   for (const Node* child : node.children) {
     const Tile& below = *child->tile;
     range = range.joined({below.lowest_celsius, below.highest_celsius});
     corners.push_back(below.bounds.min);
     corners.push_back(below.bounds.max);
-    children_error_m = std::max(children_error_m, static_cast<double>(below.geometric_error_m));
+    tile.geometric_error_m = std::max(tile.geometric_error_m, below.geometric_error_m);
+    tile.colour_error_levels = std::max(tile.colour_error_levels, below.colour_error_levels);
+    tile.temperature_error_celsius = std::fmax(tile.temperature_error_celsius, below.temperature_error_celsius);
+    tile.lost_detail_m = std::max(tile.lost_detail_m, below.lost_detail_m);
     tile.child_mask |=
         static_cast<std::uint8_t>(1u << ((below.id.x & 1) | (below.id.y & 1) << 1 | (below.id.z & 1) << 2));
   }
   tile.lowest_celsius = range.lowest_celsius;
   tile.highest_celsius = range.highest_celsius;
   tile.bounds = bounds_of(corners);
+}
 
+/// A float not below the sum.
+float sum_above(float a, double b) {
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  const double sum = static_cast<double>(a) + b;
+  return sum < static_cast<double>(kLargest) ? std::nextafter(static_cast<float>(sum), kLargest) : kLargest;
+}
+
+/// How far the tile is from its children, and how what it shows differs from the full mesh. The samples of the children
+/// become its own.
+void measure(Node& node, const Merged& mesh, const Surface& fine, const Thinning& thinning,
+             const TreeOptions& options) {
+  Tile& tile = *node.tile;
+  tile.geometric_error_m = sum_above(tile.geometric_error_m, thinning.distance_m);
+  for (Node* child : node.children) {
+    for (FullSample& sample : child->samples) {
+      const std::uint32_t m = child->merged_of[sample.near];
+      if (m == kNone) continue;
+      sample.near = thinning.kept_of_merged[m];
+      node.samples.push_back(sample);
+    }
+    child->samples = {};
+    child->merged_of = {};
+  }
+  thin_out(node.samples);
+  const Surface surface(tile.positions, tile.triangles);
+  measure_seen_error(tile, surface, node.samples);
+  const SeenContrast contrast{.levels = options.seen_levels, .celsius = options.span_celsius / 16};
+  const double lost_m = lost_detail_m(tile, surface, mesh, fine, thinning, contrast);
+  // Patches that were wrong before and those that are now may lie beside each other.
+  const auto before_m = static_cast<double>(tile.lost_detail_m);
+  tile.lost_detail_m = static_cast<float>(std::hypot(before_m, lost_m));
+}
+
+/// Nothing is ever drawn beside the root, so no border of it has to meet another: its positions are rounded no finer than an
+/// eighth of what they are off anyway.
+void round_as_alone(Tile& root, float step_m) {
+  const double needed = std::log2(8 * static_cast<double>(step_m) / static_cast<double>(root.geometric_error_m));
+  const auto most = static_cast<std::uint8_t>(std::clamp(std::ceil(needed), 0.0, 255.0));
+  for (StepHalvings& halvings : root.step_halvings) {
+    for (std::uint8_t& axis : halvings) axis = std::min(axis, most);
+  }
+}
+
+/// Makes the tile of a node from its children and lets go of what only this needed.
+void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
+  Tile& tile = *node.tile;
+  take_from_children(node);
   const Merged mesh = merged(node.children, tile, is_point_cloud, options.median_celsius);
   for (Node* child : node.children) {
     child->sharing_level = {};
@@ -474,15 +317,20 @@ void make_parent(Node& node, bool is_point_cloud, const TreeOptions& options) {
   const std::size_t most = tile.id.level == 0 ? options.root_vertex_count : options.tile_vertex_count;
   const std::size_t share = std::max<std::size_t>(4, std::min<std::size_t>(most, vertex_count / 3));
   const std::size_t wanted_count = std::max(share, locked_count + share / 4);
-  Thinning thinning =
-      is_point_cloud ? thinned_points(mesh, wanted_count) : thinned_surface(mesh, is_locked, wanted_count);
+  for (const std::uint32_t v : {mesh.lowest_at, mesh.highest_at}) {
+    if (v != kNone) is_locked[v] = true;
+  }
+  const ThinningOptions thinning_options{.wanted_count = wanted_count, .span_celsius = options.span_celsius};
+  const Surface fine(mesh.positions, mesh.triangles);
+  Thinning thinning = is_point_cloud ? thinned_points(mesh, is_locked, thinning_options)
+                                     : thinned_surface(mesh, fine, is_locked, thinning_options);
   show(node, mesh, thinning, is_locked, options.median_celsius);
   tile.owned_count = static_cast<std::uint32_t>(tile.positions.size());
   if (options.position_steps != nullptr) options.position_steps->apply(tile);
-  constexpr float kLargest = std::numeric_limits<float>::max();
-  const double error_m = children_error_m + thinning.distance_m;
-  tile.geometric_error_m =
-      error_m < static_cast<double>(kLargest) ? std::nextafter(static_cast<float>(error_m), kLargest) : kLargest;
+  measure(node, mesh, fine, thinning, options);
+  if (tile.id.level == 0 && options.position_steps != nullptr) {
+    round_as_alone(tile, options.position_steps->largest_step_m());
+  }
 }
 
 }  // namespace
@@ -505,6 +353,10 @@ std::vector<std::shared_ptr<const Tile>> tile_tree(std::vector<std::shared_ptr<T
     leaf_nodes.push_back(&node);
   }
   find_sharing_levels(leaf_nodes, pool);
+  if (leaf_nodes.size() > 1) {
+    pool.for_each(leaf_nodes.size(),
+                  [&](std::size_t i) { leaf_nodes[i]->samples = leaf_samples(*leaf_nodes[i]->tile); });
+  }
   for (int level = deepest; level > 0; --level) {
     std::vector<Node*> parents;
     for (auto& [id, node] : nodes) {

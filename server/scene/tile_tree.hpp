@@ -16,6 +16,9 @@ struct TreeOptions {
   std::uint32_t tile_vertex_count = 32'000;  ///< Most vertices of a coarse tile, unless locked borders need more.
   std::uint32_t root_vertex_count = 20'000;  ///< Most vertices of the root: the first picture must be small.
   float median_celsius = 0;                  ///< What temperatures are measured from; NaN = the scene has none.
+  /// A difference of temperature that counts as much as one between black and white; a sixteenth of it catches the eye.
+  double span_celsius = 16;
+  double seen_levels = 24;  ///< A difference of colour that catches the eye.
   const PositionSteps* position_steps =
       nullptr;  ///< How finely the vertices of coarse tiles are rounded; null: as one.
 };

@@ -30,6 +30,11 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuali
     if (camera && !may_be_in_view(*camera, node.bounds)) continue;
     accuracy.colour_bits = std::min(accuracy.colour_bits, held[index].colour_bits);
     const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+    accuracy.colour_error_levels =
+        std::max(accuracy.colour_error_levels, static_cast<double>(node.tile->colour_error_levels));
+    const auto celsius = static_cast<double>(node.tile->temperature_error_celsius);
+    if (!std::isnan(celsius))
+      accuracy.temperature_celsius = std::max(accuracy.temperature_celsius.value_or(0), celsius);
     // Each of three axes may be off by half a step.
     const double rounding_m = static_cast<double>(held[index].position_step_m) / 2 * std::sqrt(3.0);
     accuracy.position_mm = std::max(accuracy.position_mm, (error_m + rounding_m) * 1e3);

@@ -9,9 +9,11 @@ namespace spectra::server {
 
 /// The largest errors in what a viewer sees.
 struct ScreenAccuracy {
-  double position_mm = 0;  ///< Distance to the full mesh; 0 while nothing can be drawn.
-  double pixel_error = 0;  ///< The same in pixels; 0 without a camera.
-  int colour_bits = 8;     ///< A channel of the coarsest colours.
+  double position_mm = 0;                     ///< Distance to the full mesh; 0 while nothing can be drawn.
+  double pixel_error = 0;                     ///< The same in pixels; 0 without a camera.
+  int colour_bits = 8;                        ///< A channel of the coarsest colours.
+  double colour_error_levels = 0;             ///< Of coarse tiles, 95th percentile; rounding not counted.
+  std::optional<double> temperature_celsius;  ///< The same of temperatures; nothing where none is seen.
 };
 
 /// What a viewer has of one node.

@@ -16,6 +16,9 @@ using protocol::TileId;
 
 constexpr double kViewMargin = 1.1;
 
+// A patch of a wrong colour that is so many pixels wide is seen as much as a surface that is one pixel away.
+constexpr double kDetailPixels = 2;
+
 struct Vector {
   double x = 0, y = 0, z = 0;
 };
@@ -65,9 +68,9 @@ void extend(Bounds& bounds, const Bounds& by) {
   }
 }
 
-// Of a tile's surface, seen within `bounds`: in pixels, or in metres without a camera.
+// Of what a tile shows, within `bounds`: in pixels, or in metres without a camera.
 double error_of(const ViewTree::Node& node, const Bounds& bounds, const std::optional<Camera>& camera) {
-  const auto error_m = static_cast<double>(node.tile->geometric_error_m);
+  const double error_m = seen_error_m(*node.tile);
   return camera ? screen_error(*camera, bounds, error_m) : error_m;
 }
 
@@ -135,8 +138,12 @@ bool is_usable(const Camera& camera) {
          camera.fov_y_deg < 180 && camera.viewport[0] > 0 && camera.viewport[1] > 0;
 }
 
-double screen_error(const Camera& camera, const Bounds& bounds, double geometric_error_m) {
-  if (!(geometric_error_m > 0)) return 0;
+double seen_error_m(const Tile& tile) {
+  return std::max(static_cast<double>(tile.geometric_error_m), static_cast<double>(tile.lost_detail_m) / kDetailPixels);
+}
+
+double screen_error(const Camera& camera, const Bounds& bounds, double size_m) {
+  if (!(size_m > 0)) return 0;
   double squared = 0;
   for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
     const auto eye = static_cast<double>(camera.eye.*axis);
@@ -145,7 +152,7 @@ double screen_error(const Camera& camera, const Bounds& bounds, double geometric
     squared += outside * outside;
   }
   if (squared == 0) return std::numeric_limits<double>::infinity();
-  return geometric_error_m * camera.viewport[1] / (2 * half_height_tangent(camera) * std::sqrt(squared));
+  return size_m * camera.viewport[1] / (2 * half_height_tangent(camera) * std::sqrt(squared));
 }
 
 bool may_be_in_view(const Camera& camera, const Bounds& bounds) {

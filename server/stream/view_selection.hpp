@@ -49,16 +49,21 @@ std::uint64_t decoded_bytes(const Tile& tile);
 /// The tiles that a camera asks for, in sending order: coarse before fine; of one level those in view before others,
 /// then by how much their lack is seen (in octaves of the error on the screen), and among equals the hottest first.
 ///
-/// A tile is refined when it may be in view (the field of view widened by a tenth) and its geometric error, seen from
-/// the nearest point of its bounds, covers more than `pixel_error` pixels. All children of a refined tile are needed,
+/// A tile is refined when it may be in view (the field of view widened by a tenth) and its geometric error, or the
+/// half of the largest detail of colour or temperature that it shows wrong, seen from the nearest point of its bounds, covers more than
+/// `pixel_error` pixels. All children of a refined tile are needed,
 /// also those out of view, because a client replaces a tile only by all of its children. Without a camera every tile is
 /// needed. All selected tiles together take at most `most_bytes`, decoded, unless the tops alone take more: tiles are refined
 /// from the largest error on the screen downwards, and one whose children do not fit any more is left as it is.
 std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::optional<Camera>& camera, double pixel_error,
                                          std::uint64_t most_bytes = kUnbounded);
 
-/// Error on the screen, in pixels, of a geometric error within `bounds`; infinite when the eye is inside.
-double screen_error(const Camera& camera, const Bounds& bounds, double geometric_error_m);
+/// How far something on a tile may be from where it is in the full mesh, or half the size of the largest patch of another
+/// colour or temperature (metres): whichever is seen from farther away.
+double seen_error_m(const Tile& tile);
+
+/// Size on the screen, in pixels, of something so large within `bounds`; infinite when the eye is inside.
+double screen_error(const Camera& camera, const Bounds& bounds, double size_m);
 
 /// False when nothing within `bounds` can be in view, the field of view widened by a tenth.
 bool may_be_in_view(const Camera& camera, const Bounds& bounds);

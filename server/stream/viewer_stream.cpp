@@ -49,6 +49,8 @@ TileFrameHeader header_of(const TileSlot& slot, FrameKind kind) {
   header.origin_m = slot.geometry->origin_m;
   header.position_step_m = slot.geometry->position_step_m;
   header.geometric_error_m = slot.tile->geometric_error_m;
+  header.colour_error_levels = slot.tile->colour_error_levels;
+  header.temperature_error_celsius = slot.tile->temperature_error_celsius;
   header.lowest_celsius = slot.tile->lowest_celsius;
   header.highest_celsius = slot.tile->highest_celsius;
   return header;
@@ -247,7 +249,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
     for (const auto& slot : tiles_.slots())
       held.push_back({slot->is_drawable() ? slot->held_colour_bits : 0, slot->held_position_step_m});
     const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), held, camera_);
-    stats.colour_levels = 1 << std::min(accuracy.colour_bits, demand_.colour_bits);
+    const int colour_bits_drawn = std::min(accuracy.colour_bits, demand_.colour_bits);
+    const double rounding_levels = colour_bits_drawn < 8 ? 1 << (7 - colour_bits_drawn) : 0;
+    const double off_levels = accuracy.colour_error_levels + rounding_levels;
+    stats.colour_levels = off_levels > 0.5 ? std::max(1, static_cast<int>(128 / off_levels)) : 256;
+    stats.temperature_celsius = accuracy.temperature_celsius;
     stats.position_mm = accuracy.position_mm;
     stats.pixel_error = accuracy.pixel_error;
     return stats;
@@ -354,7 +360,17 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const bool is_slow = rate > 0 && !is_quick;
     demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
     order_.choose(tiles_, chosen, is_quick ? 0 : kPreviewShare * vertices);
+    remove_outdated();
     remove_surplus();
+  }
+
+  // Beneath tiles that have become fine enough when they had their colours already.
+  void remove_outdated() {
+    if (!demand_.plan || is_refining_due()) return;
+    for (const auto& slot : order_.slots()) {
+      if (slot->is_target && slot->held_geometry_epoch == demand_.geometry_epoch && slot->has_colours(demand_))
+        tiles_.remove_outdated_beneath(*slot, demand_);
+    }
   }
 
   void drop_superseded() {

@@ -65,8 +65,9 @@ struct StreamStats {
   std::uint64_t skipped_frames = 0;
   std::uint64_t failed_tiles = 0;  ///< Tiles that could not be encoded; the log names them.
   double position_mm = 0;          ///< The accuracy of what the viewer can draw now: largest distance to the full mesh,
-  int colour_levels = 256;         ///< levels per channel, and
-  double pixel_error = 0;          ///< the largest distance in pixels within the view; 0 before the first camera.
+  int colour_levels = 256;         ///< levels per channel that can be told apart, by rounding and by coarse tiles,
+  double pixel_error = 0;          ///< the largest distance in pixels within the view; 0 before the first camera, and
+  std::optional<double> temperature_celsius;  ///< what temperatures are off, 95th percentile; nothing without any.
 };
 
 /// What a viewer says of itself in scene.subscribe.

@@ -16,9 +16,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   const auto& [header, payload] = frame.value();
-  if (payload.size() != header.payload_size_bytes || payload.size() > size - kTileFrameHeaderSize) std::abort();
-  const bool is_plain = message[6] == std::byte{72} && message[7] == std::byte{0} && message[17] == std::byte{0} &&
-                        message[18] == std::byte{0} && message[19] == std::byte{0};
+  if (payload.size() != header.payload_size_bytes || payload.size() > size - kSmallestTileFrameHeaderSize) std::abort();
+  const bool is_plain = message[6] == std::byte{kTileFrameHeaderSize} && message[7] == std::byte{0} &&
+                        message[17] == std::byte{0} && message[18] == std::byte{0} && message[19] == std::byte{0};
   const auto again = encoded_header(header);
   if (is_plain && !std::equal(again.begin(), again.end(), message.begin())) std::abort();
   return 0;

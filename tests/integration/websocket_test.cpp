@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/tile_frame.hpp"
 #include "tests/integration/raw_client.hpp"
 #include "tests/integration/test_server.hpp"
 
@@ -217,7 +218,7 @@ TEST_F(WebSocketTest, SendsAFrameAsOneBinaryMessage) {
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->opcode, 2U);
     EXPECT_TRUE(frame->is_final);
-    EXPECT_EQ(frame->payload.size(), 200'072U);
+    EXPECT_EQ(frame->payload.size(), protocol::kTileFrameHeaderSize + 200'000);
   }
 }
 

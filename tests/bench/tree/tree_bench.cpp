@@ -8,11 +8,13 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -21,7 +23,9 @@
 #include "fusion/fusion_plan.hpp"
 #include "fusion/mesh/ply_reader.hpp"
 #include "server/scene/scene_snapshot.hpp"
+#include "server/scene/surface.hpp"
 #include "server/stream/tile_encoder.hpp"
+#include "server/stream/view_selection.hpp"
 #include "server/stream/viewer_stream.hpp"
 #include "tests/unit/scene/generated_scene.hpp"
 
@@ -90,24 +94,29 @@ Times simplify_whole_mesh(const fusion::MultispectralMesh& mesh) {
 }
 
 void print_levels(const SceneSnapshot& scene) {
-  std::printf("\n%-6s %6s %10s %10s %10s %24s\n", "level", "tiles", "vertices", "largest", "triangles",
-              "geometric error, m");
+  std::printf("\n%-6s %6s %10s %10s %10s   %-27s %-22s %-23s %s\n", "level", "tiles", "vertices", "largest",
+              "triangles", "geometric error, m", "colour error, levels", "temperature error, degC", "lost detail, m");
   for (int level = 0; level < scene.level_count(); ++level) {
     std::size_t tiles = 0, vertices = 0, largest = 0, triangles = 0;
-    std::vector<float> errors;
+    std::array<std::vector<float>, 4> errors;
     for (const auto& tile : scene.tiles()) {
       if (tile->id.level != level) continue;
       ++tiles;
       vertices += tile->positions.size();
       triangles += tile->triangles.size();
       largest = std::max(largest, tile->positions.size());
-      if (tile->child_mask != 0) errors.push_back(tile->geometric_error_m);
+      if (tile->child_mask == 0) continue;
+      errors[0].push_back(tile->geometric_error_m);
+      errors[1].push_back(tile->colour_error_levels);
+      if (!std::isnan(tile->temperature_error_celsius)) errors[2].push_back(tile->temperature_error_celsius);
+      errors[3].push_back(tile->lost_detail_m);
     }
     std::printf("%-6d %6zu %10zu %10zu %10zu", level, tiles, vertices, largest, triangles);
-    if (!errors.empty()) {
-      std::sort(errors.begin(), errors.end());
-      std::printf("   %.4g .. %.4g .. %.4g", static_cast<double>(errors.front()),
-                  static_cast<double>(errors[errors.size() / 2]), static_cast<double>(errors.back()));
+    for (std::vector<float>& error : errors) {
+      if (error.empty()) continue;
+      std::sort(error.begin(), error.end());
+      std::printf("   %.3g .. %.3g .. %.3g", static_cast<double>(error.front()),
+                  static_cast<double>(error[error.size() / 2]), static_cast<double>(error.back()));
     }
     std::printf("\n");
   }
@@ -118,6 +127,7 @@ void print_wire_bytes(const SceneSnapshot& scene) {
   auto settings = fusion::default_settings();
   const auto plan = fusion::FusionPlan::prepare(settings, scene.temperature()).value();
   std::size_t coarse_bytes = 0, leaf_bytes = 0;
+  std::map<const Tile*, std::size_t> bytes_of;
   for (const auto& tile : scene.tiles()) {
     const auto geometry = encoded_tile(*tile, step, 7);
     if (!geometry) {
@@ -131,10 +141,27 @@ void print_wire_bytes(const SceneSnapshot& scene) {
       std::printf("\nroot on the wire (step %g m, speed 7, 8-bit colours): geometry %zu + colours %zu = %zu bytes\n",
                   static_cast<double>(step), geometry.value().payload->size(), colours->size(), bytes);
     }
+    bytes_of[tile.get()] = bytes;
     (tile->child_mask == 0 ? leaf_bytes : coarse_bytes) += bytes;
   }
   std::printf("all leaves %zu bytes, all coarser tiles %zu bytes (%.2f of the leaves)\n", leaf_bytes, coarse_bytes,
               static_cast<double>(coarse_bytes) / static_cast<double>(leaf_bytes));
+
+  // What a viewer holds who looks at the whole scene from the front, a third from above.
+  const ViewTree tree(scene);
+  const auto& [low, high] = scene.bounds();
+  const fusion::Vec3f centre{(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
+  const float radius = static_cast<float>(std::sqrt(squared_distance(low, high)) / 2);
+  for (const auto& viewport : {std::array{900, 640}, std::array{1920, 1080}}) {
+    const fusion::Vec3f eye{centre.x, centre.y + 0.7f * radius, centre.z + 1.5f * radius};
+    const Camera camera{.eye = eye, .target = centre, .up = {0, 1, 0}, .viewport = viewport};
+    std::size_t bytes = 0, drawn = 0;
+    for (const SelectedTile& tile : selected_tiles(tree, camera, 1)) {
+      bytes += bytes_of.at(tree.nodes()[tile.node].tile.get());
+      if (tile.is_target) drawn += tree.nodes()[tile.node].tile->positions.size();
+    }
+    std::printf("at rest at %d x %d: %zu bytes, %zu vertices drawn\n", viewport[0], viewport[1], bytes, drawn);
+  }
 }
 
 void run(const Options& options) {

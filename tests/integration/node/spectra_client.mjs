@@ -31,6 +31,8 @@ export function readFrame(buffer) {
     geometricError: view.getFloat32(56, true),
     lowest: view.getFloat32(60, true),
     highest: view.getFloat32(64, true),
+    colourError: headerSize >= 80 ? view.getFloat32(72, true) : NaN,
+    temperatureError: headerSize >= 80 ? view.getFloat32(76, true) : NaN,
     payload: buffer.subarray(headerSize),
   };
 }

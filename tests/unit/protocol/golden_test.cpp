@@ -195,7 +195,9 @@ json header_json(const TileFrameHeader& header) {
           {"geometric_error_m", header.geometric_error_m},
           {"lowest_celsius", number_or_null(header.lowest_celsius)},
           {"highest_celsius", number_or_null(header.highest_celsius)},
-          {"payload_size_bytes", header.payload_size_bytes}};
+          {"payload_size_bytes", header.payload_size_bytes},
+          {"colour_error_levels", number_or_null(header.colour_error_levels)},
+          {"temperature_error_celsius", number_or_null(header.temperature_error_celsius)}};
 }
 
 /// What a frame says, decoded: the .json beside a .bin.
@@ -283,6 +285,8 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.sequence = 5;
   header.tile = {0, 0, 0, 0};
   header.geometric_error_m = 0.125F;
+  header.colour_error_levels = 3.5F;
+  header.temperature_error_celsius = std::numeric_limits<float>::quiet_NaN();
   header.lowest_celsius = header.highest_celsius = std::numeric_limits<float>::quiet_NaN();
   const EncodedGeometry cloud = encoded_geometry(positions, {}, header.position_step_m, 7).value();
   header.vertex_count = static_cast<std::uint32_t>(cloud.input_of_decoded.size());

@@ -24,6 +24,8 @@ TileFrameHeader example() {
   header.lowest_celsius = -12.5F;
   header.highest_celsius = 99.0F;
   header.payload_size_bytes = 5;
+  header.colour_error_levels = 3.5F;
+  header.temperature_error_celsius = 0.5F;
   return header;
 }
 
@@ -43,7 +45,7 @@ TEST(EncodedHeader, PutsEveryFieldWhereTheTableSays) {
   EXPECT_EQ(at(3), '1');
   EXPECT_EQ(at(4), 2);
   EXPECT_EQ(at(5), 0x81);
-  EXPECT_EQ(at(6) | at(7) << 8, 72);
+  EXPECT_EQ(at(6) | at(7) << 8, 80);
   for (int i = 0; i < 4; ++i) EXPECT_EQ(at(kTileFrameSequenceOffset + static_cast<std::size_t>(i)), i + 1);
   EXPECT_EQ(at(12), 9);
   EXPECT_EQ(at(16), 3);
@@ -59,6 +61,8 @@ TEST(EncodedHeader, PutsEveryFieldWhereTheTableSays) {
   EXPECT_EQ(at(62) | at(63) << 8, 0xC148);  // -12.5
   EXPECT_EQ(at(66) | at(67) << 8, 0x42C6);  // 99
   EXPECT_EQ(at(68), 5);
+  EXPECT_EQ(at(74) | at(75) << 8, 0x4060);  // 3.5
+  EXPECT_EQ(at(78) | at(79) << 8, 0x3F00);  // 0.5
 }
 
 TEST(DecodedFrame, GivesBackWhatWasEncoded) {
@@ -87,12 +91,24 @@ TEST(DecodedFrame, KeepsMissingTemperatureAsNaN) {
 
 TEST(DecodedFrame, SkipsALargerHeaderAndPassesUnknownKindsOn) {
   auto bytes = message(example(), 5 + 8);
-  bytes[6] = std::byte{80};
+  bytes[6] = std::byte{88};
   bytes[4] = std::byte{200};
   const auto frame = decoded_frame(bytes);
   ASSERT_TRUE(frame.has_value()) << frame.error().message;
   EXPECT_EQ(static_cast<int>(frame.value().header.kind), 200);
   EXPECT_EQ(frame.value().payload.front(), std::byte{8});
+}
+
+TEST(DecodedFrame, TakesAHeaderThatEndsBeforeTheErrors) {
+  auto bytes = message(example(), 5);
+  bytes.erase(bytes.begin() + 72, bytes.begin() + 80);
+  bytes[6] = std::byte{72};
+  const auto frame = decoded_frame(bytes);
+  ASSERT_TRUE(frame.has_value()) << frame.error().message;
+  EXPECT_TRUE(std::isnan(frame.value().header.colour_error_levels));
+  EXPECT_TRUE(std::isnan(frame.value().header.temperature_error_celsius));
+  EXPECT_EQ(frame.value().payload.size(), 5U);
+  EXPECT_EQ(frame.value().payload.front(), std::byte{0});
 }
 
 TEST(DecodedFrame, RefusesEveryTruncationAndExcess) {

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
@@ -100,11 +102,14 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
     EXPECT_EQ(tile->triangles.empty(), mesh.is_point_cloud());
     if (tile->child_mask == 0) {
       EXPECT_EQ(tile->geometric_error_m, 0);
+      EXPECT_EQ(tile->colour_error_levels, 0);
+      EXPECT_EQ(tile->lost_detail_m, 0);
+      EXPECT_TRUE(is_same_float(tile->temperature_error_celsius, std::isnan(tile->lowest_celsius) ? kNan : 0));
       leaf_vertices += tile->owned_count;
       leaf_triangles += tile->triangles.size();
       continue;
     }
-    float children_error = 0;
+    float children_error = 0, children_colour_error = 0, children_temperature_error = kNan, children_detail = 0;
     for (unsigned octant = 0; octant < 8; ++octant) {
       if ((tile->child_mask >> octant & 1) == 0) {
         EXPECT_FALSE(tiles.contains(child_of(tile->id, octant)));
@@ -112,8 +117,17 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
       }
       ++reached_count;
       ASSERT_TRUE(tiles.contains(child_of(tile->id, octant)));
-      children_error = std::max(children_error, tiles.at(child_of(tile->id, octant))->geometric_error_m);
+      const Tile& child = *tiles.at(child_of(tile->id, octant));
+      children_error = std::max(children_error, child.geometric_error_m);
+      children_colour_error = std::max(children_colour_error, child.colour_error_levels);
+      children_temperature_error = std::fmax(children_temperature_error, child.temperature_error_celsius);
+      children_detail = std::max(children_detail, child.lost_detail_m);
     }
+    EXPECT_GE(tile->colour_error_levels, children_colour_error);
+    EXPECT_GE(tile->lost_detail_m, children_detail);
+    EXPECT_TRUE(std::isfinite(tile->lost_detail_m));
+    EXPECT_EQ(std::isnan(tile->temperature_error_celsius), std::isnan(tile->lowest_celsius));
+    EXPECT_FALSE(tile->temperature_error_celsius < children_temperature_error);
     EXPECT_TRUE(std::isfinite(tile->geometric_error_m));
     EXPECT_GT(tile->geometric_error_m, children_error);
     EXPECT_EQ(tile->owned_count, count);
@@ -223,6 +237,9 @@ TEST(TileTree, SameForAnyThreadCount) {
     const Tile &a = *one->tiles()[i], &b = *four->tiles()[i];
     EXPECT_EQ(a.id, b.id);
     EXPECT_EQ(a.geometric_error_m, b.geometric_error_m);
+    EXPECT_EQ(a.colour_error_levels, b.colour_error_levels);
+    EXPECT_TRUE(is_same_float(a.temperature_error_celsius, b.temperature_error_celsius));
+    EXPECT_EQ(a.lost_detail_m, b.lost_detail_m);
     EXPECT_EQ(a.source_vertex, b.source_vertex);
     EXPECT_EQ(a.triangles, b.triangles);
     EXPECT_EQ(a.visible, b.visible);
@@ -378,6 +395,125 @@ TEST(TileTree, StatedErrorCoversWhatLiesBetweenTheMeasuredPoints) {
       EXPECT_LE(std::sqrt(largest), double{root.geometric_error_m}) << "seed " << seed << ", flat: " << is_flat;
     }
   }
+}
+
+/// What is seen at the point of a surface nearest to a place: three channels and the temperature.
+std::array<double, 4> seen_at(const Tile& tile, const Vec3f& p) {
+  double best = std::numeric_limits<double>::infinity();
+  std::array<double, 4> seen{};
+  for (const Triangle& t : tile.triangles) {
+    const Vec3f &a = tile.positions[t[0]], &b = tile.positions[t[1]], &c = tile.positions[t[2]];
+    const double squared = squared_distance_to_triangle(p, a, b, c);
+    if (squared >= best) continue;
+    best = squared;
+    seen = {};
+    const auto weights = nearest_weights(p, a, b, c);
+    for (unsigned i = 0; i < 3; ++i) {
+      const fusion::Rgb8 colour = tile.visible[t[i]];
+      seen[0] += weights[i] * colour.r;
+      seen[1] += weights[i] * colour.g;
+      seen[2] += weights[i] * colour.b;
+      seen[3] += weights[i] * static_cast<double>(tile.temperature_celsius[t[i]]);
+    }
+  }
+  return seen;
+}
+
+TEST(TileTree, RootIsRoundedNoFinerThanItIsOff) {
+  MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80});
+  // Thin: nothing of its form would be left at the usual step.
+  for (Vec3f& p : mesh.positions()) {
+    if (p.x > 20) p.z *= 0.01f;
+  }
+  const auto scene = tree_of(mesh);
+  const auto finest = [](const Tile& tile) {
+    std::uint8_t most = 0;
+    for (const StepHalvings& halvings : tile.step_halvings) most = std::max(most, std::ranges::max(halvings));
+    return int{most};
+  };
+  const Tile& root = *scene->tiles().front();
+  int finest_of_leaves = 0;
+  for (const auto& tile : scene->tiles()) finest_of_leaves = std::max(finest_of_leaves, finest(*tile));
+  EXPECT_LT(finest(root), finest_of_leaves);
+  if (finest(root) > 0) {
+    EXPECT_GT(std::ldexp(scene->suggested_position_step_m(), 1 - finest(root)), root.geometric_error_m / 8);
+  }
+}
+
+TEST(TileTree, StatedErrorsOfColourAndTemperatureAreNotBelowThoseSampled) {
+  MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80, .has_missing_temperature = false});
+  std::mt19937 random(17);
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const Vec3f& p = mesh.positions()[v];
+    mesh.temperature_celsius()[v] = 20 + 8 * std::sin(0.3f * p.x) * std::cos(0.2f * p.y);
+    mesh.visible()[v] = {static_cast<std::uint8_t>(128 + 90 * std::sin(0.8f * p.x)),
+                         static_cast<std::uint8_t>(p.y > 40 ? 200 : 60), static_cast<std::uint8_t>(random() % 30)};
+  }
+  const auto scene = tree_of(mesh);
+  const auto tiles = by_id(*scene);
+  for (const auto& tile : scene->tiles()) {
+    if (tile->child_mask == 0) continue;
+    std::vector<double> colour, temperature;
+    visit_leaves(tiles, *tile, [&](const Tile& leaf) {
+      // Every triangle is about as large as every other.
+      for (std::size_t i = 0; i < leaf.triangles.size(); i += 5) {
+        const Triangle& t = leaf.triangles[i];
+        const Vec3f p = samples(leaf.positions, std::span(&t, 1), 1, random)[0];
+        const auto full = seen_at(leaf, p), shown = seen_at(*tile, p);
+        double largest = 0;
+        for (unsigned j = 0; j < 3; ++j) largest = std::max(largest, std::fabs(full[j] - shown[j]));
+        colour.push_back(largest);
+        temperature.push_back(std::fabs(full[3] - shown[3]));
+      }
+    });
+    const auto percentile = [](std::vector<double>& values) {
+      const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 95 / 100);
+      std::nth_element(values.begin(), place, values.end());
+      return *place;
+    };
+    EXPECT_GE(double{tile->colour_error_levels}, percentile(colour));
+    EXPECT_GE(double{tile->temperature_error_celsius}, percentile(temperature));
+    if (tile->id.level == 0) {
+      EXPECT_LE(double{tile->colour_error_levels}, 2 * percentile(colour) + 1) << "so large that it says nothing";
+      EXPECT_LE(double{tile->temperature_error_celsius}, 2 * percentile(temperature) + 0.1);
+    }
+  }
+}
+
+TEST(TileTree, ManySpotsAreSeenFromTheRootAndWarmNothingElse) {
+  MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
+  std::mt19937 random(23);
+  for (float& t : mesh.temperature_celsius()) t = 20 + 0.01f * static_cast<float>(random() % 20);
+  std::set<Place> hot;
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const auto x = static_cast<int>(mesh.positions()[v].x), y = static_cast<int>(mesh.positions()[v].y);
+    if (x % 40 != 20 || y % 40 != 20) continue;
+    mesh.temperature_celsius()[v] = 34;
+    hot.insert(place(mesh.positions()[v]));
+  }
+  ASSERT_EQ(hot.size(), 25u);
+  const auto scene = tree_of(mesh);
+  const auto warm_area = [](const Tile& tile) {
+    double area = 0;
+    for (std::int64_t i = 0; i < 40'000; ++i) {
+      const Triangle& t = tile.triangles[static_cast<std::size_t>(i) % tile.triangles.size()];
+      const double u = static_cast<double>(i * 7919 % 1000) * 1e-3,
+                   v = (1 - u) * static_cast<double>(i * 104729 % 1000) * 1e-3;
+      const double celsius = (1 - u - v) * static_cast<double>(tile.temperature_celsius[t[0]]) +
+                             u * static_cast<double>(tile.temperature_celsius[t[1]]) +
+                             v * static_cast<double>(tile.temperature_celsius[t[2]]);
+      if (celsius > 25) area += triangle_area(tile.positions[t[0]], tile.positions[t[1]], tile.positions[t[2]]);
+    }
+    return area * static_cast<double>(tile.triangles.size()) / 40'000;
+  };
+  const Tile& root = *scene->tiles()[0];
+  std::set<Place> shown;
+  for (std::size_t v = 0; v < root.positions.size(); ++v) {
+    if (root.temperature_celsius[v] == 34) shown.insert(place(root.positions[v]));
+  }
+  EXPECT_EQ(shown, hot);
+  // Each is as warm as its six triangles, about three square metres; the root has a vertex for every 64.
+  EXPECT_LT(warm_area(root), 25 * 6);
 }
 
 TEST(TileTree, PointsOfACloudAreNeverFartherThanStated) {

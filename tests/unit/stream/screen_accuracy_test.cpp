@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <memory>
 
 #include "fake_scene.hpp"
 
@@ -13,9 +15,12 @@ namespace {
 class ScreenAccuracyTest : public ::testing::Test {
  protected:
   ScreenAccuracy of(const std::vector<int>& colour_bits, const std::optional<Camera>& camera = std::nullopt) const {
-    std::vector<HeldQuality> held;
-    for (const int bits : colour_bits) held.push_back({bits, kStep});
-    return screen_accuracy(tree_, held, camera);
+    return screen_accuracy(tree_, held(colour_bits), camera);
+  }
+  static std::vector<HeldQuality> held(const std::vector<int>& colour_bits) {
+    std::vector<HeldQuality> result;
+    for (const int bits : colour_bits) result.push_back({bits, kStep});
+    return result;
   }
   std::vector<int> none() const { return std::vector<int>(tree_.nodes().size()); }
 
@@ -45,6 +50,29 @@ TEST_F(ScreenAccuracyTest, ColoursAreThoseOfWhatIsDrawn) {
   EXPECT_EQ(of(colour_bits).colour_bits, 6);
   for (const std::size_t quarter : tree_.nodes()[0].children) colour_bits[quarter] = 8;
   EXPECT_EQ(of(colour_bits).colour_bits, 8) << "the root is not drawn any more";
+}
+
+TEST_F(ScreenAccuracyTest, CountsColourAndTemperatureOfCoarseTiles) {
+  std::vector<std::shared_ptr<const Tile>> tiles = testing::quadtree_tiles(2, 6);
+  auto root = std::make_shared<Tile>(*tiles[0]);
+  root->colour_error_levels = 9;
+  root->temperature_error_celsius = 0.5F;
+  tiles[0] = root;
+  for (std::size_t i = 1; i < tiles.size(); ++i) {
+    auto leaf = std::make_shared<Tile>(*tiles[i]);
+    leaf->temperature_error_celsius = i == 1 ? 0 : std::numeric_limits<float>::quiet_NaN();
+    tiles[i] = leaf;
+  }
+  const ViewTree tree(*testing::scene_of(tiles));
+  std::vector<int> colour_bits(tree.nodes().size());
+  const auto accuracy = [&] { return screen_accuracy(tree, held(colour_bits), std::nullopt); };
+  EXPECT_FALSE(accuracy().temperature_celsius);
+  colour_bits[0] = 8;
+  EXPECT_EQ(accuracy().colour_error_levels, 9);
+  EXPECT_EQ(accuracy().temperature_celsius, 0.5);
+  colour_bits.assign(tree.nodes().size(), 8);
+  EXPECT_EQ(accuracy().colour_error_levels, 0);
+  EXPECT_EQ(accuracy().temperature_celsius, 0);
 }
 
 TEST_F(ScreenAccuracyTest, CountsWhatIsInView) {

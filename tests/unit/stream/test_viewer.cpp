@@ -50,9 +50,11 @@ std::size_t TestViewer::wake_count() {
   return wake_count_;
 }
 
-std::size_t TestViewer::take() {
+std::size_t TestViewer::take(std::size_t most) {
   std::size_t taken = 0;
-  while (auto frame = stream_->next_frame(0)) {
+  while (taken < most) {
+    const auto frame = stream_->next_frame(0);
+    if (!frame) break;
     receive(*frame);
     ++taken;
     if (acknowledges) acknowledge();
@@ -60,7 +62,7 @@ std::size_t TestViewer::take() {
   return taken;
 }
 
-void TestViewer::wait_and_take() {
+void TestViewer::wait_and_take(std::size_t most) {
   {
     std::unique_lock lock(mutex_);
     if (!woken_.wait_for(lock, kStall, [this] { return wake_count_ != seen_wake_count_; })) {
@@ -68,7 +70,7 @@ void TestViewer::wait_and_take() {
     }
     seen_wake_count_ = wake_count_;
   }
-  take();
+  take(most);
 }
 
 StreamComplete TestViewer::complete() {

@@ -40,10 +40,10 @@ class TestViewer {
 
   /// Takes frames as they come, until the stream says complete. Fails the test when nothing comes for a long time.
   StreamComplete complete();
-  /// Takes what can be had at once; returns the number of frames.
-  std::size_t take();
+  /// Takes what can be had at once, at most so many frames; returns their number.
+  std::size_t take(std::size_t most = static_cast<std::size_t>(-1));
   /// Waits until there may be something new, then takes it.
-  void wait_and_take();
+  void wait_and_take(std::size_t most = static_cast<std::size_t>(-1));
   /// Acknowledges everything that was taken.
   void acknowledge();
 

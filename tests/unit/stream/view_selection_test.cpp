@@ -147,6 +147,23 @@ TEST(SelectedTiles, KeepToTheBytesWhereTheErrorIsSeenMost) {
   EXPECT_EQ(last, all.size());
 }
 
+TEST(SelectedTiles, WrongColoursAreRefinedLikeWrongForm) {
+  auto tiles = quadtree_tiles(2, 4);
+  auto root = std::make_shared<Tile>(*tiles[0]);
+  root->geometric_error_m = 1e-4F;
+  tiles[0] = root;
+  const Camera camera = camera_over(0.5F, 0.5F, 1.5F);
+  EXPECT_EQ(selected_tiles(ViewTree(*scene_of(tiles)), camera, 1).size(), 1U);
+  auto blurred = std::make_shared<Tile>(*root);
+  blurred->lost_detail_m = 0.02F;
+  tiles[0] = blurred;
+  const ViewTree tree(*scene_of(tiles));
+  EXPECT_EQ(selected_tiles(tree, camera, 1).size(), 5U);
+  const double pixels = screen_error(camera, tree.nodes()[0].bounds, 0.01);
+  EXPECT_EQ(selected_tiles(tree, camera, 1.01 * pixels).size(), 1U) << "a patch of two pixels is one pixel off";
+  EXPECT_EQ(selected_tiles(tree, camera, 0.99 * pixels).size(), 5U);
+}
+
 TEST(SelectedTiles, HotOnesComeFirstAmongEquals) {
   auto tiles = quadtree_tiles(2, 4);
   auto hot = std::make_shared<Tile>(*tiles[3]);

@@ -103,6 +103,22 @@ TEST_F(ViewerStreamView, OutdatedTilesDoNotStayInFrontOfNewerOnes) {
   expect_view(viewer, near, 0.6);
 }
 
+TEST_F(ViewerStreamView, OutdatedTilesGoWhenACoarserOneThatIsNewerBecomesFineEnough) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  show(viewer, 0.6);
+  while (viewer.tiles.at({0, 0, 0, 0}).generation < 2) {
+    if (viewer.take(1) == 0) viewer.wait_and_take(1);
+  }
+  ASSERT_EQ(viewer.tiles.at({2, 3, 3, 0}).generation, 1U) << "the root alone has the new colours";
+  const Camera afar = camera_over(2, 2, 5000);
+  viewer.stream().set_camera(afar);
+  viewer.complete();
+  expect_view(viewer, afar, 0.6);
+}
+
 TEST_F(ViewerStreamView, TilesLeftLongestAreRemovedBeyondTheLimit) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe({.cache_bytes = 14 * decoded_bytes(*scene_->tiles().front())});

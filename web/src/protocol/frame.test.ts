@@ -24,6 +24,20 @@ describe('TileFrame', () => {
     expect([...decoded.payload]).toEqual([99]);
   });
 
+  it('reads the errors of colour and temperature where the header has them', () => {
+    const long = decodeTileFrame(
+      frame((view) => {
+        view.setUint16(6, 80, true);
+        view.setUint32(68, 4, true);
+        view.setFloat32(72, 3.5, true);
+        view.setFloat32(76, 0.25, true);
+      }, 84),
+    );
+    expect([long.colour_error_levels, long.temperature_error_celsius]).toEqual([3.5, 0.25]);
+    const short = decodeTileFrame(frame(() => undefined));
+    expect([short.colour_error_levels, short.temperature_error_celsius]).toEqual([Number.NaN, Number.NaN]);
+  });
+
   it('keeps an unknown kind for the caller to ignore', () => {
     expect(decodeTileFrame(frame((view) => view.setUint8(4, 77))).kind).toBe(77);
   });

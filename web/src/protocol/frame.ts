@@ -1,6 +1,7 @@
 /** Tile frames: the binary messages of docs/protocol.md. */
 
 export const FRAME_MAGIC = 0x31435053;
+/** The shortest header; from 80 on it states the errors of colour and temperature too. */
 export const FRAME_HEADER_BYTES = 72;
 
 export const FrameKind = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5, colours_subtract_green: 6 } as const;
@@ -27,6 +28,10 @@ export interface TileFrame {
   /** NaN = no temperature under this tile. */
   lowest_celsius: number;
   highest_celsius: number;
+  /** Largest difference of a channel between the tile and the full mesh, 95th percentile, levels; NaN = not said. */
+  colour_error_levels: number;
+  /** The same of the temperature; NaN = none, or not said. */
+  temperature_error_celsius: number;
   /** A view into the message, not a copy. */
   payload: Uint8Array<ArrayBuffer>;
 }
@@ -82,6 +87,8 @@ export function decodeTileFrame(message: ArrayBuffer): TileFrame {
     geometric_error_m: f32(56),
     lowest_celsius: f32(60),
     highest_celsius: f32(64),
+    colour_error_levels: headerSize >= 80 ? f32(72) : Number.NaN,
+    temperature_error_celsius: headerSize >= 80 ? f32(76) : Number.NaN,
     payload: new Uint8Array(message, headerSize, payloadSize),
   };
 }

@@ -616,10 +616,14 @@ export interface StreamAccuracy {
    */
   position_mm: number | null;
   /**
-   * Levels of a colour channel.
+   * Levels of a colour channel that can be told apart; coarse tiles count.
    */
   colour_levels: number;
   pixel_error: number | null;
+  /**
+   * Of temperatures, for 95 % of the surface; null: there are none.
+   */
+  temperature_celsius: number | null;
 }
 /**
  * Params of the notification stream.ack.

@@ -94,6 +94,8 @@ describe('Golden frames', () => {
       ...fields,
       lowest_celsius: nullIfNone(fields.lowest_celsius),
       highest_celsius: nullIfNone(fields.highest_celsius),
+      colour_error_levels: nullIfNone(fields.colour_error_levels),
+      temperature_error_celsius: nullIfNone(fields.temperature_error_celsius),
       tile: [tile.level, tile.x, tile.y, tile.z],
       payload_size_bytes: payload.byteLength,
     }).toEqual(expected.header);

@@ -207,7 +207,12 @@ export const streamStats: Decoder<StreamStats> = object({
   queued_bytes: number,
   skipped_frames: count,
   viewers: count,
-  accuracy: object({ position_mm: nullable(number), colour_levels: number, pixel_error: nullable(number) }),
+  accuracy: object({
+    position_mm: nullable(number),
+    colour_levels: number,
+    pixel_error: nullable(number),
+    temperature_celsius: nullable(number),
+  }),
 });
 
 export const status: Decoder<Status> = object({

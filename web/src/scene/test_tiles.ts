@@ -36,6 +36,8 @@ export function tileFrame(tile: TileId, part: Partial<TileFrame> = {}): TileFram
     origin_m: [0, 0, 0],
     position_step_m: 1,
     geometric_error_m: 0,
+    colour_error_levels: 0,
+    temperature_error_celsius: 0,
     lowest_celsius: 0,
     highest_celsius: 0,
     payload: new Uint8Array(0),

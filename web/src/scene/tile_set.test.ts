@@ -180,15 +180,28 @@ describe('TileSet', () => {
     expect(tiles.progress(2)).toEqual({ current: 2, total: 2 });
   });
 
-  it('tells how far what is drawn and visible may be from the full mesh', () => {
+  it('tells how what is drawn and visible may differ from the full mesh', () => {
     const half_mm = 0.001 / Math.sqrt(3);
-    add(root, { child_mask: 0b11, geometric_error_m: 0.02, position_step_m: half_mm });
+    const coarse = { colour_error_levels: 9, temperature_error_celsius: 0.5 };
+    add(root, { child_mask: 0b11, geometric_error_m: 0.02, position_step_m: half_mm, ...coarse });
     const all = () => true;
-    expect(tiles.drawnError_m(all)).toBeCloseTo(0.0205, 9);
-    add(childTile(root, 0), { geometric_error_m: 0, position_step_m: half_mm });
-    add(childTile(root, 1), { geometric_error_m: 0.003, position_step_m: half_mm });
-    expect(tiles.drawnError_m(all)).toBeCloseTo(0.0035, 9);
-    expect(tiles.drawnError_m(() => false)).toBeNull();
+    expect(tiles.drawnError(all)).toMatchObject({ colour_levels: 9, temperature_celsius: 0.5 });
+    expect(tiles.drawnError(all)?.position_m).toBeCloseTo(0.0205, 9);
+    const none = Number.NaN;
+    add(childTile(root, 0), { geometric_error_m: 0, position_step_m: half_mm, temperature_error_celsius: none });
+    add(childTile(root, 1), { geometric_error_m: 0.003, position_step_m: half_mm, temperature_error_celsius: none });
+    expect(tiles.drawnError(all)).toMatchObject({ colour_levels: 0, temperature_celsius: null });
+    expect(tiles.drawnError(all)?.position_m).toBeCloseTo(0.0035, 9);
+    expect(tiles.drawnError(() => false)).toBeNull();
+  });
+
+  it('tells from the colours how they have been rounded', () => {
+    add(root, {}, 0b10101000);
+    expect(tiles.drawnError(() => true)).toMatchObject({ colour_levels: 0, rounding_levels: 4 });
+    tiles.addColours(frame(root, { generation: 2 }), new Uint8Array([255, 64, 32, 255, 0, 16, 48, 255, 16, 0, 0, 255]));
+    expect(tiles.drawnError(() => true)?.rounding_levels).toBe(8);
+    tiles.addColours(frame(root, { generation: 3 }), colours(1));
+    expect(tiles.drawnError(() => true)?.rounding_levels).toBe(0);
   });
 
   it('gives every tile its own name', () => {

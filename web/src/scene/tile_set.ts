@@ -11,12 +11,23 @@ export interface Drawable {
 
 export type CreateDrawable = (geometry: DecodedGeometry, rgba: Uint8Array<ArrayBuffer>) => Drawable;
 
+/** How what is drawn may differ from the full mesh. */
+export interface DrawnError {
+  /** Farthest that its surface may be away. */
+  position_m: number;
+  /** What channels of visible colours are off because tiles are coarse, for 95 % of the surface. */
+  colour_levels: number;
+  /** The same of temperatures; null = there are none. */
+  temperature_celsius: number | null;
+  /** What rounding adds to the colours as they are drawn: half a step; 0 when they are whole. */
+  rounding_levels: number;
+}
+
 interface Shown {
   drawable: Drawable;
   geometry: GeometrySummary;
   revision: number;
-  /** Farthest that its surface may be from the full mesh, metres. */
-  error_m: number;
+  error: DrawnError;
   /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
   rank: number;
   /** The server that is or was connected knows that this geometry is held here. */
@@ -36,7 +47,7 @@ interface TileNode {
   child_mask: number;
   shown: Shown | null;
   /** Geometry whose colours have not come yet. */
-  waitingGeometry: { revision: number; geometry: DecodedGeometry; error_m: number } | null;
+  waitingGeometry: { revision: number; geometry: DecodedGeometry; error: DrawnError } | null;
   /** Colours whose geometry is not decoded yet. */
   waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
   /** Rank of the oldest colours that stand on the screen when the children are drawn in this tile's place; NOTHING when they cannot be. */
@@ -158,9 +169,14 @@ export class TileSet {
     this.#setChildMask(node, frame.child_mask);
     const { shown } = node;
     if (shown !== null && !this.#isStale(shown) && frame.revision < shown.revision) return;
-    // Rounding moves a vertex by half a step along each of three axes at most.
-    const error_m = frame.geometric_error_m + (frame.position_step_m / 2) * Math.sqrt(3);
-    node.waitingGeometry = { revision: frame.revision, geometry, error_m };
+    const error: DrawnError = {
+      // Rounding moves a vertex by half a step along each of three axes at most.
+      position_m: frame.geometric_error_m + (frame.position_step_m / 2) * Math.sqrt(3),
+      colour_levels: frame.colour_error_levels,
+      temperature_celsius: Number.isNaN(frame.temperature_error_celsius) ? null : frame.temperature_error_celsius,
+      rounding_levels: 0,
+    };
+    node.waitingGeometry = { revision: frame.revision, geometry, error };
     this.#join(node);
   }
 
@@ -243,12 +259,18 @@ export class TileSet {
     return counts;
   }
 
-  /** Farthest that what is drawn may be from the full mesh, of the tiles that `isVisible`; null when there are none. */
-  drawnError_m(isVisible: (centre: Vec3, radius: number) => boolean): number | null {
-    let largest: number | null = null;
+  /** The largest errors of what is drawn, of the tiles that `isVisible`; null when there are none. */
+  drawnError(isVisible: (centre: Vec3, radius: number) => boolean): DrawnError | null {
+    let largest: DrawnError | null = null;
     for (const { shown } of this.#drawn) {
-      if (shown === null || shown.error_m <= (largest ?? -1)) continue;
-      if (isVisible(shown.geometry.centre, shown.geometry.radius)) largest = shown.error_m;
+      if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
+      const { error } = shown;
+      largest ??= { position_m: 0, colour_levels: 0, rounding_levels: 0, temperature_celsius: null };
+      largest.position_m = Math.max(largest.position_m, error.position_m);
+      largest.colour_levels = Math.max(largest.colour_levels, error.colour_levels);
+      largest.rounding_levels = Math.max(largest.rounding_levels, error.rounding_levels);
+      if (error.temperature_celsius !== null)
+        largest.temperature_celsius = Math.max(largest.temperature_celsius ?? 0, error.temperature_celsius);
     }
     return largest;
   }
@@ -326,16 +348,18 @@ export class TileSet {
       if (rank < shown.rank) return;
       checkLength(node, rgba, shown.geometry);
       shown.rank = rank;
+      shown.error.rounding_levels = roundingOf(rgba);
       shown.drawable.setColours(rgba);
       this.#arrived(node);
     } else if (waitingGeometry !== null && waitingGeometry.revision === revision) {
       node.waitingGeometry = null;
       node.waitingColours = null;
-      const { geometry, error_m } = waitingGeometry;
+      const { geometry, error } = waitingGeometry;
       checkLength(node, rgba, geometry.summary);
       shown?.drawable.dispose();
       const drawable = this.createDrawable(geometry, rgba);
-      node.shown = { drawable, geometry: geometry.summary, revision, error_m, rank, isKnownToServer: true };
+      error.rounding_levels = roundingOf(rgba);
+      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, isKnownToServer: true };
       if (node.isDrawn) drawable.setVisible(true);
       this.#arrived(node);
     }
@@ -393,6 +417,18 @@ export class TileSet {
     // Of tiles that are not held themselves, and not all of whose children are, whatever is there is drawn.
     for (const child of node.children) if (child !== undefined) this.#select(child);
   }
+}
+
+/** Half of the step to which colours have been rounded: multiples of a power of two, with 255 in the place of 256. */
+function roundingOf(rgba: Uint8Array): number {
+  let bits = 16;
+  for (let i = 0; i < rgba.length; i += 1) {
+    if ((i & 3) === 3) continue;
+    const channel = rgba[i]!;
+    if (channel !== 255) bits |= channel;
+    if ((bits & 1) !== 0) return 0;
+  }
+  return (bits & -bits) / 2;
 }
 
 function checkLength(node: TileNode, rgba: Uint8Array, { vertex_count }: GeometrySummary): void {

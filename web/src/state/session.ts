@@ -102,7 +102,7 @@ export class Session {
     this.#markers = new Markers(
       this.viewport,
       (depth) => {
-        const drawn_m = Math.max(store.quality?.position_step_mm ?? 0, store.position_error_mm ?? 0) / 1000;
+        const drawn_m = Math.max((store.quality?.position_step_mm ?? 0) / 1000, store.drawnError?.position_m ?? 0);
         const pixel_m = (2 * depth * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.viewport.size[1];
         return Math.max(2 * drawn_m, pixel_m);
       },
@@ -461,6 +461,7 @@ export class Session {
     if (this.tiles.updateSelection() || bytes > 0) {
       this.store.shown = this.tiles.counts();
       this.#look.pictureChanged();
+      this.#sayError();
     }
     clearTimeout(this.#nextPicture);
     if (next_ms !== null && next_ms > 0) this.#nextPicture = setTimeout(() => this.viewport.invalidate(), next_ms);
@@ -490,6 +491,7 @@ export class Session {
     store.camera = pose;
     store.axes = this.viewport.axesInView();
     this.#markers.update();
+    this.#sayError();
     if (store.pinned !== null) {
       store.pinned = { ...store.pinned, place: this.viewport.project(store.pinned.reading.probe.position) };
     }
@@ -522,8 +524,19 @@ export class Session {
     this.#rateWindow = this.#rateWindow.filter(({ at }) => now - at < 2000);
     store.rate_bytes_per_s = this.#rateWindow.reduce((sum, { bytes }) => sum + bytes, 0) / 2;
     if (store.behindSince !== null) store.progress = this.#progress();
-    const error_m = this.tiles.drawnError_m(this.viewport.visibility());
-    store.position_error_mm = error_m === null ? null : error_m * 1000;
+    this.#sayError();
+  }
+
+  /** What the status says of the picture, as soon as the picture is another one. */
+  #sayError(): void {
+    const error = this.tiles.drawnError(this.viewport.visibility());
+    const before = this.store.drawnError;
+    const isSame =
+      error?.position_m === before?.position_m &&
+      error?.colour_levels === before?.colour_levels &&
+      error?.rounding_levels === before?.rounding_levels &&
+      error?.temperature_celsius === before?.temperature_celsius;
+    if (!isSame) this.store.drawnError = error;
   }
 
   #progress(): number {

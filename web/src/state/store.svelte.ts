@@ -16,7 +16,7 @@ import type {
   Vec3,
 } from '../protocol/messages';
 import type { UpAxis } from '../scene/first_view';
-import type { TileCounts } from '../scene/tile_set';
+import type { DrawnError, TileCounts } from '../scene/tile_set';
 import type { LinkState } from '../transport/connection';
 import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
@@ -92,8 +92,8 @@ export class Store {
   pictureMethod = $state<string | null>(null);
   /** What the last finished change cost: bytes received and time until all of it was on the screen. */
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
-  /** Farthest that what is on the screen may be from the full mesh. */
-  position_error_mm = $state<number | null>(null);
+  /** How what is on the screen may differ from the full mesh; null = there is nothing. */
+  drawnError = $state.raw<DrawnError | null>(null);
   camera = $state.raw<CameraPose | null>(null);
   axes = $state.raw<{ x: Vec3; y: Vec3; z: Vec3 }>({ x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] });
   upAxis = $state<UpAxis>('y');
@@ -129,6 +129,8 @@ export class Store {
     ),
   );
   readonly connected = $derived(this.link.phase === 'open');
+  /** All that was asked for has come. */
+  readonly settled = $derived(this.complete !== null && this.behindSince === null);
   readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
   /** What is on its way for longer than a moment, or waits for a connection. */
   readonly unconfirmed = $derived<FusionChange | null>(
@@ -143,12 +145,8 @@ export class Store {
       this.pictureMethod !== this.fusion.method &&
       (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS)),
   );
-  /** How exact what is on the screen now is; nobody can say that of the picture of a lost link. */
-  readonly accuracy = $derived(
-    !this.connected || this.position_error_mm === null
-      ? null
-      : { position_mm: this.position_error_mm, colour_levels: this.stats?.accuracy.colour_levels ?? null },
-  );
+  /** How exact the picture is; nobody can say that of the picture of a lost link. */
+  readonly accuracy = $derived(this.connected ? this.drawnError : null);
   readonly graphicsLostFor_s = $derived(this.graphicsLostAt === null ? 0 : Math.max(0, (this.now - this.graphicsLostAt) / 1000));
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
 }

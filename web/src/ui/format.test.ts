@@ -48,9 +48,16 @@ describe('Numbers', () => {
   });
 
   it('say how exact the picture is', () => {
-    expect(plain(accuracyWords({ position_mm: 2, colour_levels: 256 }))).toBe('within 2 mm, colours exact');
-    expect(plain(accuracyWords({ position_mm: null, colour_levels: 64 }))).toBe('colours ±2 of 255');
-    expect(accuracyWords(null)).toBeNull();
+    const words = (position_m: number, colour_levels: number, temperature_celsius: number | null, isSettled: boolean) =>
+      plain(accuracyWords({ position_m, colour_levels, temperature_celsius, rounding_levels: 0 }, isSettled));
+    expect(words(0.04, 2.1, 0.395, false)).toBe('coarse: within 4 cm, 3 levels, 0.4 °C');
+    expect(words(0.002, 0.2, 0.001, true)).toBe('within 2 mm, 1 level, 0.01 °C');
+    expect(words(0.002, 0, 0, true)).toBe('within 2 mm, colours exact');
+    expect(words(0.002, 3, null, true)).toBe('within 2 mm, 3 levels');
+    expect(words(0.002, Number.NaN, null, true)).toBe('within 2 mm, colours coarse');
+    const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2 };
+    expect(plain(accuracyWords(rounded, true))).toBe('within 2 mm, 2 levels, 0 °C');
+    expect(accuracyWords(null, true)).toBeNull();
   });
 });
 

@@ -1,4 +1,5 @@
 /** Numbers as the instrument writes them. */
+import type { DrawnError } from '../scene/tile_set';
 
 import type { Probe, Scene } from '../protocol/messages';
 
@@ -92,14 +93,22 @@ export function duration(seconds: number): string {
   return `${fixed(Math.floor(seconds / 3600), 0)}${THIN_SPACE}h`;
 }
 
-/** How exact the picture is, in words. */
-export function accuracyWords(accuracy: { position_mm: number | null; colour_levels: number | null } | null): string | null {
-  if (accuracy === null) return null;
-  const parts: string[] = [];
-  if (accuracy.position_mm !== null) parts.push(`within ${length(accuracy.position_mm / 1000)}`);
-  if (accuracy.colour_levels !== null) {
-    const off = accuracy.colour_levels >= 256 ? 0 : 128 / accuracy.colour_levels;
-    parts.push(off === 0 ? 'colours exact' : `colours ±${figures(off, 2)} of 255`);
-  }
-  return parts.length === 0 ? null : parts.join(', ');
+/** How exact the picture is, in words: farthest that it may be off, for all but a twentieth of colours and temperatures. */
+export function accuracyWords(error: DrawnError | null, isSettled: boolean): string | null {
+  if (error === null) return null;
+  const { position_m, temperature_celsius } = error;
+  const colour_levels = error.colour_levels + error.rounding_levels;
+  const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
+  const parts = [`within ${length(position_m)}`];
+  if (!isOff) parts.push('colours exact');
+  else if (Number.isNaN(colour_levels)) parts.push('colours coarse');
+  else parts.push(withUnit(figures(roundedUp(colour_levels, 0), 3), colour_levels > 1 ? 'levels' : 'level'));
+  if (isOff && temperature_celsius !== null) parts.push(withUnit(figures(roundedUp(temperature_celsius, 2), 3), 'degC'));
+  return `${isSettled ? '' : 'coarse: '}${parts.join(', ')}`;
+}
+
+/** What is said of an error is never smaller than it. */
+function roundedUp(value: number, decimals: number): number {
+  const step = 10 ** -decimals;
+  return Math.ceil(value / step - 1e-6) * step;
 }
