@@ -150,7 +150,12 @@ export class SpectraClient {
       client.socket.once("open", resolve);
       client.socket.once("error", reject);
     });
-    client.closed = new Promise((resolve) => client.socket.once("close", (code) => resolve(code)));
+    client.closed = new Promise((resolve) =>
+      client.socket.once("close", (code, reason) => {
+        client.#end(new Error(`the connection was closed: ${code} ${reason}`));
+        resolve(code);
+      }),
+    );
     client.hello = await hello;
     return client;
   }
@@ -213,6 +218,10 @@ export class SpectraClient {
         clearTimeout(timer);
         resolve(params);
       };
+      waiter.reject = (error) => {
+        clearTimeout(timer);
+        reject(error);
+      };
       this.waiters.push(waiter);
     });
   }
@@ -226,6 +235,13 @@ export class SpectraClient {
   close() {
     this.socket.close();
     return this.closed;
+  }
+
+  /** Nobody waits for what cannot come any more. */
+  #end(error) {
+    for (const { reject } of [...this.pending.values(), ...this.waiters]) reject(error);
+    this.pending.clear();
+    this.waiters = [];
   }
 
   #receive(data, isBinary) {
