@@ -51,8 +51,9 @@ function boxes(page) {
       for (const item of footer.querySelectorAll('.item')) {
         if (!seen(item)) continue;
         const box = item.getBoundingClientRect();
-        const isIn = box.top < bar.bottom - 1;
-        if (isIn && (box.left < bar.left - 0.5 || box.right > bar.right + 0.5 || box.bottom > bar.bottom + 0.5))
+        const isIn = box.top < bar.bottom - 1 && box.bottom > bar.top + 1;
+        const room = item.parentElement.getBoundingClientRect();
+        if (isIn && (box.left < room.left - 0.5 || box.right > room.right + 0.5 || box.bottom > bar.bottom + 0.5))
           problems.push(`the status bar cuts ${name(item)}`);
       }
     }
