@@ -102,9 +102,9 @@ export class TileSet {
   }
 
   /** Every tile that has something to draw, drawn or not. */
-  *shownGeometries(): Iterable<{ geometry: GeometrySummary; visible: boolean }> {
-    for (const { shown, isDrawn } of this.#nodes.values()) {
-      if (shown !== null) yield { geometry: shown.geometry, visible: isDrawn };
+  *shownGeometries(): Iterable<{ level: number; geometry: GeometrySummary; visible: boolean }> {
+    for (const { id, shown, isDrawn } of this.#nodes.values()) {
+      if (shown !== null) yield { level: id.level, geometry: shown.geometry, visible: isDrawn };
     }
   }
 

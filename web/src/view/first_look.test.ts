@@ -44,7 +44,7 @@ function setUp(choices = new UpChoices(null)) {
       },
     },
     choices,
-    () => tiles.map((geometry) => ({ geometry })),
+    () => tiles.map((geometry, i) => ({ level: i === 0 ? 0 : 1, geometry })),
     (up) => {
       seen.up = up;
     },
@@ -54,6 +54,19 @@ function setUp(choices = new UpChoices(null)) {
 }
 
 describe('FirstLook', () => {
+  it('is the same whether finer tiles came with the first or not', () => {
+    const alone = setUp();
+    const together = setUp();
+    for (const { look, tiles } of [alone, together]) {
+      look.sceneIs(scene());
+      tiles.push(tile(grid(8)));
+    }
+    together.tiles.push(tile(grid(3), [0, -1, 0]), tile(grid(5), [1, 0, 0]));
+    alone.look.pictureChanged();
+    together.look.pictureChanged();
+    expect(together.seen.view).toEqual(alone.seen.view);
+  });
+
   it('is decided by the first tile and then left alone', () => {
     const { look, tiles, seen } = setUp();
     look.sceneIs(scene());

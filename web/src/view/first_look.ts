@@ -42,7 +42,7 @@ export class FirstLook {
   constructor(
     private readonly viewport: Looking,
     private readonly choices: UpChoices,
-    private readonly tiles: () => Iterable<{ geometry: GeometrySummary }>,
+    private readonly tiles: () => Iterable<{ level: number; geometry: GeometrySummary }>,
     private readonly onUp: (up: UpAxis) => void,
   ) {}
 
@@ -63,7 +63,8 @@ export class FirstLook {
   /** Tiles have come. */
   pictureChanged(): void {
     if (this.#scene === null || this.#decided !== null) return;
-    const geometries = this.#geometries();
+    // Whatever finer ones have come with it: what is seen first must not depend on how fast they are.
+    const geometries = this.#coarsest();
     if (geometries.length === 0) return;
     this.#decided = {
       points: withoutStrays(samplePoints(geometries), this.#scene.core_bounds ?? null),
@@ -129,6 +130,12 @@ export class FirstLook {
 
   #geometries(): GeometrySummary[] {
     return [...this.tiles()].map(({ geometry }) => geometry);
+  }
+
+  #coarsest(): GeometrySummary[] {
+    const tiles = [...this.tiles()];
+    const coarsest = Math.min(...tiles.map(({ level }) => level));
+    return tiles.filter(({ level }) => level === coarsest).map(({ geometry }) => geometry);
   }
 
   #decidedBox(): Bounds | null {
