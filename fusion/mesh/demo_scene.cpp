@@ -141,6 +141,7 @@ LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Pro
   MultispectralMesh mesh;
   mesh.name = "demo";
   mesh.up = UpAxis::Y;
+  mesh.is_metric = true;
   mesh.has_visible = true;
   mesh.has_temperature = true;
   mesh.resize_vertices(scene.positions.size());

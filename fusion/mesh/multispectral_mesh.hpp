@@ -57,6 +57,7 @@ class MultispectralMesh {
   Vec3d origin;
   std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
   UpAxis up = UpAxis::Z;
+  bool is_metric = false;         ///< Somebody has said that positions are in metres; otherwise they are taken for it.
   bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
   bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.
   bool double_positions = false;  ///< The input had double positions; output keeps them.

@@ -92,10 +92,9 @@ class Notes {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (vertices_.properties[*schema_.vertex[kX + axis]].type != PlyScalar::Float32) continue;
       const double furthest = std::max(std::abs(axes[axis].first), std::abs(axes[axis].second));
-      const auto stored = static_cast<float>(furthest / options_.metres_per_unit);
+      const auto stored = static_cast<float>(furthest / options_.scale());
       const float next = std::nextafter(stored, 0.0F);
-      rounding =
-          std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.metres_per_unit);
+      rounding = std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.scale());
     }
     if (origin != Vec3d{} && extent > 0 && rounding > kTooCoarse * extent) {
       add("rounded_positions", vertices_.count,
@@ -242,10 +241,12 @@ class Notes {
   void about_plausibility(const TemperatureFacts& facts) {
     const std::string range = "Temperatures from " + short_number(static_cast<double>(facts.lowest)) + " to " +
                               short_number(static_cast<double>(facts.highest)) + ", taken as degC, ";
-    const auto most = [&facts](std::uint64_t count) {
+    const std::uint64_t measured_count = facts.finite_count - facts.zero_count - facts.full_count;
+    const auto most = [measured_count](std::uint64_t count) {
       constexpr std::uint64_t kMost = 9;
-      return count > 0 && 10 * count >= kMost * (facts.finite_count - facts.zero_count);
+      return count > 0 && 10 * count >= kMost * measured_count;
     };
+    const std::string no_data = facts.full_count > 0 ? "; if 65535 stands for no data, --no-data 65535" : "";
     const PlyProperty& property = *temperature_property();
     const std::optional<TemperatureUnit> named = temperature_name(property.name).unit;
     const std::string call = "'" + printable(property.name) + "'";
@@ -253,21 +254,22 @@ class Notes {
     if (named == TemperatureUnit::Fahrenheit) {
       add(kId, facts.finite_count, range + "are in Fahrenheit by the name " + call + ": --temperature-unit fahrenheit");
     } else if (named == TemperatureUnit::Centikelvin || most(facts.centikelvin_like_count)) {
-      add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin");
+      add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin" + no_data);
     } else if (named == TemperatureUnit::Kelvin || most(facts.kelvin_like_count)) {
-      add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin");
+      add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin" + no_data);
     } else if (most(facts.tenth_kelvin_like_count)) {
       add(kId, facts.finite_count,
-          range + "look like tenths of kelvin: --temperature-scale 0.1 --temperature-offset -273.15");
+          range + "look like tenths of kelvin: --temperature-scale 0.1 --temperature-offset -273.15" + no_data);
     } else if (size_bytes(property.type) == 1) {
       add(kId, facts.finite_count,
           range + "are of type " + std::string(to_string(property.type)) +
               " and look like grey values: --temperature-scale A --temperature-offset B (degC = A value + B)");
-    } else if (facts.too_hot_count > facts.finite_count / 2) {
+    } else if (facts.too_hot_count - facts.full_count > measured_count / 2) {
       add(kId, facts.finite_count,
           range +
               "look like counts of a sensor or another quantity: --temperature-scale A --temperature-offset B "
-              "(degC = A value + B), or --temperature-property NAME");
+              "(degC = A value + B), or --temperature-property NAME" +
+              no_data);
     } else if (facts.too_hot_count > 0) {
       const std::string value = short_number(static_cast<double>(facts.highest));
       add(kId, facts.too_hot_count,
@@ -284,12 +286,11 @@ class Notes {
   void about_what_is_skipped() {
     const auto of = [](std::size_t count) { return counted(count, "property", "properties"); };
     const auto names = unused_names(vertices_, schema_.vertex, std::nullopt);
-    add("skipped_vertex_properties", names.size(),
-        of(names.size()) + " of the vertices without meaning here left out: " + joined(names));
+    add("skipped_vertex_properties", names.size(), of(names.size()) + " of the vertices left out: " + joined(names));
     if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
       const auto face_names = unused_names(*faces, schema_.face, schema_.corner_list);
       add("skipped_face_properties", face_names.size(),
-          of(face_names.size()) + " of the faces without meaning here left out: " + joined(face_names));
+          of(face_names.size()) + " of the faces left out: " + joined(face_names));
     }
     for (const PlyElement& element : header_.elements) {
       const bool is_read =

@@ -45,11 +45,11 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
   }
   BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, scene_options));
   Result<void> overlap = check_overlap(scene, thermal);
-  if (!overlap && options.metres_per_unit != 1) {
+  if (!overlap && options.scale() != 1) {
     const auto tell = [&options](LoadedScene& told, const std::string& scaled, const std::string& as_it_is) {
       told.notes.push_back({"scaled_one_file", 1,
-                            "--scale " + number_text(options.metres_per_unit) + " taken for " + scaled +
-                                " alone: " + as_it_is + " is in metres already"});
+                            "--scale " + number_text(options.scale()) + " taken for " + scaled + " alone: " + as_it_is +
+                                " is in metres already"});
     };
     ReadOptions unscaled = options;
     unscaled.metres_per_unit = 1;
@@ -108,7 +108,7 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
 
   // Doubles wait for the origin, which is known when all are read; floats can move there without loss, unless they are
   // scaled.
-  const bool is_exact = mesh.double_positions || options.metres_per_unit != 1;
+  const bool is_exact = mesh.double_positions || options.scale() != 1;
   std::vector<Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
   std::size_t kept_count = 0;
   const auto keep = [&](const PlyVertexBlock& block, std::size_t begin, std::size_t end) {

@@ -53,8 +53,7 @@ struct PlyBodyFacts {
 
 /// How the values of a file are taken.
 struct PlyInterpretation {
-  explicit PlyInterpretation(const ReadOptions& options)
-      : temperature(options), metres_per_unit(options.metres_per_unit) {}
+  explicit PlyInterpretation(const ReadOptions& options) : temperature(options), metres_per_unit(options.scale()) {}
 
   PlySchema schema;
   PlySurvey survey;

@@ -60,7 +60,7 @@ Result<void> check_read_options(const ReadOptions& options) {
       return failure(ErrorCode::OutOfRange, "no-data is a number; nan stands for no data anyway", "no_data");
     }
   }
-  if (!std::isfinite(options.metres_per_unit) || options.metres_per_unit <= 0) {
+  if (!std::isfinite(options.scale()) || options.scale() <= 0) {
     return failure(ErrorCode::OutOfRange, "scale is the metres in one unit of the file, a finite number above 0",
                    "scale");
   }

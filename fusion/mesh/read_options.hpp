@@ -33,13 +33,14 @@ struct ReadOptions {
   std::optional<double> temperature_offset;
   /// Values of the file, in its own unit, that stand for "nothing was measured". Infinite ones may be among them.
   std::vector<double> no_data;
-  /// Metres in one unit of the file's positions.
-  double metres_per_unit = 1;
+  /// Metres in one unit of the file's positions; absent: nobody has said, and they are taken for metres.
+  std::optional<double> metres_per_unit;
   /// Which way is up; absent: found out. Reading does not need it, survey() does.
   std::optional<UpAxis> up;
   /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.
   Progress progress;
 
+  double scale() const { return metres_per_unit.value_or(1); }
   /// How the temperature is scaled; nullopt: nobody said so, it is taken for degrees Celsius.
   std::optional<CelsiusScale> celsius_scale() const;
 };

@@ -68,13 +68,12 @@ bool speaks_of_metres(const LoadedScene& scene) {
 
 /// Rooms and machines measured in millimetres look like mountains. Maps are flatter, or lie at map coordinates (then
 /// there is an origin), or say what they count in.
-void judge_size(LoadedScene& scene, double metres_per_unit) {
+void judge_size(LoadedScene& scene) {
   const auto extents = extents_of(*scene.core_bounds);
   const double largest = *std::max_element(extents.begin(), extents.end());
   const double smallest = *std::min_element(extents.begin(), extents.end());
   const bool is_at_map_coordinates = scene.mesh.origin != Vec3d{};
-  if (metres_per_unit != 1 || largest < kRoomInMillimetres || smallest < kFlat * largest || is_at_map_coordinates ||
-      speaks_of_metres(scene)) {
+  if (scene.mesh.is_metric || largest < kRoomInMillimetres || smallest < kFlat * largest || is_at_map_coordinates) {
     return;
   }
   scene.notes.push_back({"may_be_millimetres", 1,
@@ -88,7 +87,8 @@ void judge_size(LoadedScene& scene, double metres_per_unit) {
 void survey(LoadedScene& scene, const ReadOptions& options) {
   find_strays(scene);
   find_up(scene, options.up);
-  judge_size(scene, options.metres_per_unit);
+  scene.mesh.is_metric = scene.mesh.is_metric || options.metres_per_unit || speaks_of_metres(scene);
+  judge_size(scene);
 }
 
 }  // namespace spectra::fusion

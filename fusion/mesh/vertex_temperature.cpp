@@ -18,6 +18,7 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   float lowest = facts.lowest;
   float highest = facts.highest;
   std::uint32_t zero = 0;
+  std::uint32_t full = 0;
   std::uint32_t kelvin = 0;
   std::uint32_t tenths = 0;
   std::uint32_t hundredths = 0;
@@ -27,6 +28,7 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
     lowest = c < lowest ? c : lowest;
     highest = c > highest ? c : highest;
     zero += static_cast<std::uint32_t>(c == 0.0F);
+    full += static_cast<std::uint32_t>(c == 65'535.0F);
     kelvin += static_cast<std::uint32_t>(c >= 200.0F) & static_cast<std::uint32_t>(c < 400.0F);
     tenths += static_cast<std::uint32_t>(c >= 2000.0F) & static_cast<std::uint32_t>(c < 4000.0F);
     hundredths += static_cast<std::uint32_t>(c >= 20'000.0F) & static_cast<std::uint32_t>(c < 40'000.0F);
@@ -37,6 +39,7 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   facts.lowest = lowest;
   facts.highest = highest;
   facts.zero_count += zero;
+  facts.full_count += full;
   facts.kelvin_like_count += kelvin;
   facts.tenth_kelvin_like_count += tenths;
   facts.centikelvin_like_count += hundredths;

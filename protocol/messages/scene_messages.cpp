@@ -53,6 +53,7 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("position_step_m", message.position_step_m);
   fields.require("position_step_m", message.position_step_m > 0, "a number above 0");
   fields.field("up", message.up);
+  fields.optional("metric", message.metric);
   fields.field("notes", message.notes);
 }
 

@@ -57,6 +57,7 @@ struct SceneDescription {
   std::uint32_t levels = 0;
   double position_step_m = 0;  ///< Default step of the positions, the largest where tiles differ; above 0.
   UpAxis up = UpAxis::Z;
+  std::optional<bool> metric;    ///< Positions are known to be in metres; else they are taken for it.
   std::vector<SceneNote> notes;  ///< What loading noticed.
 };
 

@@ -16,7 +16,8 @@ int run_demo_scene(const DemoSceneFileOptions& options) {
                      {fusion::kWritingPhase, "writing " + options.output.filename().string(), 1}});
   const auto mesh = fusion::demo_scene({options.vertex_count, options.seed}, line.sink());
   const auto written =
-      fusion::write_ply(options.output, mesh, mesh.visible(), "up " + std::string(to_string(mesh.up)), line.sink());
+      fusion::write_ply(options.output, mesh, mesh.visible(),
+                        "up " + std::string(to_string(mesh.up)) + "; positions in metres", line.sink());
   line.end();
   return written ? kDone : fail(written.error());
 }

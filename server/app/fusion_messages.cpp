@@ -268,6 +268,7 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   message.levels = static_cast<std::uint32_t>(scene.level_count());
   message.position_step_m = double{scene.suggested_position_step_m()};
   message.up = to_message(scene.up());
+  message.metric = scene.is_metric();
   for (const auto& note : scene.notes()) message.notes.push_back({note.id, note.count, note.message});
   return message;
 }

@@ -61,6 +61,7 @@ nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::Temper
           {"bounds", protocol::to_json(bounds)},
           {"core_bounds", protocol::to_json(core)},
           {"size_m", {size[0], size[1], size[2]}},
+          {"metric", mesh.is_metric},
           {"up", to_string(mesh.up)},
           {"temperature", protocol::to_json(to_message(temperature))},
           {"topology",
@@ -84,7 +85,8 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
   fmt::print("bounds       {} {} {} to {} {} {} m from the origin\n", bounds.min[0], bounds.min[1], bounds.min[2],
              bounds.max[0], bounds.max[1], bounds.max[2]);
   const auto size = size_of(core_bounds_of(loaded));
-  fmt::print("size         {:.6g} x {:.6g} x {:.6g} m\n", size[0], size[1], size[2]);
+  fmt::print("size         {:.6g} x {:.6g} x {:.6g} m{}\n", size[0], size[1], size[2],
+             mesh.is_metric ? "" : " (the file names no unit, metres are assumed; --scale gives another)");
   fmt::print("up           {}\n", to_string(mesh.up));
   fmt::print("colours      {}\n", mesh.has_visible ? "yes" : "none (shown as mid grey)");
   if (temperature.has_temperature()) {

@@ -208,6 +208,7 @@ class TiledSnapshot final : public SceneSnapshot {
         double_positions_(scene.mesh.double_positions),
         left_out_(scene.mesh.left_out),
         up_(scene.mesh.up),
+        is_metric_(scene.mesh.is_metric),
         notes_(std::move(scene.notes)) {
     std::vector<std::shared_ptr<Tile>> leaves = cut_leaves(std::move(scene.mesh), pool, leaf_vertex_count, levels);
     const double leaves_share = levels == LevelsOfDetail::All ? kLeavesShare : 1;
@@ -250,6 +251,7 @@ class TiledSnapshot final : public SceneSnapshot {
   const Bounds& bounds() const override { return bounds_; }
   const Bounds& core_bounds() const override { return core_bounds_; }
   fusion::UpAxis up() const override { return up_; }
+  bool is_metric() const override { return is_metric_; }
   std::span<const fusion::Note> notes() const override { return notes_; }
   int level_count() const override { return tiles_.empty() ? 0 : tiles_.back()->id.level + 1; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
@@ -303,6 +305,7 @@ class TiledSnapshot final : public SceneSnapshot {
     mesh.left_out = left_out_;
     mesh.name = name_;
     mesh.up = up_;
+    mesh.is_metric = is_metric_;
     mesh.resize_vertices(static_cast<std::size_t>(vertex_count_));
     mesh.triangles().resize(static_cast<std::size_t>(triangle_count_));
     const std::span<Vec3f> positions = mesh.positions();
@@ -406,6 +409,7 @@ class TiledSnapshot final : public SceneSnapshot {
   bool has_visible_, has_temperature_, double_positions_;
   std::vector<fusion::LeftOutVertex> left_out_;
   fusion::UpAxis up_;
+  bool is_metric_;
   std::vector<fusion::Note> notes_;
   Bounds bounds_, core_bounds_;
   std::vector<std::shared_ptr<const Tile>> tiles_;

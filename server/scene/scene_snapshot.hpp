@@ -108,6 +108,8 @@ class SceneSnapshot {
   /// Of all that is worth a look: bounds() without the few vertices that lie far from everything else.
   virtual const Bounds& core_bounds() const = 0;
   virtual fusion::UpAxis up() const = 0;
+  /// Somebody has said that positions are in metres; otherwise they are taken for it.
+  virtual bool is_metric() const = 0;
   /// What was noticed while the scene was read.
   virtual std::span<const fusion::Note> notes() const = 0;
   virtual int level_count() const = 0;

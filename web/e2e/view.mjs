@@ -158,7 +158,7 @@ export function addViewTests(browser, scratch) {
     const up = () => page.evaluate(() => [globalThis.spectra.store.upAxis, globalThis.spectra.viewport.pose.up]);
     const { scene } = await page.evaluate(() => ({ scene: globalThis.spectra.store.scene }));
     assert.equal((await up())[0], scene.up);
-    assert.match(await page.locator('[data-status="size"]').innerText(), /^[\d.]+\sm × [\d.]+\sm × [\d.]+\sm$/);
+    assert.match(await page.locator('[data-status="size"]').innerText(), /^[\d.]+ × [\d.]+ × [\d.]+\sm$/);
     await page.getByRole('radio', { name: '−X' }).click();
     await page.reload();
     await settled(page);

@@ -288,6 +288,26 @@ TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
             std::string::npos);
 }
 
+TEST(FieldKinds, ASensorsLargestCountDoesNotHideTheUnit) {
+  const auto said = [](double first, double step, std::size_t full_count) {
+    std::vector<std::string> lines = lines_of(first, step, 40);
+    for (std::size_t i = 0; i < full_count; ++i) lines[i] = "0 0 0 65535";
+    return note_text(loaded(text_file("property ushort temperature\n", lines)), "implausible_temperatures");
+  };
+  for (const std::size_t full_count : {1U, 25U}) {
+    EXPECT_NE(said(29000, 20, full_count).find("centikelvin; if 65535 stands for no data, --no-data 65535"),
+              std::string::npos)
+        << said(29000, 20, full_count);
+    EXPECT_NE(said(290, 1, full_count).find("--temperature-unit kelvin; if 65535"), std::string::npos)
+        << said(290, 1, full_count);
+    EXPECT_NE(said(7000, 20, full_count).find("counts of a sensor"), std::string::npos);
+    EXPECT_NE(said(15, 1, full_count).find(": if 65535 stands for no data, --no-data 65535"), std::string::npos)
+        << said(15, 1, full_count);
+  }
+  EXPECT_NE(said(15, 1, 40).find("--no-data 65535"), std::string::npos) << said(15, 1, 40);
+  EXPECT_EQ(said(29000, 20, 0).find("65535"), std::string::npos);
+}
+
 TEST(FieldKinds, TexturesAreSeenWhereverTheyAreSaid) {
   const std::string plain = text_file("property float s\nproperty float t\n", {"0 0 0 0.5 0.25"});
   EXPECT_EQ(note_count(loaded(plain), "texture"), 1U);

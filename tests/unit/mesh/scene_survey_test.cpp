@@ -4,8 +4,10 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fusion/mesh/up_search.hpp"
@@ -115,7 +117,7 @@ TEST(SceneSurvey, TakesUpAsItIsTold) {
 }
 
 TEST(SceneSurvey, NoticesMillimetresWhereTheyArePlausible) {
-  const auto is_noticed = [](LoadedScene scene, double metres_per_unit = 1) {
+  const auto is_noticed = [](LoadedScene scene, std::optional<double> metres_per_unit = {}) {
     ReadOptions options;
     options.metres_per_unit = metres_per_unit;
     survey(scene, options);
@@ -143,6 +145,23 @@ TEST(SceneSurvey, NoticesMillimetresWhereTheyArePlausible) {
   LoadedScene astray = sheet(3, 0.4, 2);
   astray.mesh.positions()[0] = {9000, 9000, 9000};
   EXPECT_FALSE(is_noticed(std::move(astray))) << "one stray point makes no large scene";
+}
+
+TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
+  const auto is_metric = [](std::vector<std::string> comments, std::optional<double> metres_per_unit = {}) {
+    LoadedScene scene = sheet(3, 0.4, 2);
+    scene.comments = std::move(comments);
+    ReadOptions options;
+    options.metres_per_unit = metres_per_unit;
+    survey(scene, options);
+    return scene.mesh.is_metric;
+  };
+  EXPECT_FALSE(is_metric({}));
+  EXPECT_FALSE(is_metric({"comment millimetres", "comment parameters"}));
+  EXPECT_TRUE(is_metric({"comment xyz metres; a quarry"}));
+  EXPECT_TRUE(is_metric({"obj_info unit: meter"}));
+  EXPECT_TRUE(is_metric({}, 0.001));
+  EXPECT_TRUE(is_metric({}, 1)) << "said, although it changes nothing";
 }
 
 TEST(SceneSurvey, BearsScenesOfNothing) {

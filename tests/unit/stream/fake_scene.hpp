@@ -27,6 +27,7 @@ class FakeScene : public SceneSnapshot {
   const Bounds& bounds() const override { return bounds_; }
   const Bounds& core_bounds() const override { return bounds_; }
   fusion::UpAxis up() const override { return fusion::UpAxis::Z; }
+  bool is_metric() const override { return true; }
   std::span<const fusion::Note> notes() const override { return {}; }
   int level_count() const override { return 3; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }

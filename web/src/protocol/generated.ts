@@ -316,6 +316,10 @@ export interface SceneDescription {
   position_step_m: number;
   up: UpAxis;
   /**
+   * Whether somebody (the file, or who serves it) has said that positions are in metres; otherwise they are taken for it. Absent: unknown.
+   */
+  metric?: boolean;
+  /**
    * What loading noticed.
    */
   notes: SceneNote[];

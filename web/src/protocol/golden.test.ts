@@ -33,6 +33,7 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
 const optionalFields = new Set([
   'resumed_tiles',
   'core_bounds',
+  'metric',
   'highlighted_share',
   'temperature_range',
   'over_range',

@@ -74,6 +74,7 @@ export const scene: Decoder<Scene> = object({
   levels: count,
   position_step_m: number,
   up: oneOf('x', 'y', 'z', '-x', '-y', '-z'),
+  metric: optional(boolean),
   notes: array(object({ id: string, count, message: string })),
 });
 

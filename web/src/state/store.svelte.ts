@@ -119,6 +119,8 @@ export class Store {
   readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
   readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
   readonly hasThermal = $derived(this.scene?.temperature.min != null);
+  /** Somebody has said that the scene is in metres; otherwise its lengths are shown in units. */
+  readonly isMetric = $derived(this.scene?.metric === true);
   /** Without thermal data every method shows the visible colours. */
   readonly viewMode = $derived<ViewMode>(this.hasThermal ? viewModeOf(this.fusion?.method ?? '') : 'visible');
   /** What the palette chooser says beside the palette is no note. */

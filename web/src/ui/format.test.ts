@@ -33,13 +33,14 @@ describe('Numbers', () => {
   });
 
   it('have fitting lengths', () => {
-    expect([0.0005, 0.002, 0.25, 12.345, 4500].map((m) => plain(length(m)))).toEqual([
+    expect([0.0005, 0.002, 0.25, 12.345, 4500].map((m) => plain(length(m, true)))).toEqual([
       '0.5 mm',
       '2 mm',
       '25 cm',
       '12.3 m',
       '4.5 km',
     ]);
+    expect([0.0005, 0.25, 4500].map((m) => plain(length(m, false)))).toEqual(['0.0005 units', '0.25 units', '4500 units']);
     expect(figures(0.000123456, 3)).toBe('0.000123');
   });
 
@@ -49,25 +50,31 @@ describe('Numbers', () => {
 
   it('say how exact the picture is', () => {
     const words = (position_m: number, colour_levels: number, temperature_celsius: number | null, isSettled: boolean) =>
-      plain(accuracyWords({ position_m, colour_levels, temperature_celsius, rounding_levels: 0 }, isSettled));
+      plain(accuracyWords({ position_m, colour_levels, temperature_celsius, rounding_levels: 0 }, isSettled, true));
     expect(words(0.04, 2.1, 0.395, false)).toBe('coarse: within 4 cm, 3 levels, 0.4 °C');
     expect(words(0.002, 0.2, 0.001, true)).toBe('within 2 mm, 1 level, 0.01 °C');
     expect(words(0.002, 0, 0, true)).toBe('within 2 mm, colours exact');
     expect(words(0.002, 3, null, true)).toBe('within 2 mm, 3 levels');
     expect(words(0.002, Number.NaN, null, true)).toBe('within 2 mm, colours coarse');
     const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2 };
-    expect(plain(accuracyWords(rounded, true))).toBe('within 2 mm, 2 levels, 0 °C');
-    expect(accuracyWords(null, true)).toBeNull();
+    expect(plain(accuracyWords(rounded, true, true))).toBe('within 2 mm, 2 levels, 0 °C');
+    expect(plain(accuracyWords(rounded, true, false))).toBe('within 0.002 units, 2 levels, 0 °C');
+    expect(accuracyWords(null, true, true)).toBeNull();
   });
 });
 
 describe('The size of a scene', () => {
   it('is in metres along each axis, so that a file in millimetres is noticed', () => {
     const bounds = { min: [0, -1000, 10] as [number, number, number], max: [3000, 2000, 50] as [number, number, number] };
-    expect(plain(extent({ bounds }))).toBe('3 000 m × 3 000 m × 40 m');
-    expect(plain(extent({ bounds, core_bounds: { min: [0, 0, 0], max: [3, 2.71828, 0.04567] } }))).toBe(
-      '3 m × 2.72 m × 0.0457 m',
-    );
-    expect(plain(extent({ bounds: { min: [0, 0, 0], max: [1_234_567, 0, 0] } }))).toBe('1 234 567 m × 0 m × 0 m');
+    expect(plain(extent({ bounds, metric: true }))).toBe('3 000 × 3 000 × 40 m');
+    const core_bounds = { min: [0, 0, 0] as [number, number, number], max: [3, 2.71828, 0.04567] as [number, number, number] };
+    expect(plain(extent({ bounds, core_bounds, metric: true }))).toBe('3 × 2.72 × 0.0457 m');
+    expect(plain(extent({ bounds: { min: [0, 0, 0], max: [1_234_567, 0, 0] }, metric: true }))).toBe('1 234 567 × 0 × 0 m');
+  });
+
+  it('is in units where nobody has said what they are', () => {
+    const bounds = { min: [0, 0, 0] as [number, number, number], max: [3000, 2000, 50] as [number, number, number] };
+    expect(plain(extent({ bounds, metric: false }))).toBe('3 000 × 2 000 × 50 units');
+    expect(plain(extent({ bounds }))).toBe('3 000 × 2 000 × 50 units');
   });
 });

@@ -54,8 +54,9 @@ export function bytes(value: number): string {
   return value < 1000 ? `${fixed(value, 0)}${THIN_SPACE}B` : `${count(value)}B`;
 }
 
-/** A length with a fitting unit, three figures. */
-export function length(value_m: number): string {
+/** A length with a fitting unit, three figures; where nobody has said that the scene is metric, in its own units. */
+export function length(value_m: number, isMetric: boolean): string {
+  if (!isMetric) return withUnit(figures(value_m, Math.abs(value_m) < 1 ? 2 : 3), 'units');
   const size = Math.abs(value_m);
   if (size === 0) return withUnit('0', 'm');
   if (size < 0.01) return withUnit(figures(value_m * 1000, 2), 'mm');
@@ -63,17 +64,24 @@ export function length(value_m: number): string {
   return size < 1000 ? withUnit(figures(value_m, 3), 'm') : withUnit(figures(value_m / 1000, 3), 'km');
 }
 
-/** A length in metres, so that one thousandfold stands out: 3 000 m, 0.2 m. */
-function metres(value_m: number): string {
-  const [whole = '', rest] = figures(value_m, value_m < 1000 ? 3 : 4).split('.');
-  const grouped = whole.replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
-  return withUnit(rest === undefined ? grouped : `${grouped}.${rest}`, 'm');
+/** A length without a prefix, so that one thousandfold stands out: 3 000, 0.2. */
+function grouped(value: number): string {
+  const [whole = '', rest] = figures(value, value < 1000 ? 3 : 4).split('.');
+  const groups = whole.replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
+  return rest === undefined ? groups : `${groups}.${rest}`;
 }
 
-/** Size of a scene along its axes, without its strays. */
-export function extent({ bounds, core_bounds }: Pick<Scene, 'bounds' | 'core_bounds'>): string {
+/** Size of a scene along its axes, without its strays: in metres, or in units where nobody has said what they are. */
+export function extent({ bounds, core_bounds, metric }: Pick<Scene, 'bounds' | 'core_bounds' | 'metric'>): string {
   const { min, max } = core_bounds ?? bounds;
-  return [0, 1, 2].map((axis) => metres((max[axis] ?? 0) - (min[axis] ?? 0))).join(' × ');
+  const sides = [0, 1, 2].map((axis) => grouped((max[axis] ?? 0) - (min[axis] ?? 0)));
+  return withUnit(sides.join(' × '), metric === true ? 'm' : 'units');
+}
+
+/** What the size of a scene is, and where its unit comes from. */
+export function sizeTitle({ metric }: Pick<Scene, 'metric'>): string {
+  const size = 'Size of the scene along x, y and z';
+  return metric === true ? size : `${size}. Its file does not say in what unit; --scale S does: metres in one of them`;
 }
 
 /** So many significant figures, no exponent, no trailing zeros. */
@@ -94,12 +102,12 @@ export function duration(seconds: number): string {
 }
 
 /** How exact the picture is, in words: farthest that it may be off, for all but a twentieth of colours and temperatures. */
-export function accuracyWords(error: DrawnError | null, isSettled: boolean): string | null {
+export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMetric: boolean): string | null {
   if (error === null) return null;
   const { position_m, temperature_celsius } = error;
   const colour_levels = error.colour_levels + error.rounding_levels;
   const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
-  const parts = [`within ${length(position_m)}`];
+  const parts = [`within ${length(position_m, isMetric)}`];
   if (!isOff) parts.push('colours exact');
   else if (Number.isNaN(colour_levels)) parts.push('colours coarse');
   else parts.push(withUnit(figures(roundedUp(colour_levels, 0), 3), colour_levels > 1 ? 'levels' : 'level'));
