@@ -17,8 +17,10 @@ using fusion::Vec3f;
 
 constexpr std::size_t kLeafSamples = 1024;
 constexpr std::size_t kMostSamples = 4096;
-/// 95 % of the surface, and what chance may do to a share of the samples.
-constexpr double kShare = 0.965;
+/// 95 % of the surface, and what chance may do to a share of the samples: 1.5 of its deviations, and no less than this.
+constexpr double kShare = 0.95, kLeastMargin = 0.015;
+/// Of a tile's surface: an eighth of the tile that holds less of it is not looked at by itself.
+constexpr double kLeastShare = 1.0 / 16;
 /// Cells from a 1024th to an eighth of the tile.
 constexpr int kFinestBits = 10, kCoarsestBits = 3;
 
@@ -47,17 +49,51 @@ Shown shown_at(const Tile& tile, const Surface& surface, const Vec3f& p, std::ui
   return shown;
 }
 
-/// The value that this share of the weight does not exceed.
-double percentile(std::vector<std::pair<float, float>>& value_and_weight) {
-  std::sort(value_and_weight.begin(), value_and_weight.end());
-  double total = 0;
-  for (const auto& [_, weight] : value_and_weight) total += static_cast<double>(weight);
-  double sum = 0;
-  for (const auto& [value, weight] : value_and_weight) {
-    sum += static_cast<double>(weight);
-    if (sum >= kShare * total) return static_cast<double>(value);
+/// Differences of the samples of a part, and how much of the surface each stands for.
+struct Differences {
+  std::vector<std::pair<float, float>> value_and_weight;
+  double weight = 0;
+
+  void add(double value, float its_weight) {
+    value_and_weight.emplace_back(static_cast<float>(value), its_weight);
+    weight += static_cast<double>(its_weight);
   }
-  return 0;
+  void join(const Differences& other) {
+    value_and_weight.insert(value_and_weight.end(), other.value_and_weight.begin(), other.value_and_weight.end());
+    weight += other.weight;
+  }
+  /// The value that 95 % of the surface do not exceed.
+  double percentile() {
+    if (value_and_weight.empty()) return 0;
+    std::sort(value_and_weight.begin(), value_and_weight.end());
+    const double deviation = std::sqrt(kShare * (1 - kShare) / static_cast<double>(value_and_weight.size()));
+    const double share = std::min(kShare + std::max(kLeastMargin, 1.5 * deviation), 1.0);
+    double sum = 0;
+    for (const auto& [value, its_weight] : value_and_weight) {
+      sum += static_cast<double>(its_weight);
+      if (sum >= share * weight) return static_cast<double>(value);
+    }
+    return static_cast<double>(value_and_weight.back().first);
+  }
+};
+
+using Parts = std::array<Differences, 8>;
+
+/// The largest of the tile as a whole and of its eighths: whoever is near has one of them alone on the screen.
+double largest_percentile(Parts& parts) {
+  Differences whole;
+  for (const Differences& part : parts) whole.join(part);
+  double largest = whole.percentile();
+  for (Differences& part : parts) {
+    if (part.weight > kLeastShare * whole.weight) largest = std::max(largest, part.percentile());
+  }
+  return largest;
+}
+
+std::size_t octant_of(const Vec3f& p, const Bounds& bounds) {
+  const auto is_upper = [](float at, float low, float high) { return at > low + (high - low) / 2 ? 1U : 0U; };
+  return is_upper(p.x, bounds.min.x, bounds.max.x) | is_upper(p.y, bounds.min.y, bounds.max.y) << 1U |
+         is_upper(p.z, bounds.min.z, bounds.max.z) << 2U;
 }
 
 }  // namespace
@@ -127,19 +163,20 @@ void thin_out(std::vector<FullSample>& samples) {
 }
 
 void measure_seen_error(Tile& tile, const Surface& surface, std::span<const FullSample> samples) {
-  std::vector<std::pair<float, float>> colour, temperature;
+  Parts colour, temperature;
   for (const FullSample& sample : samples) {
+    const std::size_t octant = octant_of(sample.position, tile.bounds);
     const Shown shown = shown_at(tile, surface, sample.position, sample.near);
     const auto channels = channels_of(sample.visible);
     double largest = 0;
     for (unsigned j = 0; j < 3; ++j) largest = std::max(largest, std::fabs(channels[j] - shown.channels[j]));
-    colour.emplace_back(static_cast<float>(largest), sample.weight);
+    colour[octant].add(largest, sample.weight);
     const double difference = std::fabs(static_cast<double>(sample.celsius) - shown.celsius);
-    if (std::isfinite(difference)) temperature.emplace_back(static_cast<float>(difference), sample.weight);
+    if (std::isfinite(difference)) temperature[octant].add(difference, sample.weight);
   }
   const auto raise = [](float& error, double by) { error = std::fmax(error, static_cast<float>(by)); };
-  raise(tile.colour_error_levels, percentile(colour));
-  if (!std::isnan(tile.lowest_celsius)) raise(tile.temperature_error_celsius, percentile(temperature));
+  raise(tile.colour_error_levels, largest_percentile(colour));
+  if (!std::isnan(tile.lowest_celsius)) raise(tile.temperature_error_celsius, largest_percentile(temperature));
 }
 
 double lost_detail_m(const Tile& tile, const Surface& surface, const MergedTiles& mesh, const Surface& fine,

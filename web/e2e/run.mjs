@@ -17,6 +17,7 @@ import {
   startServer,
   test,
 } from './harness.mjs';
+import { addAccuracyTests } from './accuracy.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLoadTests } from './load.mjs';
@@ -484,6 +485,7 @@ test('Nothing broke the content policy', () => {
   );
 });
 
+addAccuracyTests(browser);
 addLayoutTests(browser);
 addLinkTests(browser);
 addLoadTests(browser, scratch);

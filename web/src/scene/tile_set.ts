@@ -15,7 +15,7 @@ export type CreateDrawable = (geometry: DecodedGeometry, rgba: Uint8Array<ArrayB
 export interface DrawnError {
   /** Farthest that its surface may be away. */
   position_m: number;
-  /** What channels of visible colours are off because tiles are coarse, for 95 % of the surface. */
+  /** What channels of visible colours are off because tiles are coarse, for 95 % of the surface, or of the eighth of a tile where it is worst. */
   colour_levels: number;
   /** The same of temperatures; null = there are none. */
   temperature_celsius: number | null;
