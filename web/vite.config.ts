@@ -1,13 +1,15 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vitest/config';
 import { precompressed } from './scripts/precompressed';
+import { programPreload } from './scripts/program_preload';
 
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [svelte(), precompressed()],
+  plugins: [svelte(), programPreload(), precompressed()],
   base: './',
-  build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0 },
+  // One style sheet and plain imports: the page itself says what is to be loaded early.
+  build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0, cssCodeSplit: false, modulePreload: false },
   worker: { format: 'es' },
   // By number: a machine without /etc/hosts does not know "localhost".
   server: {

@@ -1,8 +1,5 @@
-import { mount } from 'svelte';
-import App from './ui/App.svelte';
-import './ui/app.css';
+import { beginHeadStart } from './head_start';
 
-const target = document.getElementById('app');
-if (target === null) throw new Error('the page has no #app');
-// In a task of its own: together with reading the program it would be a long one.
-setTimeout(() => mount(App, { target }));
+// A module of its own, so that it is small and there first.
+beginHeadStart();
+void import('./ui/program');

@@ -89,6 +89,7 @@ export async function linkProxy(target_url, { rate_bytes_per_s = Infinity, delay
 
   const sockets = new Set();
   const connections = [];
+  const requests = [];
   const lines = { up: { freeAt: 0 }, down: { freeAt: 0 } };
   const proxy = net.createServer({ noDelay: true }, (near) => {
     const far = net.connect({ host: target.hostname, port: Number(target.port), noDelay: true });
@@ -99,6 +100,10 @@ export async function linkProxy(target_url, { rate_bytes_per_s = Infinity, delay
     const connection = { path: "", received_bytes: 0 };
     connections.push(connection);
     near.once("data", (chunk) => (connection.path = chunk.toString("latin1").split(" ")[1]));
+    near.on("data", (chunk) => {
+      const [method, path] = chunk.toString("latin1", 0, 300).split(" ");
+      if (method === "GET") requests.push(path);
+    });
     new Lane(near, far, link, lines.up);
     new Lane(far, near, link, lines.down, connection);
   });
@@ -108,6 +113,8 @@ export async function linkProxy(target_url, { rate_bytes_per_s = Infinity, delay
     link,
     /** Every connection so far: the path that it asked for first, and how much has come back. */
     connections,
+    /** What has been asked for so far, in order. */
+    requests,
     /** Nothing passes for that long. */
     stall(duration_ms) {
       link.stalledUntil = performance.now() + duration_ms;

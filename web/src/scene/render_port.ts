@@ -1,3 +1,4 @@
+import { takePictureWorker } from '../head_start';
 import type { RenderReply, RenderRequest } from './render_messages';
 
 /** The way to the side that draws. */
@@ -6,13 +7,9 @@ export interface RenderPort {
   dispose(): void;
 }
 
-/** True where a worker can draw on a canvas of the page, so that nothing the GPU does keeps the page waiting. */
-export const CAN_DRAW_IN_WORKER =
-  typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in HTMLCanvasElement.prototype;
-
 /** Draws in a worker of its own. */
 export function startRenderWorker(canvas: HTMLCanvasElement, onReply: (reply: RenderReply) => void): RenderPort {
-  const worker = new Worker(new URL('./render_worker.ts', import.meta.url), { type: 'module', name: 'picture' });
+  const worker = takePictureWorker();
   worker.onmessage = ({ data }: MessageEvent<RenderReply>) => onReply(data);
   worker.onerror = (event) => onReply({ kind: 'failed', message: event.message || 'the drawing worker failed' });
   const offscreen = canvas.transferControlToOffscreen();

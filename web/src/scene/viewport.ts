@@ -28,6 +28,8 @@ export interface ViewportEvents {
   onDetail: (levels: number) => void;
   /** The browser has taken the GPU away, or given it back and the picture is drawn again. */
   onContext: (isLost: boolean) => void;
+  /** The first picture with any of the scene in it stands on the screen. */
+  onFirstPicture: () => void;
   /** The drawing side has failed; `everDrew` false: it could not even start. */
   onFailure: (message: string, everDrew: boolean) => void;
 }
@@ -61,6 +63,11 @@ export class Viewport {
   #sent = 0;
   #drawn = 0;
   #isHeldUp = false;
+  /** Between the beginning of a picture and its sending. */
+  #isPutTogether = false;
+  /** Number of the first picture that has any of the scene in it; null: it has not been sent, or it stands already. */
+  #firstPicture: number | null = null;
+  #hasShown = false;
   #gpu: GpuObjects = { geometries: 0, textures: 0, programs: 0, triangles: 0, calls: 0 };
   #questionId = 0;
   #questions = new Map<number, (reply: RenderReply) => void>();
@@ -135,7 +142,13 @@ export class Viewport {
     ]);
     return {
       setColours: (next) => this.#change({ change: 'colours', tile, rgba: next }, [next.buffer]),
-      setVisible: (visible) => this.#change({ change: 'visible', tile, visible }),
+      setVisible: (visible) => {
+        if (visible && !this.#hasShown) {
+          this.#hasShown = true;
+          this.#firstPicture = this.#sent + 1;
+        }
+        this.#change({ change: 'visible', tile, visible });
+      },
       dispose: () => this.#change({ change: 'dispose', tile }),
     };
   }
@@ -291,7 +304,7 @@ export class Viewport {
   }
 
   invalidate(): void {
-    if (this.#frame === 0) this.#frame = requestAnimationFrame((now) => this.#tick(now));
+    if (this.#frame === 0 && !this.#isPutTogether) this.#frame = requestAnimationFrame((now) => this.#tick(now));
   }
 
   dispose(): void {
@@ -324,9 +337,15 @@ export class Viewport {
     const moved = this.#controls.update(elapsed_s);
     if (moved && !this.#isJump) this.#moves();
     this.#isJump = false;
+    // What changes meanwhile is in this picture: it calls for no other one.
+    this.#isPutTogether = true;
     const more = this.events.beforeRender();
+    this.#isPutTogether = false;
+    // It may have decided where to look from, too: nothing is seen from anywhere else first.
+    const jumped = this.#isJump && this.#controls.update(0);
+    this.#isJump = false;
     this.#send();
-    if (moved) this.events.onCamera(this.pose);
+    if (moved || jumped) this.events.onCamera(this.pose);
     if (moved || more) this.invalidate();
   }
 
@@ -405,6 +424,10 @@ export class Viewport {
         this.#gpu = reply.gpu;
         this.#drawnIn(reply.ms, this.#notches.get(reply.number) ?? null);
         for (const number of this.#notches.keys()) if (number <= reply.number) this.#notches.delete(number);
+        if (this.#firstPicture !== null && reply.number >= this.#firstPicture) {
+          this.#firstPicture = null;
+          this.events.onFirstPicture();
+        }
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
         this.invalidate();

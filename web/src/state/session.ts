@@ -1,4 +1,5 @@
 import { DecodePool, Superseded } from '../decode/pool';
+import { takeDecodeWorker, takeSocket } from '../head_start';
 import { decodeTileFrame, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
@@ -44,10 +45,6 @@ const SIGHT_SHARE = 0.08;
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
 
-function createDecodeWorker(): Worker {
-  return new Worker(new URL('../decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' });
-}
-
 /** One user's session: the connection, what it brings, and the actions of the interface. */
 export class Session {
   readonly viewport: Viewport;
@@ -87,6 +84,10 @@ export class Session {
       onContext: (isLost) => {
         store.graphicsLostAt = isLost ? performance.now() : null;
       },
+      onFirstPicture: () => {
+        store.pictureStands = true;
+        this.#askFacts();
+      },
       onFailure: drawing.onFailure,
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker);
@@ -111,25 +112,29 @@ export class Session {
         store.marks = marks;
       },
     );
-    this.#intake = new FrameIntake(this.tiles, new DecodePool(createDecodeWorker), {
+    this.#intake = new FrameIntake(this.tiles, new DecodePool(takeDecodeWorker), {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),
       onProblem: (error) => this.#say(error),
     });
-    this.#connection = new Connection(url, {
-      onHello: (message) => this.#greeted(message),
-      onNotification: (method, params) => this.#notified(method, params),
-      onFrame: (message) => this.#received(message),
-      onState: (state) => {
-        store.link = state;
-        if (state.phase === 'waiting' && store.lostAt === null && store.scene !== undefined) this.#disconnected();
+    this.#connection = new Connection(
+      url,
+      {
+        onHello: (message) => this.#greeted(message),
+        onNotification: (method, params) => this.#notified(method, params),
+        onFrame: (message) => this.#received(message),
+        onState: (state) => {
+          store.link = state;
+          if (state.phase === 'waiting' && store.lostAt === null && store.scene !== undefined) this.#disconnected();
+        },
+        onProtocolError: (error) => console.warn('left out:', error.message),
+        onRoundTrip: (round_trip_ms) => {
+          const before = store.round_trip_ms;
+          store.round_trip_ms = before === null ? round_trip_ms : before + (round_trip_ms - before) * 0.3;
+        },
       },
-      onProtocolError: (error) => console.warn('left out:', error.message),
-      onRoundTrip: (round_trip_ms) => {
-        const before = store.round_trip_ms;
-        store.round_trip_ms = before === null ? round_trip_ms : before + (round_trip_ms - before) * 0.3;
-      },
-    });
+      takeSocket,
+    );
     this.settings = new Settings(store, {
       request: (method, params) => this.#connection.request(method, params),
       onChange: () => this.#markBehind(),
@@ -404,6 +409,13 @@ export class Session {
       store.pinned = null;
       store.pictureMethod = null;
     }
+    this.#askFacts();
+  }
+
+  /** What is said of the scene beside the picture; the first picture goes before it. */
+  #askFacts(): void {
+    const { store } = this;
+    if (!store.scene || !store.pictureStands) return;
     this.#histogramAsker.push(true);
     this.#connection
       .request('scene.extremes', {})
@@ -428,7 +440,7 @@ export class Session {
   }
 
   async #askHistogram(): Promise<void> {
-    if (!this.store.scene) return;
+    if (!this.store.scene || !this.store.pictureStands) return;
     try {
       this.store.histogram = histogram(
         await this.#connection.request('scene.histogram', { bins: HISTOGRAM_BINS }),

@@ -81,6 +81,8 @@ export class Store {
   statuses = $state.raw<Status[]>([]);
   complete = $state.raw<StreamComplete | null>(null);
   shown = $state.raw<TileCounts>({ tiles: 0, vertices: 0, triangles: 0 });
+  /** The first picture is on the screen: what is not needed for it need not wait any longer. */
+  pictureStands = $state(false);
   received_bytes = $state(0);
   rate_bytes_per_s = $state(0);
   round_trip_ms = $state<number | null>(null);

@@ -1,6 +1,5 @@
 import { decodeServerMessage, type Hello, hello, type RpcErrorBody } from '../protocol/messages';
 
-export const SUBPROTOCOL = 'spectra.v1';
 /** RpcError.code of a request that was refused for its rate alone. */
 export const BUSY = -32003;
 
@@ -87,7 +86,7 @@ export class Connection {
   constructor(
     private readonly url: string,
     private readonly events: ConnectionEvents,
-    private readonly openSocket: (url: string) => SocketLike = (address) => new WebSocket(address, SUBPROTOCOL),
+    private readonly openSocket: (url: string) => SocketLike,
   ) {}
 
   /** When the last message of any kind came, on performance.now()'s clock. */
