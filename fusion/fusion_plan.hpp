@@ -43,6 +43,9 @@ class FusionPlan {
   /// highlight resembles, it makes another. All 0 for a method that treats all temperatures alike.
   void mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept;
 
+  /// The method highlights some temperatures: mark() may write 1.
+  bool highlights() const { return marking_kernel_ != nullptr; }
+
   const FusionSettings& settings() const { return *settings_; }
 
   /// The active range in degC; both 0 when the scene has no temperature.

@@ -298,8 +298,9 @@ std::uint8_t rounded_channel(std::uint8_t value, int colour_bits) {
 }
 
 Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed,
-                                               ColourTransform transform) {
+                                               ColourTransform transform, std::span<const std::uint8_t> marks) {
   if (colours.empty()) return internal("no colours to encode");
+  if (!marks.empty() && marks.size() != colours.size()) return internal("not one mark for each colour");
   if (colours.size() > std::numeric_limits<std::int32_t>::max()) return internal("too many colours");
   if (colour_bits < 1 || colour_bits > 8)
     return internal("colour bits " + std::to_string(colour_bits) + " are not within 1..8");
@@ -316,6 +317,7 @@ Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colo
   } else {
     add_green_and_differences(cloud, rounded);
   }
+  if (!marks.empty()) add_attribute(cloud, draco::GeometryAttribute::GENERIC, draco::DT_UINT8, 1, false, marks);
   draco::ExpertEncoder encoder(cloud);
   encoder.SetSpeedOptions(speed, speed);
   encoder.SetEncodingMethod(draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
@@ -387,6 +389,20 @@ Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payl
                   static_cast<std::uint8_t>(red_and_blue[1] + green)};
   }
   return colours;
+}
+
+Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> payload) {
+  draco::DecoderBuffer stream = decoder_buffer(payload);
+  draco::Decoder decoder;
+  auto decoded = decoder.DecodePointCloudFromBuffer(&stream);
+  if (!decoded.ok()) return internal("does not decode: " + decoded.status().error_msg_string());
+  const draco::PointCloud& cloud = *decoded.value();
+  const draco::PointAttribute* last = cloud.attribute(cloud.num_attributes() - 1);
+  std::vector<std::uint8_t> marks;
+  if (last->attribute_type() != draco::GeometryAttribute::GENERIC || !is_of_bytes(last, 1)) return marks;
+  marks.resize(cloud.num_points());
+  for (std::uint32_t i = 0; i < cloud.num_points(); ++i) last->GetMappedValue(draco::PointIndex(i), &marks[i]);
+  return marks;
 }
 
 }  // namespace spectra::protocol

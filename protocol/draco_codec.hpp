@@ -35,8 +35,10 @@ Result<EncodedGeometry> encoded_geometry(std::span<const LatticePoint> positions
 /// Encodes colours, value i for decoded vertex i, as a sequential Draco point cloud: one COLOR attribute of 3 bytes, or with
 /// SubtractGreen a COLOR attribute of one byte and a GENERIC one of two.
 /// With colour_bits b < 8 each channel is first rounded to the nearest multiple of 2^(8-b), half up, 256 becoming 255.
+/// `marks`, where there are any, one per colour and each 0 or 1, follow as a GENERIC attribute of one byte.
 Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colours, int colour_bits, int speed,
-                                               ColourTransform transform = ColourTransform::None);
+                                               ColourTransform transform = ColourTransform::None,
+                                               std::span<const std::uint8_t> marks = {});
 
 /// The channel value that a decoder sees for `value` at `colour_bits`.
 std::uint8_t rounded_channel(std::uint8_t value, int colour_bits);
@@ -49,5 +51,7 @@ struct DecodedGeometry {
 Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload);
 Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload,
                                                  ColourTransform transform = ColourTransform::None);
+/// The marks beside colours; empty where there are none.
+Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> payload);
 
 }  // namespace spectra::protocol

@@ -26,6 +26,7 @@ static void describe(auto& fields, Is<QualityState> auto& message) {
   fields.require("encoder_speed", message.encoder_speed >= 0 && message.encoder_speed <= 10, kSpeed);
   fields.field("latency_target_ms", message.latency_target_ms);
   fields.require("latency_target_ms", message.latency_target_ms > 0, kPositive);
+  fields.field("marks", message.marks);
 }
 
 static void describe(auto& fields, Is<QualityChange> auto& message) {
@@ -42,6 +43,7 @@ static void describe(auto& fields, Is<QualityChange> auto& message) {
                  kSpeed);
   fields.optional("latency_target_ms", message.latency_target_ms);
   fields.require("latency_target_ms", message.latency_target_ms.value_or(1) > 0, kPositive);
+  fields.optional("marks", message.marks);
 }
 
 static void describe(auto& fields, Is<QualityReply> auto& message) {

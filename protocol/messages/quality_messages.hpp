@@ -16,6 +16,7 @@ struct QualityState {
   double pixel_error = 1;       ///< Above 0; pixels on the screen.
   int encoder_speed = 7;        ///< 0 smallest .. 10 fastest.
   double latency_target_ms = 200;
+  bool marks = false;  ///< Colours carry which vertices the method highlights.
 };
 
 /// Params of quality.set; what is absent stays.
@@ -26,6 +27,7 @@ struct QualityChange {
   std::optional<double> pixel_error;
   std::optional<int> encoder_speed;
   std::optional<double> latency_target_ms;
+  std::optional<bool> marks;
 };
 
 /// Result of quality.set.

@@ -333,6 +333,7 @@ protocol::QualityState to_message(const StreamQuality& quality) {
   message.pixel_error = quality.pixel_error;
   message.encoder_speed = quality.encoder_speed;
   message.latency_target_ms = quality.latency_target_ms;
+  message.marks = quality.marks;
   return message;
 }
 
@@ -346,6 +347,7 @@ protocol::Result<StreamQuality> with_change(const StreamQuality& quality, const 
   if (change.pixel_error) changed.pixel_error = *change.pixel_error;
   if (change.encoder_speed) changed.encoder_speed = *change.encoder_speed;
   if (change.latency_target_ms) changed.latency_target_ms = *change.latency_target_ms;
+  if (change.marks) changed.marks = *change.marks;
   return changed;
 }
 

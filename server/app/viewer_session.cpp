@@ -126,8 +126,8 @@ void ViewerSession::opened() {
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
   hello.role = protocol::Role::Operator;
-  hello.capabilities = {"histogram", "probe",          "extremes", "extremes_in_view",
-                        "exports",   "subtract_green", "resume",   "cache_bytes"};
+  hello.capabilities = {"histogram", "probe",       "extremes", "extremes_in_view", "exports", "subtract_green",
+                        "resume",    "cache_bytes", "marks"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);

@@ -21,6 +21,7 @@ struct Demand {
   int colour_bits = 8;
   int preview_colour_bits = 8;  ///< Of tiles that are drawn only until their children are there.
   protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
+  bool marks = false;                              ///< Of what is highlighted are wanted beside the colours.
   std::shared_ptr<const fusion::FusionPlan> plan;  ///< Null before there are settings.
   std::shared_ptr<const PlanIdentity> plan_identity;
 
@@ -29,8 +30,10 @@ struct Demand {
   }
   /// `bits` is one of the two above.
   ColourKey colour_key(const EncodedTile& geometry, int bits) const {
-    return {geometry.revision, plan_identity, bits, colour_transform};
+    return {geometry.revision, plan_identity, bits, colour_transform, carries_marks()};
   }
+  /// A method that highlights nothing has no marks to carry.
+  bool carries_marks() const { return marks && plan && plan->highlights(); }
 };
 
 }  // namespace spectra::server

@@ -58,9 +58,10 @@ struct ColourKey {
   std::shared_ptr<const PlanIdentity> plan;
   int colour_bits;
   protocol::ColourTransform transform = protocol::ColourTransform::None;
+  bool has_marks = false;
   friend bool operator<(const ColourKey& a, const ColourKey& b) {
-    return std::tie(a.revision, a.plan, a.colour_bits, a.transform) <
-           std::tie(b.revision, b.plan, b.colour_bits, b.transform);
+    return std::tie(a.revision, a.plan, a.colour_bits, a.transform, a.has_marks) <
+           std::tie(b.revision, b.plan, b.colour_bits, b.transform, b.has_marks);
   }
 };
 

@@ -23,7 +23,7 @@ std::string encode_geometry(Encoding& encoding, FrameCache::State& cache) {
 std::string encode_colours(Encoding& encoding, FrameCache::State& cache) {
   const Demand& demand = encoding.demand;
   auto result = encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, encoding.colour_bits,
-                                     demand.encoder_speed, demand.colour_transform);
+                                     demand.encoder_speed, demand.colour_transform, demand.carries_marks());
   if (!result) return result.error().message;
   encoding.made_colours = std::move(result).value();
   cache.store_colours(demand.colour_key(*encoding.geometry, encoding.colour_bits), encoding.made_colours);

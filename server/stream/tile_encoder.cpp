@@ -22,7 +22,7 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
 
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
                                                const fusion::FusionPlan& plan, int colour_bits, int encoder_speed,
-                                               protocol::ColourTransform transform) {
+                                               protocol::ColourTransform transform, bool has_marks) {
   std::vector<float> no_temperature;
   std::span<const float> temperature = tile.temperature_celsius;
   if (temperature.empty()) {
@@ -36,7 +36,13 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
     const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];
     colours[i] = {colour.r, colour.g, colour.b};
   }
-  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform));
+  std::vector<std::uint8_t> marks;
+  if (has_marks) {
+    std::vector<std::uint8_t> marked(temperature.size());
+    plan.mark(temperature, marked);
+    for (const std::uint32_t input : geometry.input_of_decoded) marks.push_back(marked[input]);
+  }
+  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 

@@ -336,6 +336,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
       demand_.encoder_speed = quality_.encoder_speed;
       ++demand_.geometry_epoch;
     }
+    if (quality_.marks != demand_.marks) {
+      demand_.marks = quality_.marks;
+      if (demand_.plan && demand_.plan->highlights()) ++demand_.colour_epoch;
+    }
     if (point_.colour_bits != demand_.colour_bits) {
       demand_.colour_bits = point_.colour_bits;
       ++demand_.colour_epoch;

@@ -29,6 +29,7 @@ struct StreamQuality {
   double pixel_error = 1;
   int encoder_speed = 7;
   double latency_target_ms = 200;
+  bool marks = false;  ///< Where the method highlights something, colours carry which vertices.
   friend bool operator==(const StreamQuality&, const StreamQuality&) = default;
 };
 

@@ -233,6 +233,9 @@ TEST(QualityMessages, RoundTheStepDownAndKeepTheRest) {
   EXPECT_EQ(changed.position_step_m, lattice_step(0.003));
   EXPECT_EQ(changed.colour_bits, 5);
   EXPECT_EQ(changed.encoder_speed, StreamQuality{}.encoder_speed);
+  EXPECT_FALSE(to_message(changed).marks);
+  change.marks = true;
+  EXPECT_TRUE(to_message(with_change(changed, change).value()).marks);
   EXPECT_LE(to_message(changed).position_step_mm, 3);
 }
 

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <limits>
+
 #include "fusion/registry.hpp"
 #include "tests/unit/fusion/scene.hpp"
 
@@ -68,6 +71,31 @@ TEST(Highlighted, DistributionIsOutsideOrInside) {
   EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.0}}, temperature), (Intervals{{2, 3}, {7, 9}}));
   EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.75}}, temperature), (Intervals{{8.5, 9}}));
   EXPECT_EQ(highlighted("histogram_distribution", {{"k", 1.0}, {"invert", true}}, temperature), (Intervals{{3, 7}}));
+}
+
+TEST(Mark, TellsVerticesThatAreHighlightedFromOthersAndFromMissingOnes) {
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  const std::vector<float> temperature = {10,        24,        26, 30, std::numeric_limits<float>::quiet_NaN(),
+                                          kInfinite, -kInfinite};
+  const auto marks = [&](const std::string& method, ParameterValues params, std::optional<RangeSetting> range = {}) {
+    // What is missing has a colour of its own, and is not highlighted by that.
+    const auto plan =
+        FusionPlan::prepare(settings_with(method, std::move(params), range, MissingDisplay(Rgb8{255, 0, 0})),
+                            scene_of(temperature))
+            .value();
+    std::vector<std::uint8_t> marked(temperature.size(), 7);
+    plan.mark(temperature, marked);
+    EXPECT_EQ(plan.highlights(), find_method(method)->highlights);
+    return marked;
+  };
+  using Marks = std::vector<std::uint8_t>;
+  EXPECT_EQ(marks("colour_mapped_threshold", {{"threshold", 25.0}}), (Marks{0, 0, 1, 1, 0, 1, 0}));
+  EXPECT_EQ(marks("colour_mapped_threshold", {{"threshold", 25.0}, {"invert", true}}), (Marks{1, 1, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(marks("colour_mapped_threshold", {{"threshold", 25.0}}, RangeSetting::manual(26.5, 27)),
+            (Marks{0, 0, 1, 1, 0, 1, 0}))
+      << "the range of the palette is another matter";
+  EXPECT_EQ(marks("thermal_highlighting", {{"low", 15.0}, {"high", 25.0}}), (Marks{1, 0, 1, 1, 0, 1, 1}));
+  EXPECT_EQ(marks("thermal_visible_blend", {}), (Marks{0, 0, 0, 0, 0, 0, 0}));
 }
 
 }  // namespace

@@ -209,6 +209,27 @@ TEST(EncodedColours, SubtractGreenGivesBackTheExtremes) {
   EXPECT_EQ(decoded_colours(encoded.value(), ColourTransform::SubtractGreen).value(), colours);
 }
 
+TEST(EncodedColours, CarryMarksBesideThemWhereThereAreAny) {
+  std::vector<ColourBytes> colours;
+  std::vector<std::uint8_t> marks;
+  for (int i = 0; i < 3000; ++i) {
+    colours.push_back(
+        {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i / 2), static_cast<std::uint8_t>(i / 7)});
+    marks.push_back(i % 700 > 600 ? 1 : 0);
+  }
+  for (const ColourTransform transform : {ColourTransform::None, ColourTransform::SubtractGreen}) {
+    for (const int bits : {8, 6}) {
+      const auto without = encoded_colours(colours, bits, 7, transform).value();
+      const auto with = encoded_colours(colours, bits, 7, transform, marks).value();
+      EXPECT_TRUE(decoded_marks(without).value().empty());
+      EXPECT_EQ(decoded_marks(with).value(), marks);
+      EXPECT_EQ(decoded_colours(with, transform).value(), decoded_colours(without, transform).value());
+      EXPECT_LT(with.size(), without.size() + 100) << "long runs cost next to nothing";
+    }
+  }
+  EXPECT_TRUE(encoded_colours(colours, 8, 7, ColourTransform::None, std::span(marks).first(10)).has_error());
+}
+
 TEST(EncodedColours, AreNotReadTheOtherWay) {
   const std::vector<ColourBytes> colours{{1, 2, 3}, {200, 100, 50}};
   const auto plain = encoded_colours(colours, 8, 7);

@@ -214,6 +214,8 @@ json frame_json(const TileFrameView& frame) {
                                                                                : ColourTransform::SubtractGreen);
     if (!colours) return colours.error().message;
     described["colours"] = colours.value();
+    const auto marks = decoded_marks(frame.payload).value();
+    if (!marks.empty()) described["marks"] = marks;
   }
   return described;
 }
@@ -273,6 +275,14 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.generation = 9;
   frames["colours_subtract_green"] =
       frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
+
+  std::vector<std::uint8_t> marks;
+  for (const std::uint32_t input : mesh.input_of_decoded) marks.push_back(input % 4 == 3 ? 1 : 0);
+  frames["colours_subtract_green_marks"] =
+      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen, marks).value());
+  header.kind = FrameKind::Colours;
+  frames["colours_marks"] =
+      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::None, marks).value());
 
   header.kind = FrameKind::Remove;
   header.sequence = 4;

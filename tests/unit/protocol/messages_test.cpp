@@ -173,6 +173,9 @@ TEST(QualityChange, HoldsTheBoundsOfItsKnobs) {
   for (const char* key : {"position_step_mm", "pixel_error", "latency_target_ms"})
     for (const json& value : {json(0), json(-1), json("1"), json(nullptr)})
       EXPECT_EQ(refused_field<QualityChange>(json{{key, value}}.dump()), key);
+  EXPECT_EQ(refused_field<QualityChange>(R"({"marks":true})"), "accepted");
+  for (const std::string marks : {"1", "\"true\"", "null"})
+    EXPECT_EQ(refused_field<QualityChange>("{\"marks\":" + marks + "}"), "marks");
 }
 
 TEST(HistogramRequest, HoldsTheBoundsOfBins) {

@@ -121,6 +121,10 @@ TEST(FrameCache, KeepsColoursApartThatAreWrittenOtherwise) {
   state.store_colours(plain, colours(10));
   EXPECT_EQ(state.find_colours(transformed), nullptr);
   EXPECT_EQ(state.claim_colours(transformed, {}).kind, Claim<std::vector<std::byte>>::Kind::Yours);
+  ColourKey marked = plain;
+  marked.has_marks = true;
+  EXPECT_EQ(state.find_colours(marked), nullptr);
+  EXPECT_EQ(state.claim_colours(marked, {}).kind, Claim<std::vector<std::byte>>::Kind::Yours);
 }
 
 TEST(FrameCache, IdentityOutlivesItsObject) {

@@ -110,7 +110,8 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       const auto geometry = protocol::decoded_geometry(frame.value().payload);
       ASSERT_TRUE(geometry.has_value());
       HeldTile& tile = tiles[header.tile];
-      tile = {.geometry = header, .positions_m = geometry.value().positions_m, .generation = 0, .colours = {}};
+      tile = {
+          .geometry = header, .positions_m = geometry.value().positions_m, .generation = 0, .colours = {}, .marks = {}};
       ASSERT_EQ(tile.positions_m.size(), header.vertex_count);
       for (auto& position : tile.positions_m) {
         for (std::size_t axis = 0; axis < 3; ++axis) position[axis] += header.origin_m[axis];
@@ -129,6 +130,7 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       held->second.generation = header.generation;
       held->second.colours = protocol::decoded_colours(frame.value().payload, colour_transform).value();
       EXPECT_EQ(held->second.colours.size(), header.vertex_count);
+      held->second.marks = protocol::decoded_marks(frame.value().payload).value();
       break;
     }
     case protocol::FrameKind::Remove:

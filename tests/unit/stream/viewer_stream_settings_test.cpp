@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -180,6 +181,68 @@ TEST_F(ViewerStreamSettings, AnotherTransformWhileFramesFlowSendsColoursAnew) {
   viewer.complete();
   EXPECT_EQ(viewer.count(FrameKind::Geometry), scene_->tiles().size());
   expect_picture(viewer, *scene_, 0.6);
+}
+
+TEST_F(ViewerStreamSettings, MarksComeWhereTheyAreAskedForAndSomethingIsHighlighted) {
+  // A highlight of one colour, which no visible colour is.
+  constexpr fusion::Rgb8 kHighlight{1, 2, 255};
+  fusion::PaletteTable palette;
+  palette.fill({kHighlight.r, kHighlight.g, kHighlight.b});
+  fusion::FusionChange change;
+  change.method = "colour_mapped_threshold";
+  change.params = {{"threshold", 22.0}, {"alpha", 1.0}};
+  const auto plan = fusion::FusionPlan::prepare(fusion::with_change(fusion::default_settings(), change).value(),
+                                                scene_->temperature(), palette)
+                        .value();
+  TestViewer marked(scene_, cache_, pool_);
+  TestViewer plain(scene_, cache_, pool_);
+  StreamQuality quality = marked.stream().quality();
+  quality.marks = true;
+  marked.stream().set_quality(quality);
+  for (TestViewer* viewer : {&marked, &plain}) {
+    viewer->stream().subscribe({});
+    viewer->stream().set_plan(plan);
+    viewer->complete();
+  }
+  EXPECT_EQ(cache_.miss_count(), 3 * scene_->tiles().size()) << "one geometry, colours with and without marks";
+  std::size_t highlighted = 0;
+  std::size_t others = 0;
+  for (const auto& tile : scene_->tiles()) {
+    const testing::HeldTile& held = marked.tiles.at(tile->id);
+    EXPECT_EQ(held.colours, plain.tiles.at(tile->id).colours);
+    EXPECT_TRUE(plain.tiles.at(tile->id).marks.empty());
+    expect_tile(held, *tile, plan, 8);
+    ASSERT_EQ(held.marks.size(), held.colours.size());
+    for (std::size_t i = 0; i < held.marks.size(); ++i) {
+      const bool is_highlight = held.colours[i] == protocol::ColourBytes{kHighlight.r, kHighlight.g, kHighlight.b};
+      EXPECT_EQ(held.marks[i] == 1, is_highlight) << i;
+      ++(held.marks[i] == 1 ? highlighted : others);
+    }
+  }
+  EXPECT_GT(highlighted, 0U);
+  EXPECT_GT(others, 0U);
+
+  // A method that treats all temperatures alike has none, and asking for them then sends nothing.
+  show(marked, 0.3);
+  marked.complete();
+  expect_picture(marked, *scene_, 0.3);
+  for (const auto& [id, held] : marked.tiles) EXPECT_TRUE(held.marks.empty());
+  show(plain, 0.3);
+  plain.complete();
+  plain.stream().set_quality(quality);
+  wait_until_idle(pool_);
+  EXPECT_EQ(plain.take(), 0U);
+  // Where something is highlighted they come with colours, sent again without geometry.
+  plain.stream().set_plan(plan);
+  quality.marks = false;
+  plain.stream().set_quality(quality);
+  plain.complete();
+  for (const auto& [id, held] : plain.tiles) EXPECT_TRUE(held.marks.empty());
+  quality.marks = true;
+  plain.stream().set_quality(quality);
+  plain.complete();
+  for (const auto& [id, held] : plain.tiles) EXPECT_EQ(held.marks.size(), held.colours.size());
+  EXPECT_EQ(plain.count(FrameKind::Geometry), scene_->tiles().size());
 }
 
 TEST_F(ViewerStreamSettings, AnotherPositionStepSendsGeometryUnderANewRevision) {

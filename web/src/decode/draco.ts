@@ -1,6 +1,6 @@
 /** Draco payloads to plain arrays. Runs in a worker in the browser, and as it is in tests. */
 
-import type { Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
+import type { Attribute, Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
 import type { ColoursJob, DecodedColours, DecodedGeometry, DecodeJob, DecodeResult } from './messages';
 import { summaryOf } from './summary';
 
@@ -96,6 +96,9 @@ function decodeColours(draco: DecoderModule, { payload, transform }: ColoursJob)
         }
       });
     }
+    withMarks(draco, decoder, cloud, (marks) => {
+      for (let from = 0, to = 3; to < rgba.length; from += 1, to += 4) rgba[to] = marks[from] === 0 ? 255 : 0;
+    });
     return { kind: 'colours', rgba };
   } finally {
     draco.destroy(cloud);
@@ -119,7 +122,23 @@ function withBytes(
   if (attribute.num_components() !== components) {
     throw new Error(`colours: ${attribute.num_components()} components of ${name}, not ${components}`);
   }
-  const size = cloud.num_points() * components;
+  lend(draco, decoder, cloud, attribute, use);
+}
+
+/** Lends the marks beside colours, where there are any: the last attribute, of one byte. */
+function withMarks(draco: DecoderModule, decoder: Decoder, cloud: PointCloud, use: (marks: Uint8Array) => void): void {
+  const last = decoder.GetAttribute(cloud, cloud.num_attributes() - 1);
+  if (last.attribute_type() === draco.GENERIC && last.num_components() === 1) lend(draco, decoder, cloud, last, use);
+}
+
+function lend(
+  draco: DecoderModule,
+  decoder: Decoder,
+  cloud: PointCloud,
+  attribute: Attribute,
+  use: (values: Uint8Array) => void,
+): void {
+  const size = cloud.num_points() * attribute.num_components();
   const heap = draco._malloc(size);
   decoder.GetAttributeDataArrayForAllPoints(cloud, attribute, draco.DT_UINT8, size, heap);
   use(new Uint8Array(draco.HEAPF32.buffer, heap, size));

@@ -6,9 +6,11 @@ declare module 'draco3d/draco_decoder_nodejs.js' {
   }
   export interface Attribute {
     num_components(): number;
+    attribute_type(): number;
   }
   export interface PointCloud {
     num_points(): number;
+    num_attributes(): number;
   }
   export interface Mesh extends PointCloud {
     num_faces(): number;

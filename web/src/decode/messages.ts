@@ -38,7 +38,7 @@ export interface DecodedGeometry {
 }
 export interface DecodedColours {
   kind: 'colours';
-  /** Red, green, blue, 255 per vertex: sRGB bytes as they go to the screen. */
+  /** Red, green, blue, alpha per vertex: sRGB bytes as they go to the screen; alpha 0 where the vertex is marked as highlighted, else 255. */
   rgba: Uint8Array<ArrayBuffer>;
 }
 export type DecodeResult = DecodedGeometry | DecodedColours;

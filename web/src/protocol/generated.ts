@@ -449,6 +449,10 @@ export interface QualityState {
    * Aim of mode auto.
    */
   latency_target_ms: number;
+  /**
+   * Colours carry which vertices the method highlights.
+   */
+  marks: boolean;
 }
 /**
  * Result of scene.histogram; without thermal data every list is empty, mean and sigma are null.
@@ -519,6 +523,7 @@ export interface QualityChange {
   pixel_error?: number;
   encoder_speed?: number;
   latency_target_ms?: number;
+  marks?: boolean;
 }
 /**
  * Result of quality.set.

@@ -88,6 +88,7 @@ describe('Golden frames', () => {
       positions_m?: number[][];
       triangles?: number[][];
       colours?: number[][];
+      marks?: number[];
     };
     const { payload, tile, ...fields } = frame;
     const nullIfNone = (value: number) => (Number.isNaN(value) ? null : value);
@@ -112,7 +113,10 @@ describe('Golden frames', () => {
       const transform = frame.kind === FrameKind.colours ? 'none' : 'subtract_green';
       const decoded = decodeJob(draco, { kind: 'colours', payload, transform });
       if (decoded.kind !== 'colours') throw new Error('not colours');
-      expect([...decoded.rgba]).toEqual((expected.colours ?? []).flatMap((rgb) => [...rgb, 255]));
+      expect([...decoded.rgba]).toEqual(
+        (expected.colours ?? []).flatMap((rgb, i) => [...rgb, expected.marks?.[i] === 1 ? 0 : 255]),
+      );
+      expect([...decoded.rgba].some((alpha, i) => i % 4 === 3 && alpha === 0)).toBe(expected.marks !== undefined);
     } else if (Object.values<number>(FrameKind).includes(frame.kind)) {
       expect(frame.kind).toBe(FrameKind.remove);
       expect(payload.byteLength).toBe(0);

@@ -139,6 +139,7 @@ export const quality: Decoder<Quality> = object({
   pixel_error: number,
   encoder_speed: count,
   latency_target_ms: number,
+  marks: boolean,
 });
 
 export const hello: Decoder<Hello> = object({
