@@ -283,6 +283,92 @@ export function addViewTests(browser, scratch) {
     await page.close();
   });
 
+  test('The person is outlined where colours alone do not show it to everybody, and nothing more is sent or drawn where that is off', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url);
+    await settled(page);
+    const state = () =>
+      page.evaluate(() => {
+        const { quality, isOutlined, highlightContrast, received_bytes } = globalThis.spectra.store;
+        return { marks: quality.marks, isOutlined, contrast: highlightContrast, received_bytes };
+      });
+    const picture = async (name) => {
+      await settled(page);
+      // Marks of the hottest and the coldest place are drawn on the picture and may come a moment later.
+      await page.evaluate(() => (globalThis.spectra.store.marksShown = false));
+      return screenshot(page, name);
+    };
+    const choose = (wish) => page.locator(`[data-outline="${wish}"]`).click();
+    /** Pixels of the square about the person's head that are another in `one` than in `other`, by whether they are light or dark there. */
+    const head = await page.evaluate(() => globalThis.spectra.viewport.project([0.3, 0.25, 1.2]));
+    const lines = (one, other) => {
+      const found = { light: 0, dark: 0 };
+      for (let x = Math.round(head.x) - 60; x < head.x + 60; x += 1) {
+        for (let y = Math.round(head.y) - 60; y < head.y + 60; y += 1) {
+          const [pixel, before] = [one.at(x, y), other.at(x, y)];
+          if (Math.max(...pixel.map((value, channel) => Math.abs(value - before[channel]))) < 40) continue;
+          if (Math.min(...pixel) > 180) found.light += 1;
+          else if (Math.max(...pixel) < 75) found.dark += 1;
+        }
+      }
+      return found;
+    };
+
+    // Automatic: in grey the demo scene's warm places are as light as others.
+    const automatic = await state();
+    assert.equal(automatic.marks, true);
+    assert.ok(automatic.contrast.in_grey < 10, JSON.stringify(automatic));
+    assert.equal(automatic.isOutlined, true);
+    assert.match(
+      await page.locator('[data-outline-note]').innerText(),
+      /^Outlined: .*in grey, many highlights look like the rest/,
+    );
+    const outlined = await picture('outline-automatic');
+
+    await choose('off');
+    const plain = await picture('outline-off');
+    assert.equal((await state()).marks, false);
+    assert.equal(await page.locator('[data-outline-note]').count(), 0);
+    const found = lines(outlined, plain);
+    assert.ok(
+      found.light > 60 && found.dark > 60,
+      `the outline of the head has ${found.light} light and ${found.dark} dark pixels`,
+    );
+    await choose('on');
+    const again = await picture('outline-on');
+    assert.deepEqual(lines(again, outlined), { light: 0, dark: 0 }, 'on is what automatic has drawn');
+
+    // Nothing highlighted: nothing outlined, whatever is asked for.
+    const field = page.locator('[data-parameter="threshold"] input[type=number]');
+    await page.locator('[data-method="colour_mapped_threshold"]').click();
+    await settled(page);
+    await field.fill('99');
+    await field.press('Enter');
+    const nothing = await picture('outline-nothing');
+    await page.locator('canvas').first().focus();
+    await page.keyboard.press('2');
+    assert.deepEqual(lines(nothing, await picture('outline-visible')), { light: 0, dark: 0 });
+    assert.equal(await page.locator('[data-outline]').count(), 0, 'there is nothing to outline in the visible view');
+
+    // It is remembered; off, a new page gets fewer bytes.
+    const received = async () => {
+      await page.reload();
+      await settled(page);
+      return (await state()).received_bytes;
+    };
+    await page.keyboard.press('3');
+    const on = await received();
+    assert.equal((await state()).isOutlined, true);
+    await choose('off');
+    await settled(page);
+    const off = await received();
+    assert.deepEqual([(await state()).marks, (await state()).isOutlined], [false, false]);
+    assert.ok(off < on && on < off * 1.05, `${on} bytes with marks, ${off} without`);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
   test('A slow machine draws less while the camera moves, and everything at rest', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);

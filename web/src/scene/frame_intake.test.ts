@@ -15,6 +15,7 @@ const results: Record<'geometry' | 'colours', DecodeResult> = {
 let decodings: { finish: () => Promise<void>; fail: () => Promise<void> }[];
 let acknowledged: number[];
 let problems: unknown[];
+let wholes: Uint8Array[];
 let tiles: TileSet;
 let intake: FrameIntake;
 let sequence: number;
@@ -30,6 +31,7 @@ beforeEach(() => {
   decodings = [];
   acknowledged = [];
   problems = [];
+  wholes = [];
   sequence = 0;
   tiles = new TileSet(() => ({ setColours: () => undefined, setVisible: () => undefined, dispose: () => undefined }));
   intake = new FrameIntake(
@@ -54,6 +56,7 @@ beforeEach(() => {
     {
       onDecoded: (last) => acknowledged.push(last),
       onArrival: () => undefined,
+      onWholeColours: (rgba) => wholes.push(rgba),
       onProblem: (error) => problems.push(error),
     },
   );
@@ -70,6 +73,15 @@ describe('FrameIntake', () => {
     expect(acknowledged).toEqual([2]);
     picture();
     expect(tiles.size).toBe(1);
+  });
+
+  it('tells of colours of the whole scene, not of those of a part', async () => {
+    receive(FrameKind.colours);
+    await decodings[0]?.finish();
+    expect(wholes).toHaveLength(1);
+    intake.receive(tileFrame({ level: 1, x: 0, y: 0, z: 0 }, { kind: FrameKind.colours, sequence: 2 }));
+    await decodings[1]?.finish();
+    expect(wholes).toHaveLength(1);
   });
 
   it('is complete once everything before is in the picture, and once only', async () => {

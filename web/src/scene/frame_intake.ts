@@ -14,6 +14,8 @@ export interface FrameIntakeEvents {
   onDecoded: (sequence: number) => void;
   /** There is something for the next picture. */
   onArrival: () => void;
+  /** New colours of the coarsest tile there can be, which shows all of the scene. */
+  onWholeColours: (rgba: Uint8Array) => void;
   /** A frame that could not be decoded, or does not fit to the others; it is left out. */
   onProblem: (error: unknown) => void;
 }
@@ -98,6 +100,7 @@ export class FrameIntake {
       .then((result) => {
         if (connectionNumber !== this.#connectionNumber) return;
         const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
+        if (result.kind === 'colours' && frame.tile.level === 0) this.events.onWholeColours(result.rgba);
         if (frame.sequence > removed) this.#arrivals.add(frame, result, performance.now());
         this.events.onArrival();
       })

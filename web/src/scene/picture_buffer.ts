@@ -1,4 +1,5 @@
 import { WebGLRenderTarget, type WebGLRenderer } from 'three';
+import type { Outline } from './outline';
 
 interface WithFramebuffers {
   setRenderTargetFramebuffer: (target: WebGLRenderTarget, framebuffer: WebGLFramebuffer) => void;
@@ -46,15 +47,18 @@ export class PictureBuffer {
     return this.renderer.getContext() as WebGL2RenderingContext;
   }
 
-  /** Copies the picture to the canvas, which has the same size. */
-  present(): void {
+  /** Copies the picture to the canvas, which has the same size, or draws it there with an outline. */
+  present(outline: Outline | null, pixel_ratio: number): void {
     const gl = this.#gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     // A copy alone does not tell every browser that the canvas has changed.
     gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#framebuffer);
     const { width, height } = this;
-    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    if (outline !== null) outline.draw(this.#framebuffer, width, height, pixel_ratio);
+    else {
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#framebuffer);
+      gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    }
     this.renderer.resetState();
   }
 

@@ -15,6 +15,7 @@ import {
 import type { Vec3 } from '../protocol/messages';
 import { clearSight } from './clear_sight';
 import { depthRange } from './depth_range';
+import { Outline } from './outline';
 import { PictureBuffer } from './picture_buffer';
 import { nearestHit } from './picking';
 import type { Eye, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
@@ -65,6 +66,9 @@ export class PictureRenderer {
   readonly #slicePace = new SlicePace();
   /** For pictures in full, and for those while the camera moves. */
   #buffers: { full: PictureBuffer | null; coarse: PictureBuffer | null } = { full: null, coarse: null };
+  /** Made when it is first wanted. */
+  #outline: Outline | null = null;
+  #isOutlined = false;
   /** Under way; a newer one takes its place. */
   #picture: Picture | null = null;
   #pointDiameter: number | null = null;
@@ -88,6 +92,7 @@ export class PictureRenderer {
     canvas.addEventListener('webglcontextrestored', () => {
       // What it held went with the context.
       this.#buffers = { full: null, coarse: null };
+      this.#outline = null;
       // Only with a picture on it is the canvas shown again.
       this.#drawWhole();
       this.reply({ kind: 'context', isLost: false });
@@ -124,6 +129,7 @@ export class PictureRenderer {
     if (this.#frame !== 0) cancelAnimationFrame(this.#frame);
     for (const tile of [...this.#tiles.keys()]) this.#apply({ change: 'dispose', tile });
     this.#materials.dispose();
+    this.#outline?.dispose();
     this.#renderer.dispose();
   }
 
@@ -157,6 +163,10 @@ export class PictureRenderer {
         break;
       case 'points':
         this.#pointDiameter = command.diameter;
+        break;
+      case 'outline':
+        this.#isOutlined = command.isOn;
+        this.#materials.setOutlined(command.isOn);
         break;
       case 'size':
         this.#fullPixelRatio = command.pixel_ratio;
@@ -276,7 +286,8 @@ export class PictureRenderer {
   #show({ buffer }: Picture): void {
     if (this.canvas.width !== buffer.width) this.canvas.width = buffer.width;
     if (this.canvas.height !== buffer.height) this.canvas.height = buffer.height;
-    buffer.present();
+    if (this.#isOutlined) this.#outline ??= new Outline(this.context);
+    buffer.present(this.#isOutlined ? this.#outline : null, buffer.width / this.#size[0]);
   }
 
   #drawWhole(): void {

@@ -25,6 +25,8 @@ export type RenderCommand =
   | { change: 'background'; colour: number }
   /** Diameter of the points of a cloud in metres; null: as far as they are apart. */
   | { change: 'points'; diameter: number | null }
+  /** A line around what is highlighted. */
+  | { change: 'outline'; isOn: boolean }
   | { change: 'size'; width: number; height: number; pixel_ratio: number };
 
 /** Where a picture is taken from. */

@@ -10,7 +10,7 @@ uniform vec3 eye;
 uniform vec3 eyeRest;
 in vec3 position;
 in vec4 color;
-out vec3 vertexColour;
+out vec4 vertexColour;
 #ifdef WIDE
 out float depth;
 #endif
@@ -21,7 +21,7 @@ uniform vec2 pointPixels;
 out float pointDiameter;
 #endif
 void main() {
-  vertexColour = color.rgb;
+  vertexColour = color;
   // From the eye first: close to it the difference is exact, far from the origin, too. A product with large numbers is not.
   gl_Position = projectionMatrix * vec4(mat3(viewMatrix) * ((position - eye) - eyeRest), 1.0);
 #ifdef WIDE
@@ -35,7 +35,8 @@ void main() {
 
 const FRAGMENT = `
 precision highp float;
-in vec3 vertexColour;
+in vec4 vertexColour;
+uniform bool isOutlined;
 out vec4 colour;
 #ifdef WIDE
 in float depth;
@@ -48,7 +49,9 @@ void main() {
 #ifdef POINTS
   if (pointDiameter > 4.0 && distance(gl_PointCoord, vec2(0.5)) > 0.5) discard;
 #endif
-  colour = vec4(vertexColour, 1.0);
+  colour = vec4(vertexColour.rgb, 1.0);
+  // What is highlighted has no alpha. Between the two the border is where both have half a share, one pixel wide.
+  if (isOutlined) colour.a = clamp((vertexColour.a - 0.5) / max(fwidth(vertexColour.a), 1e-5) + 0.5, 0.0, 1.0);
 #ifdef WIDE
   gl_FragDepth = log2(depth * depthScale.x) * depthScale.y;
 #endif
@@ -71,6 +74,7 @@ export class TileMaterials {
     pointSize: { value: 0 },
     pixelsPerTangent: { value: 1 },
     pointPixels: { value: new Vector2() },
+    isOutlined: { value: false },
   };
   readonly #surface = { plain: this.#material({}), wide: this.#material({ WIDE: '' }) };
   readonly #cloud = { plain: this.#material({ POINTS: '' }), wide: this.#material({ POINTS: '', WIDE: '' }) };
@@ -105,6 +109,11 @@ export class TileMaterials {
     const isLone = count < FEW_POINTS || diameter === 0;
     this.#uniforms.pointPixels.value.set((isLone ? LONE_POINT_PIXELS : least) * pixel_ratio, most * pixel_ratio);
     this.cloud.uniformsNeedUpdate = true;
+  }
+
+  /** The alpha of a picture tells what is highlighted (see Outline) rather than nothing. */
+  setOutlined(isOutlined: boolean): void {
+    this.#uniforms.isOutlined.value = isOutlined;
   }
 
   dispose(): void {

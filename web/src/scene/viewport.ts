@@ -47,6 +47,7 @@ export class Viewport {
   #size: [number, number] = [1, 1];
   #up: UpAxis = 'y';
   #isAiming = false;
+  #isOutlined = false;
   readonly #pace = new MotionPace();
   /** How pictures that have been sent and not drawn are drawn; null: in full. */
   #notches = new Map<number, Notch | null>();
@@ -210,6 +211,13 @@ export class Viewport {
   /** Diameter of the points of a cloud in metres; null: as far as they are apart. */
   setPointDiameter(diameter: number | null): void {
     this.#change({ change: 'points', diameter });
+  }
+
+  /** A line around what is highlighted, where the colours say what that is. */
+  setOutline(isOn: boolean): void {
+    if (isOn === this.#isOutlined) return;
+    this.#isOutlined = isOn;
+    this.#change({ change: 'outline', isOn });
   }
 
   /** How near to and how far from what is looked at the controls go, metres. */

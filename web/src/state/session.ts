@@ -28,11 +28,12 @@ import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewp
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
+import { highlightContrast } from '../view/highlight_contrast';
 import { Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
 import { cacheBytes } from './cache_bytes';
 import { Settings } from './settings';
-import type { Store } from './store.svelte';
+import type { OutlineWish, Store } from './store.svelte';
 
 const HISTOGRAM_BINS = 192;
 /** Least time between two changes of the quality, and between two camera messages. */
@@ -115,6 +116,10 @@ export class Session {
     this.#intake = new FrameIntake(this.tiles, new DecodePool(takeDecodeWorker), {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),
+      onWholeColours: (rgba) => {
+        store.highlightContrast = highlightContrast(rgba);
+        this.viewport.setOutline(store.isOutlined);
+      },
       onProblem: (error) => this.#say(error),
     });
     this.#connection = new Connection(
@@ -189,6 +194,13 @@ export class Session {
     this.#qualityChanged = true;
     if (this.store.quality !== null) this.store.quality = { ...this.store.quality, ...change };
     this.#qualitySender.push(change);
+  }
+
+  /** Unless it is off the colours say which vertices are highlighted, so that automatic can compare them with the rest. */
+  setOutline(wish: OutlineWish): void {
+    this.store.outlineWish = wish;
+    this.viewport.setOutline(this.store.isOutlined);
+    if (this.store.connected) this.#askMarks();
   }
 
   setBackground(colour: string): void {
@@ -320,7 +332,15 @@ export class Session {
     this.#setScene(message.scene, true);
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
+    this.#askMarks();
     void this.#subscribe(message, before, qualityBefore);
+  }
+
+  #askMarks(): void {
+    const { server, quality, outlineWish } = this.store;
+    const marks = outlineWish !== 'off';
+    if (server?.capabilities.includes('marks') === true && quality !== null && quality.marks !== marks)
+      void this.#sendQuality({ marks });
   }
 
   /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */

@@ -18,6 +18,7 @@ import type {
 import type { UpAxis } from '../scene/first_view';
 import type { DrawnError, TileCounts } from '../scene/tile_set';
 import type { LinkState } from '../transport/connection';
+import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
 import { type Note, notesOf } from './notes';
@@ -39,6 +40,9 @@ export function viewModeOf(method: string): ViewMode {
   if (method === THERMAL_VIEW) return 'thermal';
   return method === VISIBLE_VIEW ? 'visible' : 'fused';
 }
+
+/** Whether a line is drawn around what is highlighted; automatic: where colours alone do not show it to everybody. */
+export type OutlineWish = 'automatic' | 'on' | 'off';
 
 /** A picture that takes longer to show another method is said to be behind it. */
 const PENDING_AFTER_MS = 500;
@@ -71,6 +75,9 @@ export class Store {
   /** The hottest and the coldest place of the scene, and of what is on the screen, as they stand on it. */
   marks = $state.raw<readonly Mark[]>([]);
   marksShown = $state(true);
+  outlineWish = $state<OutlineWish>('automatic');
+  /** Of the newest colours of the whole scene; null where they say of nothing that it is highlighted. */
+  highlightContrast = $state.raw<HighlightContrast | null>(null);
   /** Under the pointer. */
   hover = $state.raw<Reading | null>(null);
   /** Readings pinned by a click, newest last. */
@@ -124,6 +131,10 @@ export class Store {
   /** Somebody has said that the scene is in metres; otherwise its lengths are shown in units. */
   readonly isMetric = $derived(this.scene?.metric === true);
   /** Without thermal data every method shows the visible colours. */
+  readonly isOutlined = $derived(
+    this.outlineWish === 'on' ||
+      (this.outlineWish === 'automatic' && this.highlightContrast !== null && needsOutline(this.highlightContrast)),
+  );
   readonly viewMode = $derived<ViewMode>(this.hasThermal ? viewModeOf(this.fusion?.method ?? '') : 'visible');
   /** What the palette chooser says beside the palette is no note. */
   readonly notes = $derived<Note[]>(

@@ -1,14 +1,17 @@
 /** What a person has chosen about the controls themselves; kept in this browser. */
 
+import type { OutlineWish } from '../state/store.svelte';
+
 export type Scheme = 'dark' | 'light';
 
 interface Kept {
   letterKeys: boolean;
   scheme: Scheme;
+  outline: OutlineWish;
 }
 
 const PLACE = 'spectra.preferences';
-const DEFAULTS: Kept = { letterKeys: true, scheme: 'dark' };
+const DEFAULTS: Kept = { letterKeys: true, scheme: 'dark', outline: 'automatic' };
 
 /** What was kept, with the default for whatever is not there or not readable. */
 export function keptPreferences(text: string | null): Kept {
@@ -17,6 +20,7 @@ export function keptPreferences(text: string | null): Kept {
     return {
       letterKeys: typeof found?.letterKeys === 'boolean' ? found.letterKeys : DEFAULTS.letterKeys,
       scheme: found?.scheme === 'light' || found?.scheme === 'dark' ? found.scheme : DEFAULTS.scheme,
+      outline: found?.outline === 'on' || found?.outline === 'off' ? found.outline : DEFAULTS.outline,
     };
   } catch {
     return DEFAULTS;
@@ -49,6 +53,14 @@ class Preferences {
   }
   set scheme(scheme: Scheme) {
     this.#keep({ ...this.#kept, scheme });
+  }
+
+  /** A line around what is highlighted. */
+  get outline(): OutlineWish {
+    return this.#kept.outline;
+  }
+  set outline(outline: OutlineWish) {
+    this.#keep({ ...this.#kept, outline });
   }
 
   #keep(kept: Kept): void {

@@ -3,10 +3,17 @@ import { keptPreferences } from './preferences.svelte';
 
 describe('keptPreferences', () => {
   it('reads what was kept', () => {
-    expect(keptPreferences('{"letterKeys":false,"scheme":"light"}')).toEqual({ letterKeys: false, scheme: 'light' });
+    expect(keptPreferences('{"letterKeys":false,"scheme":"light","outline":"off"}')).toEqual({
+      letterKeys: false,
+      scheme: 'light',
+      outline: 'off',
+    });
   });
 
-  it.each([null, '', 'nonsense', 'null', '[]', '{"letterKeys":"no","scheme":"green"}'])('takes the defaults for %j', (text) => {
-    expect(keptPreferences(text)).toEqual({ letterKeys: true, scheme: 'dark' });
-  });
+  it.each([null, '', 'nonsense', 'null', '[]', '{"letterKeys":"no","scheme":"green","outline":true}'])(
+    'takes the defaults for %j',
+    (text) => {
+      expect(keptPreferences(text)).toEqual({ letterKeys: true, scheme: 'dark', outline: 'automatic' });
+    },
+  );
 });
