@@ -67,6 +67,8 @@ export class Session {
   #claimableSession: string | null = null;
   #isHovering = false;
   #qualityChanged = false;
+  /** What this connection was last asked for. */
+  #asksMarks = false;
   #bytesBefore = 0;
   #rateWindow: { at: number; bytes: number }[] = [];
 
@@ -332,15 +334,17 @@ export class Session {
     this.#setScene(message.scene, true);
     this.#cameraSender.push(this.viewport.pose);
     this.#markBehind();
-    this.#askMarks();
+    this.#asksMarks = store.quality.marks;
     void this.#subscribe(message, before, qualityBefore);
+    // Before the stream, which is asked for at the end of this task at the earliest.
+    this.#askMarks();
   }
 
   #askMarks(): void {
-    const { server, quality, outlineWish } = this.store;
-    const marks = outlineWish !== 'off';
-    if (server?.capabilities.includes('marks') === true && quality !== null && quality.marks !== marks)
-      void this.#sendQuality({ marks });
+    const marks = this.store.outlineWish !== 'off';
+    if (this.store.server?.capabilities.includes('marks') !== true || marks === this.#asksMarks) return;
+    this.#asksMarks = marks;
+    void this.#sendQuality({ marks });
   }
 
   /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */
