@@ -293,9 +293,8 @@ class FieldWriter {
   nlohmann::json object_ = nlohmann::json::object();
 };
 
-/// What from_json does for a message that has a `describe`.
 template <class Message>
-Result<Message> read_message(const nlohmann::json& value, std::string_view path) {
+Result<Message> Wire<Message>::read(const nlohmann::json& value, std::string_view path) {
   Message message;
   FieldReader fields(value, path);
   describe(fields, message);
@@ -303,9 +302,8 @@ Result<Message> read_message(const nlohmann::json& value, std::string_view path)
   return message;
 }
 
-/// What to_json does for a message that has a `describe`.
 template <class Message>
-nlohmann::json written_message(const Message& message) {
+nlohmann::json Wire<Message>::written(const Message& message) {
   FieldWriter fields;
   describe(fields, message);
   return std::move(fields).object();

@@ -25,7 +25,7 @@ std::span<const EnumWord<RangeMode>> words_of() {
 
 /// A value whose type is told by the JSON itself.
 template <>
-Result<ParameterValue> from_json(const nlohmann::json& value, std::string_view path) {
+Result<ParameterValue> Wire<ParameterValue>::read(const nlohmann::json& value, std::string_view path) {
   if (value.is_null()) return ParameterValue(nullptr);
   if (value.is_boolean()) return ParameterValue(value.get<bool>());
   if (value.is_string()) return ParameterValue(value.get_ref<const std::string&>());
@@ -36,7 +36,8 @@ Result<ParameterValue> from_json(const nlohmann::json& value, std::string_view p
       unexpected(std::string(path), "a number, a string, true, false or null", value));
 }
 
-nlohmann::json to_json(const ParameterValue& value) {
+template <>
+nlohmann::json Wire<ParameterValue>::written(const ParameterValue& value) {
   return std::visit(
       []<class Value>(const Value& held) -> nlohmann::json {
         if constexpr (std::same_as<Value, std::nullptr_t>)
@@ -48,7 +49,7 @@ nlohmann::json to_json(const ParameterValue& value) {
 }
 
 template <>
-Result<ParameterValues> from_json(const nlohmann::json& value, std::string_view path) {
+Result<ParameterValues> Wire<ParameterValues>::read(const nlohmann::json& value, std::string_view path) {
   if (!value.is_object()) return BOOST_OUTCOME_V2_NAMESPACE::failure(unexpected(std::string(path), "an object", value));
   ParameterValues values;
   for (const auto& [name, item] : value.items()) {
@@ -58,7 +59,8 @@ Result<ParameterValues> from_json(const nlohmann::json& value, std::string_view 
   return values;
 }
 
-nlohmann::json to_json(const ParameterValues& values) {
+template <>
+nlohmann::json Wire<ParameterValues>::written(const ParameterValues& values) {
   nlohmann::json object = nlohmann::json::object();
   for (const auto& [name, value] : values) object[name] = to_json(value);
   return object;
@@ -156,68 +158,13 @@ static void describe(auto& fields, Is<FusionReply> auto& message) {
   fields.field("fusion", message.fusion);
 }
 
-template <>
-Result<ParameterDescription> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ParameterDescription>(value, path);
-}
-nlohmann::json to_json(const ParameterDescription& message) {
-  return written_message(message);
-}
-
-template <>
-Result<MethodDescription> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<MethodDescription>(value, path);
-}
-nlohmann::json to_json(const MethodDescription& message) {
-  return written_message(message);
-}
-
-template <>
-Result<PaletteDescription> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<PaletteDescription>(value, path);
-}
-nlohmann::json to_json(const PaletteDescription& message) {
-  return written_message(message);
-}
-
-template <>
-Result<FusionRange> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<FusionRange>(value, path);
-}
-nlohmann::json to_json(const FusionRange& message) {
-  return written_message(message);
-}
-
-template <>
-Result<RangeChange> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<RangeChange>(value, path);
-}
-nlohmann::json to_json(const RangeChange& message) {
-  return written_message(message);
-}
-
-template <>
-Result<FusionState> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<FusionState>(value, path);
-}
-nlohmann::json to_json(const FusionState& message) {
-  return written_message(message);
-}
-
-template <>
-Result<FusionChange> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<FusionChange>(value, path);
-}
-nlohmann::json to_json(const FusionChange& message) {
-  return written_message(message);
-}
-
-template <>
-Result<FusionReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<FusionReply>(value, path);
-}
-nlohmann::json to_json(const FusionReply& message) {
-  return written_message(message);
-}
+template struct Wire<ParameterDescription>;
+template struct Wire<MethodDescription>;
+template struct Wire<PaletteDescription>;
+template struct Wire<FusionRange>;
+template struct Wire<RangeChange>;
+template struct Wire<FusionState>;
+template struct Wire<FusionChange>;
+template struct Wire<FusionReply>;
 
 }  // namespace spectra::protocol

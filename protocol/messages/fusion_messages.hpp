@@ -99,35 +99,22 @@ struct FusionReply {
   FusionState fusion;
 };
 
-nlohmann::json to_json(const ParameterValue& value);
 template <>
-Result<ParameterValue> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ParameterValues& values);
+Result<ParameterValue> Wire<ParameterValue>::read(const nlohmann::json& value, std::string_view path);
 template <>
-Result<ParameterValues> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ParameterDescription& message);
+nlohmann::json Wire<ParameterValue>::written(const ParameterValue& value);
 template <>
-Result<ParameterDescription> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const MethodDescription& message);
+Result<ParameterValues> Wire<ParameterValues>::read(const nlohmann::json& value, std::string_view path);
 template <>
-Result<MethodDescription> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const PaletteDescription& message);
-template <>
-Result<PaletteDescription> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const FusionRange& message);
-template <>
-Result<FusionRange> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const RangeChange& message);
-template <>
-Result<RangeChange> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const FusionState& message);
-template <>
-Result<FusionState> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const FusionChange& message);
-template <>
-Result<FusionChange> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const FusionReply& message);
-template <>
-Result<FusionReply> from_json(const nlohmann::json& value, std::string_view path);
+nlohmann::json Wire<ParameterValues>::written(const ParameterValues& values);
+
+extern template struct Wire<ParameterDescription>;
+extern template struct Wire<MethodDescription>;
+extern template struct Wire<PaletteDescription>;
+extern template struct Wire<FusionRange>;
+extern template struct Wire<RangeChange>;
+extern template struct Wire<FusionState>;
+extern template struct Wire<FusionChange>;
+extern template struct Wire<FusionReply>;
 
 }  // namespace spectra::protocol

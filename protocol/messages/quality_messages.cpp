@@ -50,28 +50,8 @@ static void describe(auto& fields, Is<QualityReply> auto& message) {
   fields.field("quality", message.quality);
 }
 
-template <>
-Result<QualityState> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<QualityState>(value, path);
-}
-nlohmann::json to_json(const QualityState& message) {
-  return written_message(message);
-}
-
-template <>
-Result<QualityChange> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<QualityChange>(value, path);
-}
-nlohmann::json to_json(const QualityChange& message) {
-  return written_message(message);
-}
-
-template <>
-Result<QualityReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<QualityReply>(value, path);
-}
-nlohmann::json to_json(const QualityReply& message) {
-  return written_message(message);
-}
+template struct Wire<QualityState>;
+template struct Wire<QualityChange>;
+template struct Wire<QualityReply>;
 
 }  // namespace spectra::protocol

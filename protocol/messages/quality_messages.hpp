@@ -35,14 +35,8 @@ struct QualityReply {
   QualityState quality;
 };
 
-nlohmann::json to_json(const QualityState& message);
-template <>
-Result<QualityState> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const QualityChange& message);
-template <>
-Result<QualityChange> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const QualityReply& message);
-template <>
-Result<QualityReply> from_json(const nlohmann::json& value, std::string_view path);
+extern template struct Wire<QualityState>;
+extern template struct Wire<QualityChange>;
+extern template struct Wire<QualityReply>;
 
 }  // namespace spectra::protocol

@@ -64,60 +64,12 @@ static void describe(auto& fields, Is<ExtremesReply> auto& message) {
   fields.optional("under_range", message.under_range);
 }
 
-template <>
-Result<HistogramRequest> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<HistogramRequest>(value, path);
-}
-nlohmann::json to_json(const HistogramRequest& message) {
-  return written_message(message);
-}
-
-template <>
-Result<HistogramReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<HistogramReply>(value, path);
-}
-nlohmann::json to_json(const HistogramReply& message) {
-  return written_message(message);
-}
-
-template <>
-Result<ProbeRequest> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ProbeRequest>(value, path);
-}
-nlohmann::json to_json(const ProbeRequest& message) {
-  return written_message(message);
-}
-
-template <>
-Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ProbeReply>(value, path);
-}
-nlohmann::json to_json(const ProbeReply& message) {
-  return written_message(message);
-}
-
-template <>
-Result<ExtremesRequest> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ExtremesRequest>(value, path);
-}
-nlohmann::json to_json(const ExtremesRequest& message) {
-  return written_message(message);
-}
-
-template <>
-Result<Extreme> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<Extreme>(value, path);
-}
-nlohmann::json to_json(const Extreme& message) {
-  return written_message(message);
-}
-
-template <>
-Result<ExtremesReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ExtremesReply>(value, path);
-}
-nlohmann::json to_json(const ExtremesReply& message) {
-  return written_message(message);
-}
+template struct Wire<HistogramRequest>;
+template struct Wire<HistogramReply>;
+template struct Wire<ProbeRequest>;
+template struct Wire<ProbeReply>;
+template struct Wire<ExtremesRequest>;
+template struct Wire<Extreme>;
+template struct Wire<ExtremesReply>;
 
 }  // namespace spectra::protocol

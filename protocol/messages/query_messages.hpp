@@ -67,26 +67,12 @@ struct ExtremesReply {
   std::optional<std::array<double, 3>> under_range;
 };
 
-nlohmann::json to_json(const HistogramRequest& message);
-template <>
-Result<HistogramRequest> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const HistogramReply& message);
-template <>
-Result<HistogramReply> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ProbeRequest& message);
-template <>
-Result<ProbeRequest> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ProbeReply& message);
-template <>
-Result<ProbeReply> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ExtremesRequest& message);
-template <>
-Result<ExtremesRequest> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const Extreme& message);
-template <>
-Result<Extreme> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ExtremesReply& message);
-template <>
-Result<ExtremesReply> from_json(const nlohmann::json& value, std::string_view path);
+extern template struct Wire<HistogramRequest>;
+extern template struct Wire<HistogramReply>;
+extern template struct Wire<ProbeRequest>;
+extern template struct Wire<ProbeReply>;
+extern template struct Wire<ExtremesRequest>;
+extern template struct Wire<Extreme>;
+extern template struct Wire<ExtremesReply>;
 
 }  // namespace spectra::protocol

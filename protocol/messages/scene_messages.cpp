@@ -88,68 +88,13 @@ static void describe(auto& fields, Is<Hello> auto& message) {
   fields.field("quality", message.quality);
 }
 
-template <>
-Result<Bounds> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<Bounds>(value, path);
-}
-nlohmann::json to_json(const Bounds& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SceneTemperature>(value, path);
-}
-nlohmann::json to_json(const SceneTemperature& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SceneNote> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SceneNote>(value, path);
-}
-nlohmann::json to_json(const SceneNote& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SceneDescription> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SceneDescription>(value, path);
-}
-nlohmann::json to_json(const SceneDescription& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SceneChanged> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SceneChanged>(value, path);
-}
-nlohmann::json to_json(const SceneChanged& message) {
-  return written_message(message);
-}
-
-template <>
-Result<ServerInfo> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ServerInfo>(value, path);
-}
-nlohmann::json to_json(const ServerInfo& message) {
-  return written_message(message);
-}
-
-template <>
-Result<Limits> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<Limits>(value, path);
-}
-nlohmann::json to_json(const Limits& message) {
-  return written_message(message);
-}
-
-template <>
-Result<Hello> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<Hello>(value, path);
-}
-nlohmann::json to_json(const Hello& message) {
-  return written_message(message);
-}
+template struct Wire<Bounds>;
+template struct Wire<SceneTemperature>;
+template struct Wire<SceneNote>;
+template struct Wire<SceneDescription>;
+template struct Wire<SceneChanged>;
+template struct Wire<ServerInfo>;
+template struct Wire<Limits>;
+template struct Wire<Hello>;
 
 }  // namespace spectra::protocol

@@ -97,29 +97,13 @@ struct Hello {
   QualityState quality;
 };
 
-nlohmann::json to_json(const Bounds& message);
-template <>
-Result<Bounds> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SceneTemperature& message);
-template <>
-Result<SceneTemperature> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SceneNote& message);
-template <>
-Result<SceneNote> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SceneDescription& message);
-template <>
-Result<SceneDescription> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SceneChanged& message);
-template <>
-Result<SceneChanged> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const ServerInfo& message);
-template <>
-Result<ServerInfo> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const Limits& message);
-template <>
-Result<Limits> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const Hello& message);
-template <>
-Result<Hello> from_json(const nlohmann::json& value, std::string_view path);
+extern template struct Wire<Bounds>;
+extern template struct Wire<SceneTemperature>;
+extern template struct Wire<SceneNote>;
+extern template struct Wire<SceneDescription>;
+extern template struct Wire<SceneChanged>;
+extern template struct Wire<ServerInfo>;
+extern template struct Wire<Limits>;
+extern template struct Wire<Hello>;
 
 }  // namespace spectra::protocol

@@ -107,76 +107,14 @@ static void describe(auto& fields, Is<Status> auto& message) {
   fields.nullable("message", message.message);
 }
 
-template <>
-Result<ResumeRequest> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<ResumeRequest>(value, path);
-}
-nlohmann::json to_json(const ResumeRequest& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SubscribeRequest>(value, path);
-}
-nlohmann::json to_json(const SubscribeRequest& message) {
-  return written_message(message);
-}
-
-template <>
-Result<SubscribeReply> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<SubscribeReply>(value, path);
-}
-nlohmann::json to_json(const SubscribeReply& message) {
-  return written_message(message);
-}
-
-template <>
-Result<CameraSet> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<CameraSet>(value, path);
-}
-nlohmann::json to_json(const CameraSet& message) {
-  return written_message(message);
-}
-
-template <>
-Result<StreamAck> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<StreamAck>(value, path);
-}
-nlohmann::json to_json(const StreamAck& message) {
-  return written_message(message);
-}
-
-template <>
-Result<StreamComplete> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<StreamComplete>(value, path);
-}
-nlohmann::json to_json(const StreamComplete& message) {
-  return written_message(message);
-}
-
-template <>
-Result<StreamAccuracy> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<StreamAccuracy>(value, path);
-}
-nlohmann::json to_json(const StreamAccuracy& message) {
-  return written_message(message);
-}
-
-template <>
-Result<StreamStats> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<StreamStats>(value, path);
-}
-nlohmann::json to_json(const StreamStats& message) {
-  return written_message(message);
-}
-
-template <>
-Result<Status> from_json(const nlohmann::json& value, std::string_view path) {
-  return read_message<Status>(value, path);
-}
-nlohmann::json to_json(const Status& message) {
-  return written_message(message);
-}
+template struct Wire<ResumeRequest>;
+template struct Wire<SubscribeRequest>;
+template struct Wire<SubscribeReply>;
+template struct Wire<CameraSet>;
+template struct Wire<StreamAck>;
+template struct Wire<StreamComplete>;
+template struct Wire<StreamAccuracy>;
+template struct Wire<StreamStats>;
+template struct Wire<Status>;
 
 }  // namespace spectra::protocol

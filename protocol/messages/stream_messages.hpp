@@ -82,32 +82,14 @@ struct Status {
   std::optional<std::string> message;
 };
 
-nlohmann::json to_json(const ResumeRequest& message);
-template <>
-Result<ResumeRequest> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SubscribeRequest& message);
-template <>
-Result<SubscribeRequest> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const SubscribeReply& message);
-template <>
-Result<SubscribeReply> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const CameraSet& message);
-template <>
-Result<CameraSet> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const StreamAck& message);
-template <>
-Result<StreamAck> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const StreamComplete& message);
-template <>
-Result<StreamComplete> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const StreamAccuracy& message);
-template <>
-Result<StreamAccuracy> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const StreamStats& message);
-template <>
-Result<StreamStats> from_json(const nlohmann::json& value, std::string_view path);
-nlohmann::json to_json(const Status& message);
-template <>
-Result<Status> from_json(const nlohmann::json& value, std::string_view path);
+extern template struct Wire<ResumeRequest>;
+extern template struct Wire<SubscribeRequest>;
+extern template struct Wire<SubscribeReply>;
+extern template struct Wire<CameraSet>;
+extern template struct Wire<StreamAck>;
+extern template struct Wire<StreamComplete>;
+extern template struct Wire<StreamAccuracy>;
+extern template struct Wire<StreamStats>;
+extern template struct Wire<Status>;
 
 }  // namespace spectra::protocol
