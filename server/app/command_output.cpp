@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "fusion/mesh/scene_survey.hpp"
@@ -21,6 +22,12 @@ void print_line(std::string_view kind, std::string_view message) {
   line += '\n';
   ProgressLine::make_way();
   std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+/// A file's name may be any bytes; whoever is told of it wants UTF-8.
+std::string as_utf8(const std::string& bytes) {
+  using nlohmann::json;
+  return json::parse(json(bytes).dump(-1, ' ', false, json::error_handler_t::replace)).get<std::string>();
 }
 
 }  // namespace
@@ -65,7 +72,10 @@ fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scen
                                                const fusion::ReadOptions& options) {
   auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal, options) : fusion::read_ply(scene, options);
   fusion::report(options.progress, fusion::kSurveyPhase, 0);
-  if (loaded) fusion::survey(loaded.value(), options);
+  if (!loaded) return loaded;
+  fusion::survey(loaded.value(), options);
+  loaded.value().mesh.name = as_utf8(loaded.value().mesh.name);
+  for (fusion::Note& note : loaded.value().notes) note.message = as_utf8(note.message);
   return loaded;
 }
 

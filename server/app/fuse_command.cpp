@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -17,7 +20,7 @@ namespace {
 
 struct FusedFacts {
   std::vector<fusion::Note> notes;
-  bool has_temperature = false;
+  fusion::TemperatureSummary temperature;
 };
 
 ProgressStage writing(const FuseOptions& options, double weight) {
@@ -30,7 +33,7 @@ fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fus
                      {fusion::kHistogramPhase, "counting temperatures and hues", 0.5},
                      {fusion::kFusingPhase, "fusing to " + options.output.filename().string(), 2}});
   BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings, watched(options.read, line)));
-  return FusedFacts{std::move(fused.notes), fused.temperature.has_temperature()};
+  return FusedFacts{std::move(fused.notes), fused.temperature};
 }
 
 /// To a file that needs no lattice.
@@ -42,7 +45,7 @@ fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fus
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
   BOOST_OUTCOME_TRYV(
       write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), file, line.sink()));
-  return FusedFacts{std::move(loaded.notes), temperature.summary.has_temperature()};
+  return FusedFacts{std::move(loaded.notes), temperature.summary};
 }
 
 /// To a Draco file on the lattice of the scene.
@@ -55,13 +58,13 @@ fusion::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fu
   WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
   const auto scene =
       SceneSnapshot::build(std::move(loaded), 1, pool, kLeafVertexCount, LevelsOfDetail::LeavesOnly, line.sink());
-  file.position_step_m = file_position_step_m(*scene);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene->temperature()));
-  const auto mesh = scene->whole_mesh();
+  auto mesh = scene->whole_mesh();
+  BOOST_OUTCOME_TRYV(round_for_file(*scene, mesh, file));
   BOOST_OUTCOME_TRY(const auto losses,
                     write_scene_file(options.output, mesh, fused_colours(mesh, plan), file, line.sink()));
   notes.insert(notes.end(), losses.begin(), losses.end());
-  return FusedFacts{std::move(notes), scene->temperature().summary.has_temperature()};
+  return FusedFacts{std::move(notes), scene->temperature().summary};
 }
 
 fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::FusionSettings& settings,
@@ -83,13 +86,24 @@ int run_fuse(const FuseOptions& options) {
   if (!format) {
     return fail(kWrongUsage, options.output.string() + ": the output must end in .ply, .glb or .drc");
   }
+  std::error_code unknown;
+  for (const auto& input : {std::optional(options.input), options.thermal}) {
+    if (input && std::filesystem::equivalent(*input, options.output, unknown)) {
+      return fail(kWrongUsage, options.output.string() + ": the output is the input, which would be lost");
+    }
+  }
   const auto settings = settings_from_text(options.settings);
   if (!settings) return fail(settings.error());
   const auto facts = fused(options, settings.value(), *format);
   if (!facts) return fail(facts.error());
   print_notes(facts.value().notes);
-  if (!facts.value().has_temperature && fusion::find_method(settings.value().method)->needs_temperature) {
-    warn(options.input.string() + " has no temperatures: the visible colours are written");
+  const auto& temperature = facts.value().temperature;
+  const bool has_any =
+      temperature.has_temperature() || temperature.over_range_count + temperature.under_range_count > 0;
+  if (!has_any && fusion::find_method(settings.value().method)->needs_temperature) {
+    warn(options.input.string() + " has no temperatures: " +
+         (settings.value().missing ? "all is written in the colour for missing ones"
+                                   : "the visible colours are written"));
   }
   return kDone;
 }

@@ -24,11 +24,12 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
 }
 
 /// What a Draco file has lost, for people.
-std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, protocol::DracoKeeping keeping,
-                                    float position_step_m) {
+std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, const SceneFileOptions& options) {
   std::vector<fusion::Note> losses;
-  if (keeping == protocol::DracoKeeping::Everything) return losses;
-  std::string rounded = fmt::format("positions are rounded to {:.4g} mm", 1000 * static_cast<double>(position_step_m));
+  if (options.keeping == protocol::DracoKeeping::Everything) return losses;
+  const float coarsest_m = std::max(options.position_step_m, options.largest_position_step_m);
+  std::string rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m),
+                                    coarsest_m > options.position_step_m ? ", finer where the form is finer," : "");
   if (file.temperature_step_celsius > 0) {
     rounded += fmt::format(" and temperatures to {:g} degC", file.temperature_step_celsius);
   }
@@ -42,7 +43,7 @@ std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, protocol::D
   add("under_range_written", file.under_range_count,
       fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
                   file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
-  if (keeping == protocol::DracoKeeping::Order) return losses;
+  if (options.keeping == protocol::DracoKeeping::Order) return losses;
   losses.push_back({"vertex_order", 0,
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
   add("left_out_vertices", file.left_out_vertex_count,
@@ -77,7 +78,7 @@ fusion::Result<SceneFile> draco_file(const fusion::MultispectralMesh& mesh, std:
   if (!file) return fusion::failure(fusion::ErrorCode::Unsupported, file.error().message);
   const auto& bytes = file.value().bytes;
   const auto* text = reinterpret_cast<const char*>(bytes.data());
-  return SceneFile{std::string(text, bytes.size()), losses_of(file.value(), options.keeping, options.position_step_m)};
+  return SceneFile{std::string(text, bytes.size()), losses_of(file.value(), options)};
 }
 
 }  // namespace
@@ -151,8 +152,35 @@ fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem
   return std::move(file.losses);
 }
 
-float file_position_step_m(const SceneSnapshot& scene) {
-  return one_step_for_all(position_step_in_force(0, scene.suggested_position_step_m()), scene.bounds());
+fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::MultispectralMesh& mesh,
+                                    SceneFileOptions& options) {
+  const float usual_step_m = position_step_in_force(0, scene.suggested_position_step_m());
+  float finest_m = usual_step_m;
+  const std::span<fusion::Vec3f> positions = mesh.positions();
+  for (const auto& tile : scene.tiles()) {
+    if (tile->child_mask != 0) continue;
+    const auto lattice = tile_lattice(*tile, usual_step_m);
+    if (!lattice) return fusion::failure(fusion::ErrorCode::Unsupported, lattice.error().message);
+    const auto& [origin_m, step_m, coarsest_step_m, points] = lattice.value();
+    finest_m = std::min(finest_m, step_m);
+    options.largest_position_step_m = std::max(options.largest_position_step_m, coarsest_step_m);
+    const auto round = [&, &origin = origin_m, &step = step_m, &lattice_points = points](std::uint32_t v) {
+      const auto at = [&](std::size_t axis) {
+        return static_cast<float>(static_cast<double>(origin[axis]) +
+                                  static_cast<double>(step) * static_cast<double>(lattice_points[v][axis]));
+      };
+      positions[tile->source_vertex[v]] = {at(0), at(1), at(2)};
+    };
+    if (tile->triangles.empty()) {
+      for (std::uint32_t v = 0; v < tile->positions.size(); ++v) round(v);
+    }
+    for (const fusion::Triangle& triangle : tile->triangles) {
+      for (const std::uint32_t v : triangle) round(v);
+    }
+  }
+  options.position_step_m = one_step_for_all(finest_m, scene.bounds());
+  options.largest_position_step_m = std::max(options.largest_position_step_m, options.position_step_m);
+  return fusion::success();
 }
 
 }  // namespace spectra::server

@@ -39,6 +39,7 @@ struct SceneFileOptions {
   SceneFileFormat format = SceneFileFormat::Ply;
   protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
   float position_step_m = 0;                                       ///< Of a Draco file that does not keep everything.
+  float largest_position_step_m = 0;  ///< The step of those vertices that are rounded most.
 };
 
 /// A file, and what it does not tell as the scene did.
@@ -60,8 +61,10 @@ fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem
                                                            const SceneFileOptions& options,
                                                            const fusion::Progress& progress = {});
 
-/// The position step that a Draco file of a scene has: the one that the scene is streamed with.
-float file_position_step_m(const SceneSnapshot& scene);
+/// Rounds the whole mesh of a scene for a Draco file that does not keep everything, as the scene is streamed: each vertex as finely
+/// as its surroundings need. Sets the options' steps; the file's is the finest, doubled until all of the scene fits on it.
+fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::MultispectralMesh& mesh,
+                                    SceneFileOptions& options);
 
 /// Stands for a missing temperature in a GLB: colder than anything can be.
 inline constexpr float kGlbMissingCelsius = -1000;

@@ -92,8 +92,12 @@ fusion::Result<SceneFileOptions> file_options_of(RequestTarget& target, SceneFil
 fusion::Result<SceneFile> fused_export(const SceneSnapshot& scene, const fusion::FusionSettings& settings,
                                        SceneFileOptions options) {
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene.temperature()));
-  options.position_step_m = file_position_step_m(scene);
-  const auto mesh = scene.whole_mesh();
+  auto mesh = scene.whole_mesh();
+  const bool is_rounded =
+      options.format == SceneFileFormat::Draco && options.keeping != protocol::DracoKeeping::Everything;
+  if (is_rounded) {
+    BOOST_OUTCOME_TRYV(round_for_file(scene, mesh, options));
+  }
   return scene_file(mesh, fused_colours(mesh, plan), options);
 }
 

@@ -178,7 +178,11 @@ int parse_and_run(int argc, const char* const* argv) {
 
 int run_program(int argc, const char* const* argv) {
   try {
-    return parse_and_run(argc, argv);
+    const int status = parse_and_run(argc, argv);
+    if ((std::fflush(stdout) != 0 || std::ferror(stdout) != 0) && status == kDone) {
+      return fail(kJobFailed, "standard output could not be written");
+    }
+    return status;
   } catch (const std::bad_alloc&) {
     return fail(kJobFailed, "out of memory");
   } catch (const std::exception& error) {

@@ -1,7 +1,7 @@
 // The program as a script sees it: exit status 0, 1 for a failed job, 2 for wrong usage, one clear line on standard error.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { closeSync, copyFileSync, existsSync, mkdtempSync, openSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import net from "node:net";
 import { tmpdir } from "node:os";
 import path from "node:path";
@@ -49,6 +49,47 @@ test("a failed job is 1 and names the file", () => {
   writeFileSync(inFolder("huge.ply"), "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n");
   fails(1, /huge\.ply/, "info", inFolder("huge.ply"));
   fails(1, /nowhere/, "fuse", demo, inFolder("nowhere/out.ply"), "--method", "thermal_only");
+});
+
+test("what would be lost is not overwritten, and what could not be written is said", () => {
+  const before = readFileSync(demo);
+  fails(2, /demo\.ply: the output is the input/, "fuse", demo, demo, "--method", "thermal_only");
+  fails(2, /demo\.ply: the output is the input/, "fuse", inFolder("cut.ply"), demo, "--method", "thermal_only", "--thermal", demo);
+  assert.ok(readFileSync(demo).equals(before));
+  const full = openSync("/dev/full", "w");
+  for (const args of [["info", demo], ["methods"], ["--help"]]) {
+    const { status, stderr } = spawnSync(binary, args, { stdio: ["ignore", full, "pipe"], encoding: "utf8" });
+    assert.equal(status, 1, args[0]);
+    assert.match(stderr, /standard output/);
+  }
+  closeSync(full);
+});
+
+test("a file without temperatures is said to have none, and only such a one", () => {
+  const points = (...celsius) => {
+    const file = inFolder("celsius.ply");
+    writeFileSync(file, `ply\nformat ascii 1.0\nelement vertex ${celsius.length}\nproperty float x\nproperty float y\nproperty float z\nproperty float temperature\nend_header\n${celsius.map((value, i) => `${i} 0 0 ${value}\n`).join("")}`);
+    return file;
+  };
+  const said = (file, ...more) => {
+    const { status, stderr } = spawnSync(binary, ["fuse", file, inFolder("o.ply"), "--method", "thermal_only", ...more], { encoding: "utf8" });
+    assert.equal(status, 0, stderr);
+    return stderr;
+  };
+  assert.doesNotMatch(said(points("inf", "inf")), /no temperatures/);
+  assert.match(said(points("nan", "nan")), /no temperatures: the visible colours are written/);
+  assert.match(said(points("nan", "nan"), "--missing", "#ff00ff"), /no temperatures: all is written in the colour for missing/);
+});
+
+test("a file may have any name", async () => {
+  const name = Buffer.concat([Buffer.from(`${folder}/Geb`), Buffer.from([0xe4]), Buffer.from("ude.ply")]);
+  copyFileSync(demo, name);
+  // Node's own arguments are UTF-8; a shell passes the bytes on.
+  const command = `exec "$0" "$@" "$(printf '%s/Geb\\344ude.ply' "${folder}")"`;
+  const info = spawnSync("/bin/sh", ["-c", command, binary, "info", "--json"], { encoding: "utf8" });
+  assert.equal(JSON.parse(info.stdout).name, "Geb\ufffdude.ply", info.stderr);
+  const glb = spawnSync("/bin/sh", ["-c", `exec "$0" fuse "$(printf '%s/Geb\\344ude.ply' "${folder}")" "${folder}/named.glb" --method visible_only`, binary], { encoding: "utf8" });
+  assert.equal(glb.status, 0, glb.stderr);
 });
 
 test("a port in use is 1 and names it", async () => {

@@ -82,7 +82,7 @@ async function loadedDraco(file) {
 }
 
 /** A vertex with +Y up: z is up unless the scene says that y is. */
-const isYUp = /^comment up y$/m.test(readFileSync(scene).subarray(0, 1000).toString("latin1"));
+const isYUp = /^comment up y\b/m.test(readFileSync(scene).subarray(0, 1000).toString("latin1"));
 const uprightOf = (ply, i) => (isYUp ? [ply.x[i], ply.y[i], ply.z[i]] : [ply.x[i], ply.z[i], -ply.y[i]]);
 
 test("three.js reads the PLY", () => {
@@ -152,31 +152,65 @@ test("Khronos' validator has nothing to say about a GLB", async () => {
   }
 });
 
-test("three.js reads the Draco file: on the lattice, every triangle once", async () => {
+test("three.js reads the Draco file: every triangle once, where the one in the scene's order has it", async () => {
   const { output, said } = fused("drc");
-  assert.match(said, /rounded to .* mm and temperatures to .* degC/);
+  assert.match(said, /rounded to .* mm, finer where the form is finer, and temperatures to .* degC/);
   assert.match(said, /order of their own.*--keep-order/);
-  // A step has three significant bits, so that the rounded text tells it.
-  const told = Number(/rounded to ([0-9.e-]+) mm/.exec(said)[1]) / 1000;
-  const unit = 2 ** (Math.floor(Math.log2(told * (1 + 1e-3))) - 2);
-  const step = unit * Math.round(told / unit);
-  const { attributes, index } = await loadedDraco(output);
-  const colours = screenColours(attributes.color);
-  const hashes = colours.map((colour, i) =>
-    cornerHash(
-      [attributes.position.getX(i), attributes.position.getY(i), attributes.position.getZ(i)].map((metres) => {
-        const lattice = nearestLattice(metres, step);
-        assert.ok(Math.abs(lattice * step - metres) < 1e-4 * step, `${metres} m is on the lattice of ${step} m`);
-        return lattice;
-      }),
-      colour,
-    ),
-  );
-  const identity = new MeshIdentity();
-  for (let i = 0; i < index.count; i += 3) {
-    identity.addTriangle(...[0, 1, 2].map((corner) => hashes[index.getX(i + corner)]));
+  const told_m = Number(/rounded to ([0-9.e-]+) mm/.exec(said)[1]) / 1000;
+  const order = await loadedDraco(fused("drc", scene, "--keep-order").output);
+  let farthest_m = 0;
+  for (const [axis, get] of [["x", "getX"], ["y", "getY"], ["z", "getZ"]]) {
+    for (let i = 0; i < picture.vertexCount; ++i) {
+      farthest_m = Math.max(farthest_m, Math.abs(order.attributes.position[get](i) - picture[axis][i]));
+    }
   }
-  assert.equal(`${identity}`, `${identityOfPly(picture, [0, 0, 0], step)}`);
+  assert.ok(farthest_m < 0.501 * told_m && farthest_m > 0.05 * told_m, `${farthest_m} of ${told_m}`);
+  const identityOf = ({ attributes, index }) => {
+    const colours = screenColours(attributes.color);
+    const hashes = colours.map((colour, i) =>
+      cornerHash(
+        [attributes.position.getX(i), attributes.position.getY(i), attributes.position.getZ(i)].map((metres) =>
+          nearestLattice(metres, told_m / 1024),
+        ),
+        colour,
+      ),
+    );
+    const identity = new MeshIdentity();
+    for (let i = 0; i < index.count; i += 3) {
+      const corners = [0, 1, 2].map((corner) => index.getX(i + corner));
+      if (new Set(corners).size === 3) identity.addTriangle(...corners.map((corner) => hashes[corner]));
+    }
+    return `${identity}`;
+  };
+  assert.equal(identityOf(await loadedDraco(output)), identityOf(order));
+});
+
+test("a Draco file keeps what is small in a large scene", async () => {
+  // A map of 2 km with vertices every 20 m, and in it a bowl of 5 cm.
+  const vertices = [];
+  const triangles = [];
+  const grid = (count, at) => {
+    const first = vertices.length;
+    for (let i = 0; i < count * count; ++i) vertices.push([...at(i % count, Math.floor(i / count)), 20]);
+    for (let y = 0; y + 1 < count; ++y) {
+      for (let x = 0; x + 1 < count; ++x) {
+        const corner = first + y * count + x;
+        triangles.push([corner, corner + 1, corner + count], [corner + 1, corner + count + 1, corner + count]);
+      }
+    }
+  };
+  grid(100, (x, y) => [20 * x, 20 * y, Math.sin(x) + Math.cos(y)]);
+  const small = vertices.length;
+  grid(20, (x, y) => [900 + x / 400, 900 + y / 400, 20 + ((x - 10) ** 2 + (y - 10) ** 2) / 4000]);
+  const input = written("map.ply", { header: [...kFloats, "float temperature"], vertices, triangles });
+  const { attributes } = await loadedDraco(fused("drc", input, "--keep-order").output);
+  const places = new Set();
+  for (let i = small; i < vertices.length; ++i) {
+    const place = [attributes.position.getX(i), attributes.position.getY(i), attributes.position.getZ(i)];
+    for (let axis = 0; axis < 3; ++axis) assert.ok(Math.abs(place[axis] - vertices[i][axis]) < 0.002, `${place} of ${vertices[i]}`);
+    places.add(`${place}`);
+  }
+  assert.equal(places.size, 400);
 });
 
 test("three.js reads the Draco files that keep more", async () => {
