@@ -23,6 +23,7 @@ describe('Numbers', () => {
     expect(plain(celsius(-3.14))).toBe('−3.1 °C');
     expect(plain(celsius(-0.04))).toBe('0.0 °C');
     expect(celsius(null)).toBe('none');
+    expect([celsius(Infinity), celsius(-Infinity)]).toEqual(['over range', 'under range']);
   });
 
   it('say what a sensor could not', () => {

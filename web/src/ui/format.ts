@@ -26,14 +26,15 @@ export function unitSymbol(unit: string): string {
   return unit === 'deg' ? '°' : unit;
 }
 
+/** Infinite: beyond what the sensor could tell. */
 export function celsius(value: number | null | undefined): string {
+  if (value === Infinity || value === -Infinity) return value > 0 ? 'over range' : 'under range';
   return value == null ? 'none' : withUnit(fixed(value, 1), 'degC');
 }
 
 /** What was read at a place, in words. */
 export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range'>): string {
-  if (probe.temperature_range === 'over') return 'over range';
-  if (probe.temperature_range === 'under') return 'under range';
+  if (probe.temperature_range != null) return celsius(probe.temperature_range === 'over' ? Infinity : -Infinity);
   return probe.temperature === null ? 'no temperature' : celsius(probe.temperature);
 }
 

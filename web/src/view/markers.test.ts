@@ -49,6 +49,15 @@ describe('Markers', () => {
     expect(marks()).toEqual([]);
   });
 
+  it('marks as the hottest what the sensor could not tell any more', () => {
+    const { markers, marks } = setUp(() => null);
+    markers.extremesAre({ ...extremes, over_range: [5, 5, 0], under_range: [-5, 5, 0] });
+    expect(marks()).toMatchObject([
+      { kind: 'hottest', temperature: Infinity, x: 55, y: 45 },
+      { kind: 'coldest', temperature: -Infinity, x: 45, y: 45 },
+    ]);
+  });
+
   it('finds out at rest whether something stands before it', async () => {
     let front: number | null = 4;
     const { markers, marks, picks } = setUp(() => front);

@@ -31,6 +31,13 @@ export interface Mark {
   isHidden: boolean;
 }
 
+/** The hottest or the coldest place: one beyond what the sensor could tell (an infinite temperature) comes before all others. */
+export function extremeOf(extremes: Extremes | null, kind: Kind): Extreme | null {
+  const beyond = kind === 'hottest' ? extremes?.over_range : extremes?.under_range;
+  if (beyond != null) return { position: beyond, temperature: kind === 'hottest' ? Infinity : -Infinity };
+  return extremes?.[kind] ?? null;
+}
+
 /** Casting rays through the scene is work, and so is finding what is seen: it waits until the camera rests. */
 const REST_MS = 250;
 const KINDS = ['hottest', 'coldest'] as const;
@@ -97,8 +104,8 @@ export class Markers {
       return [{ kind, of, temperature: extreme.temperature, x: place.x, y: place.y, isHidden }];
     };
     return KINDS.flatMap((kind) => {
-      const whole = this.#extremes?.[kind] ?? null;
-      const seen = this.#inView?.extremes[kind] ?? null;
+      const whole = extremeOf(this.#extremes, kind);
+      const seen = extremeOf(this.#inView?.extremes ?? null, kind);
       // Where the scene's own is seen, one mark says both.
       const isSame = whole !== null && seen !== null && String(whole.position) === String(seen.position);
       return [
@@ -112,7 +119,7 @@ export class Markers {
     const check = this.#check;
     const hidden = new Set<Kind>();
     for (const kind of KINDS) {
-      const extreme = this.#extremes?.[kind] ?? null;
+      const extreme = extremeOf(this.#extremes, kind);
       const place = extreme && this.#placeOf(extreme);
       if (extreme === null || place === null) continue;
       const hit = await this.viewport.pick(place.x, place.y);
