@@ -4,7 +4,7 @@
 
 namespace spectra::fusion {
 
-/// A distance in metres for people: three digits, and kilometres from 1000 m on.
+/// A distance in metres for people: three digits, and kilometres from 1000 m on (with an exponent from a million of them on).
 std::string distance_text(double metres);
 
 }  // namespace spectra::fusion

@@ -11,7 +11,7 @@
 
 namespace spectra::fusion {
 
-/// A vertex of the input without a finite position: no part of the scene, but kept for an output that has the input's
+/// A vertex of the input without a position (not finite, or a hole): no part of the scene, but kept for an output that has the input's
 /// vertices in their order.
 struct LeftOutVertex {
   std::uint32_t input_index = 0;
@@ -53,7 +53,7 @@ class MultispectralMesh {
   const std::vector<Triangle>& triangles() const { return triangles_; }
   std::vector<Triangle>& triangles() { return triangles_; }
 
-  /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM loses nothing).
+  /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM keeps its millimetres).
   Vec3d origin;
   std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
   UpAxis up = UpAxis::Z;

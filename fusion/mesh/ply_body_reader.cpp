@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fusion/mesh/ply_values.hpp"
+#include "fusion/mesh/scene_origin.hpp"
 
 namespace spectra::fusion {
 
@@ -36,7 +37,11 @@ bool is_position(const Vec3d& p) {
 
 PlyBodyReader::PlyBodyReader(BlockFile& file, const PlyHeader& header, const PlyInterpretation& interpretation,
                              const PlyHandlers& handlers)
-    : file_(file), header_(header), interpretation_(interpretation), handlers_(handlers) {}
+    : file_(file),
+      header_(header),
+      interpretation_(interpretation),
+      handlers_(handlers),
+      sample_(header.find("vertex")->count) {}
 
 Result<PlyBodyFacts> PlyBodyReader::read() {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -63,6 +68,7 @@ Result<PlyBodyFacts> PlyBodyReader::read() {
   BOOST_OUTCOME_TRY(result);
 
   facts_.faces = faces.facts();
+  conclude_positions(faces);
   if (facts_.faces.triangle_count > 0) {
     facts_.unreferenced_vertex_count =
         vertices->count - facts_.left_out_vertex_count - facts_.faces.referenced_vertex_count;
@@ -135,14 +141,31 @@ Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& elemen
   return result;
 }
 
+/// Holes are at one place that no triangle uses, or that is far from everything.
+void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
+  sample_.conclude();
+  facts_.bulk = sample_.bulk();
+  facts_.origin = scene_origin(facts_.min, facts_.max, facts_.bulk);
+  const auto& hole = sample_.hole();
+  if (!hole || interpretation_.hole) return;
+  const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),
+                                   [&](std::uint64_t vertex) { return faces.is_referenced(vertex); });
+  if (hole->is_far || !is_used) facts_.hole = hole->place;
+}
+
 /// Brings the positions to metres, and finds those that are none.
 void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t first_vertex) {
   if (const double metres = interpretation_.metres_per_unit; metres != 1) {
     for (Vec3d& p : positions) p = {p.x * metres, p.y * metres, p.z * metres};
   }
   left_out_.clear();
+  sample_.add(first_vertex, positions);
   Box box{facts_.min, facts_.max};
   bool all_good = true;
+  const std::optional<Vec3d>& hole = interpretation_.hole;
+  if (hole) {
+    for (const Vec3d& p : positions) all_good = all_good && p != *hole;
+  }
   for (const Vec3d& p : positions) {
     all_good = all_good && is_position(p);
     box.add(p);
@@ -151,9 +174,11 @@ void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t fi
     box = {facts_.min, facts_.max};
     if (is_left_out_.is_empty()) is_left_out_.resize(header_.find("vertex")->count);
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      if (is_position(positions[i])) {
+      const bool is_hole = positions[i] == hole;
+      if (is_position(positions[i]) && !is_hole) {
         box.add(positions[i]);
       } else {
+        facts_.hole_count += is_hole ? 1U : 0U;
         left_out_.push_back(static_cast<std::uint32_t>(i));
         is_left_out_.set(first_vertex + i);
       }

@@ -28,6 +28,7 @@ class PlyBodyReader {
   Result<void> hand_on(PlyRawVertices raw, const PlyElement& element);
   void judge_positions(std::span<Vec3d> positions, std::uint64_t first_vertex);
   Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
+  void conclude_positions(const PlyFaceReader& faces);
   void convert_temperatures(const PlyRawVertices& raw);
 
   BlockFile& file_;
@@ -35,6 +36,7 @@ class PlyBodyReader {
   const PlyInterpretation& interpretation_;
   const PlyHandlers& handlers_;
   PlyBodyFacts facts_;
+  PositionSample sample_;
 
   VertexBits is_left_out_;               ///< Empty until the first one.
   std::vector<std::uint32_t> left_out_;  ///< Of the block.

@@ -49,6 +49,7 @@ class PlyFaceReader {
   Result<void> read_strips(const PlyElement& element, std::size_t corner_list);
 
   FaceFacts facts() const;
+  bool is_referenced(std::uint64_t vertex) const { return is_referenced_[vertex]; }
   /// The error came from the sink: it is not about this file.
   bool sink_has_failed() const { return sink_has_failed_; }
 

@@ -49,13 +49,17 @@ Result<void> for_each_temperature(const PlyVertexBlock& block, Use&& use) {
 }
 
 Result<FirstPass> first_pass(PlyStream& stream) {
-  TemperatureAccumulator temperatures;
+  std::optional<TemperatureAccumulator> temperatures(std::in_place);
   PlyHandlers handlers;
   handlers.vertices = [&](const PlyVertexBlock& block) {
-    return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures.add(celsius); });
+    return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures->add(celsius); });
   };
-  BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
-  return FirstPass{facts, temperatures.summary()};
+  BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
+  if (stream.leave_out_hole(facts)) {
+    temperatures.emplace();
+    BOOST_OUTCOME_TRY(facts, stream.read(handlers));
+  }
+  return FirstPass{facts, temperatures->summary()};
 }
 
 /// The histogram of the file, by another pass over it; the pass's error, if any, is kept in `error`.
@@ -97,7 +101,7 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
   PlyLayout layout;
   layout.vertex_count = stream.vertex_count();
   layout.triangle_count = facts.faces.triangle_count;
-  layout.origin = scene_origin(facts.min, facts.max);
+  layout.origin = facts.origin;
   layout.double_positions = stream.has_double_positions();
   layout.has_temperature = stream.has_temperature();
   PlyEncoder encoder(layout, std::move(sink));

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "fusion/mesh/distance_text.hpp"
 #include "fusion/mesh/ply_values.hpp"
 #include "fusion/mesh/scene_origin.hpp"
 #include "fusion/mesh/temperature_name.hpp"
@@ -34,6 +35,16 @@ std::string short_number(double value) {
   return {text.data(), end};
 }
 
+/// The shortest text that is read back as a value of that type.
+std::string value_text(double value, PlyScalar type) {
+  if (type == PlyScalar::Float64) return number_text(value);
+  std::array<char, 32> text;
+  const bool is_float = type == PlyScalar::Float32 && std::abs(value) <= double{std::numeric_limits<float>::max()};
+  const auto [end, status] = is_float ? std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value))
+                                      : std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
 bool is_used(const PlySlots& slots, std::size_t property) {
   return std::find(slots.begin(), slots.end(), std::optional(property)) != slots.end();
 }
@@ -57,6 +68,7 @@ class Notes {
         survey_(interpretation.survey),
         options_(options),
         facts_(facts),
+        hole_(interpretation.hole),
         vertices_(*header.find("vertex")) {}
 
   std::vector<Note> take() {
@@ -77,29 +89,62 @@ class Notes {
   }
 
   void about_positions() {
-    add("left_out_vertices", facts_.left_out_vertex_count,
-        counted(facts_.left_out_vertex_count, "vertex", "vertices") + " without a finite position left out");
+    const std::uint64_t nowhere_count = facts_.left_out_vertex_count - facts_.hole_count;
+    add("left_out_vertices", nowhere_count,
+        counted(nowhere_count, "vertex", "vertices") + " without a finite position left out");
+    if (facts_.hole_count > 0) {
+      add("hole_vertices", facts_.hole_count,
+          counted(facts_.hole_count, "vertex", "vertices") + " in exactly one place, " + hole_text() +
+              ", taken for holes and left out with their temperatures, like vertices without a position; written as "
+              "nan they need no guess");
+    }
     add("left_out_faces", facts_.faces.left_out_face_count,
         counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
-    // Float coordinates far from 0 have been rounded before they came here.
-    constexpr double kTooCoarse = 1.0 / 20'000;
-    const Vec3d origin = scene_origin(facts_.min, facts_.max);
-    const double extent =
-        std::max({facts_.max.x - facts_.min.x, facts_.max.y - facts_.min.y, facts_.max.z - facts_.min.z});
+    about_rounding();
+  }
+
+  /// The place of the holes in the numbers of the file.
+  std::string hole_text() const {
+    const Vec3d& place = *hole_;
+    std::string text;
+    for (const auto& [slot, metres] : {std::pair{kX, place.x}, std::pair{kY, place.y}, std::pair{kZ, place.z}}) {
+      text += (text.empty() ? "" : " ") +
+              value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
+    }
+    return text;
+  }
+
+  /// What the file, or keeping positions as floats, has lost of them.
+  void about_rounding() {
+    if (!facts_.bulk) return;
+    const Bulk& bulk = *facts_.bulk;
     const std::array<std::pair<double, double>, 3> axes = {
-        {{facts_.min.x, facts_.max.x}, {facts_.min.y, facts_.max.y}, {facts_.min.z, facts_.max.z}}};
+        {{bulk.min.x, bulk.max.x}, {bulk.min.y, bulk.max.y}, {bulk.min.z, bulk.max.z}}};
     double rounding = 0;
+    bool is_all_float = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (vertices_.properties[*schema_.vertex[kX + axis]].type != PlyScalar::Float32) continue;
+      const PlyScalar type = vertices_.properties[*schema_.vertex[kX + axis]].type;
+      is_all_float = is_all_float && (type == PlyScalar::Float32 || size_bytes(type) < 4);
+      if (type != PlyScalar::Float32) continue;
       const double furthest = std::max(std::abs(axes[axis].first), std::abs(axes[axis].second));
       const auto stored = static_cast<float>(furthest / options_.scale());
       const float next = std::nextafter(stored, 0.0F);
       rounding = std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.scale());
     }
-    if (origin != Vec3d{} && extent > 0 && rounding > kTooCoarse * extent) {
+    // Float coordinates far from 0 have been rounded before they came here.
+    constexpr double kTooCoarse = 1.0 / 20'000;
+    if (facts_.origin != Vec3d{} && rounding > kTooCoarse * bulk.extent()) {
       add("rounded_positions", vertices_.count,
           "Positions are floats far from 0, which the file itself rounds to " + short_number(rounding) +
               " m; write them as double, or closer to 0");
+    }
+    constexpr double kMillimetre = 0.001;
+    const double kept = largest_rounding(bulk, facts_.origin);
+    if (!is_all_float && kept > kMillimetre) {
+      add("coarse_positions", vertices_.count,
+          "Positions are kept as floats from " + number_text(facts_.origin.x) + " " + number_text(facts_.origin.y) +
+              " " + number_text(facts_.origin.z) + ": the farthest of this large scene are off by up to " +
+              distance_text(kept) + "; cut it into parts where that matters");
     }
   }
 
@@ -320,6 +365,7 @@ class Notes {
   const PlySurvey& survey_;
   const ReadOptions& options_;
   const PlyBodyFacts& facts_;
+  const std::optional<Vec3d>& hole_;
   const PlyElement& vertices_;
   std::vector<Note> notes_;
 };

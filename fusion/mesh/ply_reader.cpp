@@ -152,11 +152,18 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
     }
     return success();
   };
-  BOOST_OUTCOME_TRY(const PlyBodyFacts facts, stream.read(handlers));
+  BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
+  if (stream.leave_out_hole(facts)) {
+    kept_count = 0;
+    mesh.left_out.clear();
+    mesh.triangles().clear();
+    mesh_index.clear();
+    BOOST_OUTCOME_TRY(facts, stream.read(handlers));
+  }
   if (kept_count < mesh.vertex_count()) mesh.resize_vertices(kept_count);
   exact_positions.resize(is_exact ? kept_count : 0);
 
-  mesh.origin = scene_origin(facts.min, facts.max);
+  mesh.origin = facts.origin;
   if (is_exact) {
     std::transform(exact_positions.begin(), exact_positions.end(), mesh.positions().begin(),
                    [&](const Vec3d& position) { return relative_to(mesh.origin, position); });

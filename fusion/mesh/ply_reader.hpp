@@ -33,8 +33,8 @@ struct LoadedScene {
 /// Reads PLY 1.0: ascii, and binary of both byte orders; a regular file, plain or packed with gzip. Safe on untrusted input:
 /// every count is checked against the bytes that are there, and memory is bounded by a small multiple of the (unpacked)
 /// file's size. docs/input.md tells what is recognised; in short:
-/// - Positions: x, y, z of any type. Vertices without a finite one are left out with their faces (MultispectralMesh::
-///   left_out). The mesh's origin is chosen as scene_origin.hpp says.
+/// - Positions: x, y, z of any type. Vertices without a finite one, and those at the one place that stands for it
+///   (PositionSample::hole), are left out with their faces (MultispectralMesh::left_out). The mesh's origin is chosen as scene_origin.hpp says.
 /// - Visible colour: three channels of any type, scaled by the largest value in the file; packed; of splats; of the faces.
 /// - Temperature: a scalar whose name says so, or that the options name, of the vertices or the faces. Scaled to degC as the
 ///   options say. NaN, at or below -273.15 degC, or a value that the options name: missing (NaN). +inf and what is beyond

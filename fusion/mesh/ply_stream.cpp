@@ -141,6 +141,12 @@ Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
   return reader.handler_has_failed() ? std::move(facts) : located(with_reason(std::move(facts)), name_);
 }
 
+bool PlyStream::leave_out_hole(const PlyBodyFacts& facts) {
+  if (!facts.hole) return false;
+  interpretation_.hole = facts.hole;
+  return true;
+}
+
 /// What does not fit in a damaged file, or is left over, is only what came of the damage.
 Result<PlyBodyFacts> PlyStream::with_reason(Result<PlyBodyFacts> facts) {
   if (facts && facts.value().trailing_byte_count == 0) return facts;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "fusion/mesh/ply_reader.hpp"
 #include "fusion/mesh/ply_schema.hpp"
 #include "fusion/mesh/ply_survey.hpp"
+#include "fusion/mesh/position_sample.hpp"
 #include "fusion/mesh/read_options.hpp"
 #include "fusion/mesh/vertex_colour.hpp"
 #include "fusion/mesh/vertex_temperature.hpp"
@@ -42,10 +44,15 @@ struct PlyHandlers {
 
 /// What was found in the body.
 struct PlyBodyFacts {
-  Vec3d min, max;  ///< Of all positions.
+  Vec3d min, max;            ///< Of all positions.
+  std::optional<Bulk> bulk;  ///< Where nearly all of them are, when that is more than one place.
+  Vec3d origin;              ///< What to tell them from, as scene_origin.hpp says.
+  /// A place that nothing is but holes, found in this reading: PlyStream::leave_out_hole() takes it.
+  std::optional<Vec3d> hole;
   FaceFacts faces;
   TemperatureFacts temperature;
-  std::uint64_t left_out_vertex_count = 0;      ///< Without a finite position within the range of float.
+  std::uint64_t left_out_vertex_count = 0;      ///< Without a finite position within the range of float, and holes.
+  std::uint64_t hole_count = 0;                 ///< Left out because they are at the place of holes.
   std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
   std::uint64_t clamped_colour_count = 0;       ///< Vertices whose colour was out of range or no number.
   std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
@@ -60,6 +67,7 @@ struct PlyInterpretation {
   ColourConversion colours;  ///< Of the vertices.
   TemperatureConversion temperature;
   double metres_per_unit;
+  std::optional<Vec3d> hole;  ///< Vertices there are no part of the scene; in metres.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the
@@ -81,6 +89,10 @@ class PlyStream {
 
   /// Reads the whole body from its beginning; may be called again.
   Result<PlyBodyFacts> read(const PlyHandlers& handlers);
+
+  /// Where the reading found holes that are written as a number, they are left out of all later ones, and true tells that this
+  /// one is void.
+  bool leave_out_hole(const PlyBodyFacts& facts);
 
   /// What has to be said about the file after a reading, for people.
   std::vector<Note> notes(const PlyBodyFacts& facts) const;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+
+#include "fusion/mesh/position_sample.hpp"
 #include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
@@ -9,6 +12,14 @@ namespace spectra::fusion {
 /// smaller than that extent. Float coordinates minus such an origin are floats again, without any rounding; double ones keep
 /// at least the precision that a float has at the size of the extent.
 Vec3d scene_origin(const Vec3d& min, const Vec3d& max);
+
+/// The same, unless strays decide it to the harm of the rest: where a float at that distance from the origin would be rounded
+/// by more than a 20,000th of the bulk's size, it is the origin of the bulk. Strays may then lose what a float loses at their
+/// distance.
+Vec3d scene_origin(const Vec3d& min, const Vec3d& max, const std::optional<Bulk>& bulk);
+
+/// What a float loses at most of a coordinate of the bulk when it is relative to the origin.
+double largest_rounding(const Bulk& bulk, const Vec3d& origin);
 
 /// The position as it is stored: relative to the origin, in float.
 inline Vec3f relative_to(const Vec3d& origin, const Vec3d& position) {

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
@@ -103,6 +105,109 @@ TEST(FieldKinds, HolesOfDoublePositionsKeepTheOthersExact) {
   ASSERT_EQ(scene.mesh.vertex_count(), 3U);
   EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}}));
   EXPECT_EQ(scene.mesh.origin.x + static_cast<double>(scene.mesh.positions()[1].x), 412346.125);
+}
+
+/// A bumpy square of 20 x 20 double points at map coordinates, and more points.
+std::string map_square(const std::vector<Vec3d>& more, const std::string& faces = {}, const std::string& lines = {}) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(400 + more.size()) +
+                     "\nproperty double x\nproperty double y\nproperty double z\nproperty float temperature\n" + faces +
+                     "end_header\n";
+  std::vector<Vec3d> points;
+  for (int i = 0; i < 400; ++i) {
+    points.push_back({500'000.123 + 0.15 * (i % 20), 4'200'000.456 + 0.15 * (i / 20), 100.01 * (1 + 1e-4 * (i % 7))});
+  }
+  points.insert(points.end(), more.begin(), more.end());
+  char line[120];
+  for (const Vec3d& p : points) {
+    std::snprintf(line, sizeof line, "%.17g %.17g %.17g %d\n", p.x, p.y, p.z, p.x > 1000 ? 20 : 0);
+    text += line;
+  }
+  return text + lines;
+}
+
+double place_x(const LoadedScene& scene, std::size_t vertex) {
+  return scene.mesh.origin.x + static_cast<double>(scene.mesh.positions()[vertex].x);
+}
+
+TEST(FieldKinds, AStrayDoesNotTakeTheOriginAwayFromTheScene) {
+  for (const Vec3d& stray : {Vec3d{}, Vec3d{500'000, 4'200'000, -1e7}, Vec3d{1e30, 0, 0}}) {
+    const LoadedScene scene = loaded(map_square({stray}));
+    ASSERT_EQ(scene.mesh.vertex_count(), 401U);
+    EXPECT_NEAR(place_x(scene, 3), 500'000.573, 1e-6) << stray.x;
+    EXPECT_NEAR(place_x(scene, 400), stray.x, 1e-7 * stray.x) << stray.x;
+    EXPECT_EQ(note_count(scene, "hole_vertices"), 0U);
+    EXPECT_EQ(note_count(scene, "coarse_positions"), 0U);
+  }
+}
+
+TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
+  const double largest = static_cast<double>(std::numeric_limits<float>::max());
+  for (const Vec3d& place : {Vec3d{}, Vec3d{-9999, -9999, -9999}, Vec3d{largest, largest, largest}}) {
+    for (const bool are_most : {false, true}) {
+      const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(are_most ? 2000 : 20, place)));
+      ASSERT_EQ(scene.mesh.vertex_count(), 400U) << place.x;
+      EXPECT_NEAR(place_x(scene, 3), 500'000.573, 1e-6) << place.x;
+      EXPECT_EQ(*std::min_element(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end()),
+                20);
+      EXPECT_EQ(note_count(scene, "hole_vertices"), are_most ? 2000U : 20U);
+      EXPECT_EQ(note_count(scene, "left_out_vertices"), 0U);
+      EXPECT_EQ(scene.mesh.left_out.size(), are_most ? 2000U : 20U);
+    }
+  }
+  EXPECT_NE(
+      note_text(loaded(map_square(std::vector<Vec3d>(20, {-9999, 0.1, 7}))), "hole_vertices").find("-9999 0.1 7,"),
+      std::string::npos);
+  ReadOptions millimetres;
+  millimetres.metres_per_unit = 0.001;
+  const LoadedScene small = loaded(map_square(std::vector<Vec3d>(20, {-9999, 0, 0})), millimetres);
+  EXPECT_EQ(note_count(small, "hole_vertices"), 20U);
+  EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
+}
+
+TEST(FieldKinds, HolesWrittenAsANumberTakeTheirFacesWithThem) {
+  const std::string faces = "element face 2\n" + std::string(kFaces);
+  const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(20, {-1, -1, -1}), faces, "3 0 1 20\n4 1 2 400 20\n"));
+  EXPECT_EQ(scene.mesh.vertex_count(), 400U);
+  EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 20}}));
+  EXPECT_EQ(note_count(scene, "left_out_faces"), 1U);
+}
+
+/// The tip of a cone whose triangles share no vertices is a corner of its surface; and where every place is there often, none
+/// is a hole.
+TEST(FieldKinds, ManyVerticesInOnePlaceNeedNotBeAHole) {
+  std::vector<std::string> lines;
+  std::string faces;
+  for (int i = 0; i < 40; ++i) {
+    for (const int rim : {i, i + 1}) {
+      lines.push_back(std::to_string(std::cos(rim * 0.157)) + " " + std::to_string(std::sin(rim * 0.157) + i * 1e-4) +
+                      " 0");
+    }
+    lines.push_back("0 0 1");
+    faces += "3 " + std::to_string(3 * i) + " " + std::to_string(3 * i + 1) + " " + std::to_string(3 * i + 2) + "\n";
+  }
+  const LoadedScene cone = loaded(text_file("", lines, "element face 40\n" + std::string(kFaces), faces));
+  EXPECT_EQ(cone.mesh.vertex_count(), 120U);
+  EXPECT_EQ(cone.mesh.triangle_count(), 40U);
+
+  lines.clear();
+  for (int i = 0; i < 400; ++i) lines.push_back(std::to_string(i % 10) + " 0 0");
+  EXPECT_EQ(loaded(text_file("", lines)).mesh.vertex_count(), 400U);
+  EXPECT_EQ(loaded(text_file("", std::vector<std::string>(400, "3 4 5"))).mesh.vertex_count(), 400U);
+}
+
+TEST(FieldKinds, PositionsThatAFloatRoundsByMoreThanAMillimetreAreSaid) {
+  EXPECT_EQ(note_count(loaded(map_square({{510'000, 4'200'000, 100}, {500'000, 4'210'000, 100}})), "coarse_positions"),
+            0U);
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 100\nproperty double x\nproperty double y\nproperty double "
+      "z\nend_header\n";
+  for (int i = 0; i < 100; ++i) {
+    text += std::to_string(500'000 + 600.123 * i) + " " + std::to_string(4'200'000 + 613.01 * (i * 37 % 100)) + " 7\n";
+  }
+  const LoadedScene wide = loaded(text);
+  EXPECT_EQ(note_count(wide, "coarse_positions"), 100U);
+  EXPECT_NE(note_text(wide, "coarse_positions").find("0.00195 m"), std::string::npos)
+      << note_text(wide, "coarse_positions");
 }
 
 TEST(FieldKinds, ColoursOfAnyTypeAreScaledByTheirLargest) {
@@ -291,7 +396,7 @@ TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
 TEST(FieldKinds, ASensorsLargestCountDoesNotHideTheUnit) {
   const auto said = [](double first, double step, std::size_t full_count) {
     std::vector<std::string> lines = lines_of(first, step, 40);
-    for (std::size_t i = 0; i < full_count; ++i) lines[i] = "0 0 0 65535";
+    for (std::size_t i = 0; i < full_count; ++i) lines[i] = std::to_string(i) + " 0 0 65535";
     return note_text(loaded(text_file("property ushort temperature\n", lines)), "implausible_temperatures");
   };
   for (const std::size_t full_count : {1U, 25U}) {

@@ -101,6 +101,29 @@ TEST(PlyFuse, HasThemWithoutTemperaturesColoursOrFaces) {
                     "histogram_bin");
 }
 
+/// Holes that are written as a number stay where they were, and colour nothing.
+TEST(PlyFuse, WritesHolesInTheirPlace) {
+  const test::TemporaryFolder folder;
+  std::string text = "ply\nformat ascii 1.0\nelement vertex 120\n" + std::string(test::kXyz) + std::string(test::kRgb) +
+                     "property float temperature\nend_header\n";
+  for (int i = 0; i < 120; ++i) {
+    text += i % 4 == 3
+                ? "0 0 0 9 8 7 0\n"
+                : std::to_string(i) + " " + std::to_string(i % 7) + " 5000 200 90 30 2" + std::to_string(i % 10) + "\n";
+  }
+  const auto in = folder.write("holes.ply", text);
+  expect_same_bytes(folder, in, "thermal_only");
+  const auto result = fuse_ply(in, folder.path() / "out.ply", settings_of("thermal_only"));
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result.value().temperature.minimum, 20);
+  const auto out = read_ply(folder.path() / "out.ply");
+  ASSERT_TRUE(out);
+  ASSERT_EQ(out.value().mesh.left_out.size(), 30U);
+  EXPECT_EQ(out.value().mesh.left_out[1].input_index, 7U);
+  EXPECT_EQ(out.value().mesh.left_out[1].position, (Vec3d{0, 0, 0}));
+  EXPECT_EQ(out.value().mesh.left_out[1].visible, (Rgb8{9, 8, 7}));
+}
+
 TEST(PlyFuse, ReportsWhatItDid) {
   const test::TemporaryFolder folder;
   const auto result =
