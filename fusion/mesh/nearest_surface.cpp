@@ -220,19 +220,22 @@ std::optional<NearestSurface::Hit> NearestSurface::find(const Vec3f& position, d
   return Hit{corners(state.element), state.weights, std::sqrt(state.best_squared)};
 }
 
-double NearestSurface::median_spacing() const {
-  std::vector<double> spacings;
-  if (!triangles_.empty()) {
-    const std::size_t step = std::max<std::size_t>(1, triangles_.size() / kSpacingSamples);
-    for (std::size_t t = 0; t < triangles_.size(); t += step) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Vector edge =
-            difference(vector_of(positions_[triangles_[t][i]]), vector_of(positions_[triangles_[t][(i + 1) % 3]]));
-        if (dot(edge, edge) > 0) spacings.push_back(std::sqrt(dot(edge, edge)));
-      }
+double median_edge(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+  std::vector<double> edges;
+  const std::size_t step = std::max<std::size_t>(1, triangles.size() / kSpacingSamples);
+  for (std::size_t t = 0; t < triangles.size(); t += step) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector edge =
+          difference(vector_of(positions[triangles[t][i]]), vector_of(positions[triangles[t][(i + 1) % 3]]));
+      if (dot(edge, edge) > 0) edges.push_back(std::sqrt(dot(edge, edge)));
     }
-    return median(spacings);
   }
+  return median(edges);
+}
+
+double NearestSurface::median_spacing() const {
+  if (!triangles_.empty()) return median_edge(positions_, triangles_);
+  std::vector<double> spacings;
   const std::size_t step = std::max<std::size_t>(1, positions_.size() / kSpacingSamples);
   for (std::size_t v = 0; v < positions_.size(); v += step) {
     Search state;

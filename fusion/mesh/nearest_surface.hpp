@@ -15,6 +15,9 @@ namespace spectra::fusion {
 /// The point of the triangle a, b, c nearest to p, as barycentric weights; total for degenerate triangles.
 std::array<double, 3> nearest_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c);
 
+/// The median length of the edges of the triangles, over a sample; 0 without any.
+double median_edge(std::span<const Vec3f> positions, std::span<const Triangle> triangles);
+
 /// Finds the nearest point of a surface: of its triangles with their inside, and of vertices of no triangle. A tree of boxes,
 /// about 45 bytes a triangle; keeps references to what it is made of. Immutable, any number of threads may ask.
 class NearestSurface {

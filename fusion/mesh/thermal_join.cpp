@@ -29,6 +29,8 @@ constexpr double kOffsets = 3;
 /// The least and the most of the scene's diagonal that a surface reaches.
 constexpr double kLeastReach = 0.005;
 constexpr double kMostReach = 0.02;
+/// Of an edge: how far the surface may be from the triangles that stand for it.
+constexpr double kCutOff = 0.5;
 constexpr double kLeastShare = 0.1;
 
 /// A box in the coordinates of the file.
@@ -184,7 +186,11 @@ class PlaceJoin {
   /// The distance up to which places are joined.
   double reach(double diagonal) {
     const bool has_surface = !thermal_.is_point_cloud();
-    const double near = has_surface ? std::min(kSpacings * spacing_, kLeastReach * diagonal) : kSpacings * spacing_;
+    // Triangles cut off what is round by a share of their size.
+    const double coarser = std::max(spacing_, median_edge(scene_.positions(), scene_.triangles()));
+    const double cut = std::min(kCutOff * coarser, kMostReach * diagonal);
+    const double near =
+        std::max(cut, has_surface ? std::min(kSpacings * spacing_, kLeastReach * diagonal) : kSpacings * spacing_);
     const double most = std::max(near, kMostReach * diagonal);
     look(most);
     std::vector<float> found = found_distances(most);

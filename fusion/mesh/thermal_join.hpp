@@ -15,7 +15,7 @@ Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal)
 /// - Else by place: the temperature at the nearest point of the thermal surface (of its triangles, between their corners, and of
 ///   its vertices of no triangle) within a distance: `join_distance_m`, or, when that is 0, three spacings of the thermal
 ///   vertices, or three times what the surfaces are apart in the middle (two reconstructions of one thing never
-///   coincide), but at most a fiftieth of the scene. Beyond the border of the thermal surface it reaches one spacing, or a third of the distance.
+///   coincide), or half an edge of the coarser of the two, but at most a fiftieth of the scene. Beyond the border of the thermal surface it reaches one spacing, or a third of the distance.
 ///   What is not reached is missing. Any number of threads, the same answer.
 /// Notes are added to the scene's: "thermal_joined_in_order", or "thermal_joined_nearest" with how many and how far, and
 /// "thermal_not_reached". Unsupported when less than a tenth of either scene reaches the other.

@@ -165,6 +165,38 @@ TEST(ThermalJoin, ReachesASurfaceThatIsDisplaced) {
   EXPECT_EQ(note_count(scene.value(), "thermal_joined_nearest"), 1600U);
 }
 
+/// A square of 3 m with hills.
+std::string hilly_file(int side, bool is_thermal) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(side * side) + "\n" +
+                     std::string(test::kXyz) + (is_thermal ? "property float temperature\n" : "") + "element face " +
+                     std::to_string((side - 1) * (side - 1)) + "\n" + std::string(test::kFaces) + "end_header\n";
+  for (int v = 0; v < side * side; ++v) {
+    const double x = 3.0 * (v % side) / (side - 1);
+    const double y = 3.0 * (v / side) / (side - 1);
+    text += std::to_string(x) + " " + std::to_string(y) + " " +
+            std::to_string(0.2 * std::sin(3 * x) * std::cos(3 * y)) + (is_thermal ? " " + std::to_string(20 + x) : "") +
+            "\n";
+  }
+  for (int v = 0; v < side * (side - 1); ++v) {
+    if (v % side == side - 1) continue;
+    text += "4 " + std::to_string(v) + " " + std::to_string(v + 1) + " " + std::to_string(v + side + 1) + " " +
+            std::to_string(v + side) + "\n";
+  }
+  return text;
+}
+
+TEST(ThermalJoin, ReachesTheHillsThatACoarserSurfaceCutsOff) {
+  for (const auto& [visible, thermal] : {std::pair{24, 8}, std::pair{60, 9}, std::pair{8, 24}}) {
+    const auto scene = joined(hilly_file(visible, false), hilly_file(thermal, true));
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(note_count(scene.value(), "missing_temperatures"), 0U) << visible << " on " << thermal;
+    const auto& mesh = scene.value().mesh;
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+      ASSERT_NEAR(mesh.temperature_celsius()[v], 20 + mesh.positions()[v].x, 0.06) << v;
+    }
+  }
+}
+
 TEST(ThermalJoin, DoesNotReachBeyondTheBorderOfTheThermalSurface) {
   const auto scene = joined(square_file(61, 3, 1, {}, false, true), square_file(41, 2, 1, {}, true, true));
   ASSERT_TRUE(scene) << scene.error().message;
