@@ -316,12 +316,12 @@ class Notes {
               "(degC = A value + B), or --temperature-property NAME" +
               no_data);
     } else if (facts.too_hot_count > 0) {
-      const std::string value = short_number(static_cast<double>(facts.highest));
+      const std::string value = value_text(static_cast<double>(facts.highest), PlyScalar::Float32);
       add(kId, facts.too_hot_count,
           range + counted(facts.too_hot_count, "is", "are") + " above 3000: if " + value +
               " stands for no data, --no-data " + value);
     } else if (facts.too_cold_count > 0) {
-      const std::string value = short_number(static_cast<double>(facts.lowest));
+      const std::string value = value_text(static_cast<double>(facts.lowest), PlyScalar::Float32);
       add(kId, facts.too_cold_count,
           range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
               " stands for no data, --no-data " + value);

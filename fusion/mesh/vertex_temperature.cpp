@@ -56,7 +56,9 @@ TemperatureConversion::TemperatureConversion(const ReadOptions& options)
 bool TemperatureConversion::is_no_data(double value) const {
   return std::any_of(no_data_.begin(), no_data_.end(), [value](double named) {
     if (value == named) return true;
-    return std::abs(value) <= kFloatMax && std::abs(named) <= kFloatMax &&
+    // The shortest text of the largest float lies beyond it, but is rounded to it.
+    constexpr double kRoundedToLargest = 0x1.FFFFFFp127;
+    return std::abs(value) < kRoundedToLargest && std::abs(named) < kRoundedToLargest &&
            static_cast<float>(value) == static_cast<float>(named);
   });
 }

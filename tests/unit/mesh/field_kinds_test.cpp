@@ -393,6 +393,33 @@ TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
             std::string::npos);
 }
 
+/// What a note names is taken back to the letter.
+TEST(FieldKinds, TheNoDataValueOfANoteWorks) {
+  for (const char* type : {"float", "double"}) {
+    for (const char* value : {"3.4028234663852886e+38", "-3.4028234663852886e+38", "3.4028235e38", "12345.678",
+                              "99999.99", "3000.7654", "-273.1499", "1e20", "16777217"}) {
+      std::vector<std::string> lines = lines_of(15, 1, 40);
+      lines[3] = std::string("3 0 0 ") + value;
+      lines[7] = std::string("7 0 0 ") + value;
+      const std::string file = text_file("property " + std::string(type) + " temperature\n", lines);
+      const std::string text = note_text(loaded(file), "implausible_temperatures");
+      const std::string option = "--no-data ";
+      const std::size_t at = text.find(option);
+      // Text is read as double, and what is below every float is no temperature anyway.
+      if (at == std::string::npos) {
+        EXPECT_GE(
+            note_count(loaded(file), "impossible_temperatures") + note_count(loaded(file), "over_range_temperatures"),
+            2U)
+            << type << " " << value;
+        continue;
+      }
+      ReadOptions options;
+      options.no_data = {std::stod(text.substr(at + option.size()))};
+      EXPECT_EQ(note_count(loaded(file, options), "no_data_temperatures"), 2U) << type << " " << value << ": " << text;
+    }
+  }
+}
+
 TEST(FieldKinds, ASensorsLargestCountDoesNotHideTheUnit) {
   const auto said = [](double first, double step, std::size_t full_count) {
     std::vector<std::string> lines = lines_of(first, step, 40);
