@@ -225,43 +225,55 @@ class Notes {
     return nullptr;
   }
 
-  /// No temperature was found: what could be one.
+  /// No temperature was found: why, and what could be one.
   void about_candidates() {
     std::vector<std::string> names;
-    for (std::size_t i = 0; i < vertices_.properties.size(); ++i) {
-      const PlyProperty& property = vertices_.properties[i];
-      if (property.is_list || is_used(schema_.vertex, i)) continue;
-      if (temperature_name(property.name).is_candidate) names.push_back(property.name);
-    }
-    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
-      for (std::size_t i = 0; i < faces->properties.size(); ++i) {
-        const PlyProperty& property = faces->properties[i];
-        if (property.is_list || is_used(schema_.face, i)) continue;
-        if (temperature_name(property.name).is_candidate) names.push_back(property.name);
-      }
-    }
     std::string text;
-    if (schema_.is_temperature_doubtful) {
-      text = "'t' is not taken for a temperature, because of its values (" + number_text(survey_.least_doubtful) +
-             " to " + number_text(survey_.most_doubtful) + ")";
-    } else if (!names.empty()) {
-      text = "No property is called a temperature";
-    } else {
-      names = plain_t();
-      if (names.empty()) return;
-      text = "'" + printable(names[0]) + "' is not taken for a temperature, because of what stands beside it";
+    const auto look = [&](const PlyElement& element, const PlySlots& slots) {
+      for (std::size_t i = 0; i < element.properties.size(); ++i) {
+        const PlyProperty& property = element.properties[i];
+        const TemperatureName name = temperature_name(property.name);
+        if (is_used(slots, i)) continue;
+        if (!property.is_list && name.is_candidate) names.push_back(property.name);
+        if (property.is_list && name.rank > 0) {
+          text = "'" + printable(property.name) + "' is a list, and not taken for a temperature, which is one number";
+        }
+      }
+    };
+    look(vertices_, schema_.vertex);
+    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
+      look(*faces, schema_.face);
     }
-    if (names.empty()) names.emplace_back("t");
-    add("no_temperature", names.size(), text + "; --temperature-property NAME takes one of: " + joined(names));
+    if (text.empty() && (schema_.is_temperature_doubtful || names.empty())) text = about_bare_t(names);
+    if (text.empty() && names.empty()) return;
+    if (text.empty()) text = "No property is called a temperature";
+    if (!names.empty()) text += "; --temperature-property NAME takes one of: " + joined(names);
+    add("no_temperature", std::max<std::size_t>(1, names.size()), text);
   }
 
-  /// A bare t that was not even looked at.
-  std::vector<std::string> plain_t() const {
-    std::vector<std::string> names;
-    for (const PlyProperty& property : vertices_.properties) {
-      if (!property.is_list && temperature_name(property.name).is_bare_t) names.push_back(property.name);
+  /// Why a bare t is no temperature; adds it to the names where it may be one nevertheless.
+  std::string about_bare_t(std::vector<std::string>& names) const {
+    const auto is_bare_t = [](const PlyProperty& one) { return !one.is_list && temperature_name(one.name).is_bare_t; };
+    const auto speaks_against = [](const PlyProperty& one) { return temperature_name(one.name).speaks_against_t; };
+    const auto& properties = vertices_.properties;
+    const auto t = std::find_if(properties.begin(), properties.end(), is_bare_t);
+    if (t == properties.end()) return {};
+    const auto other = std::find_if(properties.begin(), properties.end(), speaks_against);
+    std::string reason;
+    bool may_be_one = names.empty();
+    if (schema_.is_temperature_doubtful) {
+      // No sensor of temperatures counts further.
+      constexpr double kMostCounts = 65'535;
+      may_be_one = may_be_one && survey_.most_doubtful <= kMostCounts;
+      reason = "its values (" + number_text(survey_.least_doubtful) + " to " + number_text(survey_.most_doubtful) + ")";
+    } else if (other != properties.end()) {
+      reason = "'" + printable(other->name) + "' beside it";
+    } else {
+      may_be_one = may_be_one && size_bytes(t->type) < 4;
+      reason = "its type, " + std::string(to_string(t->type)) + ": whole numbers of that name count time";
     }
-    return names;
+    if (may_be_one) names.push_back(t->name);
+    return "'" + printable(t->name) + "' is not taken for a temperature, because of " + reason;
   }
 
   void about_temperatures() {

@@ -37,11 +37,12 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
   }
   BOOST_OUTCOME_TRY(LoadedScene thermal, read_ply(thermal_path, thermal_options));
   if (!thermal.mesh.has_temperature) {
-    return failure(
-        ErrorCode::Unsupported,
-        thermal.mesh.name +
-            ": the thermal file has no property that says temperature; --temperature-property NAME takes another",
-        thermal.mesh.name);
+    const auto note = std::find_if(thermal.notes.begin(), thermal.notes.end(),
+                                   [](const Note& one) { return one.id == "no_temperature"; });
+    return failure(ErrorCode::Unsupported,
+                   thermal.mesh.name + ": the thermal file has no temperature: " +
+                       (note == thermal.notes.end() ? "none of its properties can be one" : note->message),
+                   thermal.mesh.name);
   }
   BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, scene_options));
   Result<void> overlap = check_overlap(scene, thermal);

@@ -133,8 +133,9 @@ TemperatureName temperature_name(std::string_view name) {
   }
   result.rank = is_plain && rank > 0 ? rank - (words.size() > 1 ? kFurtherWordsCost : 0) : 0;
   result.is_bare_t = is_plain && rank == 0 && has_t;
+  // A word that says temperature makes up for any that says something else.
   result.is_candidate =
-      std::none_of(words.begin(), words.end(), [](const std::string& word) { return has(kOthers, word); });
+      rank > 0 || std::none_of(words.begin(), words.end(), [](const std::string& word) { return has(kOthers, word); });
   if (result.rank == 0 && !result.is_bare_t) result.unit.reset();
   return result;
 }

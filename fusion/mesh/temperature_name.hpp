@@ -16,7 +16,7 @@ struct TemperatureName {
   bool is_bare_t = false;
   /// The unit that the name says.
   std::optional<TemperatureUnit> unit;
-  /// Whatever it is called, it might hold a temperature: it is no normal, colour, time or the like.
+  /// Whatever it is called, it might hold a temperature: some word says so, or it is no normal, colour, time or the like.
   bool is_candidate = false;
   /// Beside such a property a bare t is no temperature: a time, a ring, a texture coordinate.
   bool speaks_against_t = false;

@@ -359,6 +359,33 @@ TEST(FieldKinds, ABareTMustLookLikeATemperature) {
   EXPECT_EQ(both.mesh.temperature_celsius()[0], 21.0F);
 }
 
+TEST(FieldKinds, WhatIsNotTakenForATemperatureIsSaidWithTheTrueReason) {
+  const auto said = [](const std::string& property, const std::string& value) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 40; ++i) lines.push_back(std::to_string(i) + " 0 0 " + value);
+    const LoadedScene scene = loaded(text_file(property, lines));
+    EXPECT_FALSE(scene.mesh.has_temperature) << property;
+    return note_text(scene, "no_temperature");
+  };
+  for (const char* name : {"s_temperature", "time_temp", "temp_id", "thermal_red", "label_temperature", "quality"}) {
+    EXPECT_EQ(said("property float " + std::string(name) + "\n", "20"),
+              "No property is called a temperature; --temperature-property NAME takes one of: " + std::string(name));
+  }
+  EXPECT_EQ(said("property list uchar float temperature\n", "1 20"),
+            "'temperature' is a list, and not taken for a temperature, which is one number");
+  EXPECT_EQ(said("property uint t\n", "20"),
+            "'t' is not taken for a temperature, because of its type, uint: whole numbers of that name count time");
+  EXPECT_NE(said("property ushort t\n", "20")
+                .find("because of its type, ushort: whole numbers of that name count time; "
+                      "--temperature-property NAME takes one of: t"),
+            std::string::npos);
+  EXPECT_EQ(said("property double t\n", "1700000000"),
+            "'t' is not taken for a temperature, because of its values (1.7e+09 to 1.7e+09)");
+  EXPECT_NE(said("property float t\nproperty float GPS_time\n", "20 7").find("because of 'GPS_time' beside it"),
+            std::string::npos);
+  EXPECT_EQ(said("property float time\n", "20"), "");
+}
+
 TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
   struct Case {
     std::string property;

@@ -99,7 +99,14 @@ TEST(ThermalJoin, RefusesWhatCannotBeJoined) {
   const auto no_temperature = joined(good, good);
   ASSERT_FALSE(no_temperature);
   EXPECT_EQ(no_temperature.error().code, ErrorCode::Unsupported);
-  EXPECT_NE(no_temperature.error().message.find("t.ply"), std::string::npos);
+  EXPECT_EQ(no_temperature.error().message,
+            "t.ply: the thermal file has no temperature: none of its properties can be one");
+  const auto other_name = joined(good, "ply\nformat ascii 1.0\nelement vertex 1\n" + std::string(test::kXyz) +
+                                           "property float quality\nend_header\n0 0 0 1\n");
+  ASSERT_FALSE(other_name);
+  EXPECT_EQ(other_name.error().message,
+            "t.ply: the thermal file has no temperature: No property is called a temperature; --temperature-property "
+            "NAME takes one of: quality");
   for (const double distance :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const auto bad = joined(good, thermal_file("0 0 0 1\n", 1), distance);
