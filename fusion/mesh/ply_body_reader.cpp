@@ -224,6 +224,7 @@ void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
     conversion.convert(raw.temperatures.subspan(i, 1), std::span(temperatures_).subspan(i, 1),
                        is_left_out ? ignored : facts_.temperature);
   }
+  facts_.temperature.no_data_seen |= ignored.no_data_seen;
 }
 
 }  // namespace spectra::fusion

@@ -76,6 +76,7 @@ class Notes {
     about_colours();
     about_temperature_property();
     about_temperatures();
+    about_options();
     about_what_is_skipped();
     about_faces();
     add("trailing_bytes", facts_.trailing_byte_count,
@@ -337,6 +338,30 @@ class Notes {
       add(kId, facts.too_cold_count,
           range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
               " stands for no data, --no-data " + value);
+    }
+  }
+
+  /// What was said of the file and has changed nothing.
+  void about_options() {
+    if (temperature_property() == nullptr) {
+      std::vector<std::string> names;
+      if (options_.temperature_unit) names.emplace_back("--temperature-unit");
+      if (options_.temperature_scale) names.emplace_back("--temperature-scale");
+      if (options_.temperature_offset) names.emplace_back("--temperature-offset");
+      if (!options_.no_data.empty()) names.emplace_back("--no-data");
+      if (!names.empty()) {
+        add("unused_options", names.size(), "There is no temperature, so these have no effect: " + joined(names));
+      }
+      return;
+    }
+    std::vector<std::string> values;
+    for (std::size_t i = 0; i < std::min<std::size_t>(options_.no_data.size(), 64); ++i) {
+      const bool is_seen = (facts_.temperature.no_data_seen >> i & 1U) != 0;
+      if (!is_seen) values.push_back(number_text(options_.no_data[i]));
+    }
+    if (!values.empty()) {
+      add("unused_options", values.size(),
+          "No temperature of the file, in its own unit, has this --no-data value: " + joined(values));
     }
   }
 

@@ -15,7 +15,8 @@ namespace spectra::fusion {
 namespace {
 
 bool is_about_temperature(const Note& note) {
-  return note.id.ends_with("_temperatures") || note.id == "no_temperature" || note.id == "temperature_property";
+  return note.id.ends_with("_temperatures") || note.id == "no_temperature" || note.id == "temperature_property" ||
+         note.id == "unused_options";
 }
 
 /// A scene and the thermal file that shall lie on it.

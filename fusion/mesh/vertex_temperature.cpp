@@ -53,20 +53,22 @@ TemperatureConversion::TemperatureConversion(const ReadOptions& options)
     : scale_(options.celsius_scale().value_or(CelsiusScale{})), no_data_(options.no_data) {}
 
 /// A value that a program has rounded to float is still the value that was named.
-bool TemperatureConversion::is_no_data(double value) const {
-  return std::any_of(no_data_.begin(), no_data_.end(), [value](double named) {
+std::uint64_t TemperatureConversion::no_data_bit(double value) const {
+  const auto found = std::find_if(no_data_.begin(), no_data_.end(), [value](double named) {
     if (value == named) return true;
     // The shortest text of the largest float lies beyond it, but is rounded to it.
     constexpr double kRoundedToLargest = 0x1.FFFFFFp127;
     return std::abs(value) < kRoundedToLargest && std::abs(named) < kRoundedToLargest &&
            static_cast<float>(value) == static_cast<float>(named);
   });
+  return found == no_data_.end() ? 0 : std::uint64_t{1} << std::min<std::ptrdiff_t>(found - no_data_.begin(), 63);
 }
 
 float TemperatureConversion::converted(double value, TemperatureFacts& facts) const {
   if (std::isnan(value)) return kNone;
-  if (is_no_data(value)) {
+  if (const std::uint64_t bit = no_data_bit(value); bit != 0) {
     ++facts.no_data_count;
+    facts.no_data_seen |= bit;
     return kNone;
   }
   const double scaled = scale_.factor * value + scale_.offset;

@@ -15,6 +15,7 @@ struct TemperatureFacts {
   std::uint64_t missing_count = 0;      ///< Without a temperature, for whatever reason (also the next two).
   std::uint64_t impossible_count = 0;   ///< At or below absolute zero.
   std::uint64_t no_data_count = 0;      ///< One of the values that the options name.
+  std::uint64_t no_data_seen = 0;       ///< Which of them were found: bit i of value i, of the first 64.
   std::uint64_t over_range_count = 0;   ///< +inf, or beyond the largest float.
   std::uint64_t under_range_count = 0;  ///< -inf.
 
@@ -42,7 +43,8 @@ class TemperatureConversion {
 
  private:
   float converted(double value, TemperatureFacts& facts) const;
-  bool is_no_data(double value) const;
+  /// The bit of no_data_seen; 0 when the value is data.
+  std::uint64_t no_data_bit(double value) const;
 
   CelsiusScale scale_;
   std::vector<double> no_data_;

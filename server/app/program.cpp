@@ -40,6 +40,11 @@ void add_reading(CLI::App& command, fusion::ReadOptions& options) {
       throw CLI::ValidationError("--up " + name, "x, y, z, -x, -y, -z or auto is wanted");
   };
   command.add_option_function<std::string>("--up", set_up, "Which way is up: x, y, z, -x, -y, -z or auto");
+  const CLI::Validator is_something([](const std::string& text) { return text.empty() ? "it is empty" : ""; }, "");
+  for (const char* name :
+       {"--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
+    command.get_option(name)->check(is_something);
+  }
 }
 
 void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {

@@ -35,6 +35,9 @@ test("wrong usage is 2 and names what is wrong", () => {
   fails(2, /range/, "fuse", demo, inFolder("o.ply"), "--method", "thermal_only", "--range", "30:20");
   fails(2, /xyz|format|ply/i, "fuse", demo, inFolder("o.xyz"), "--method", "thermal_only");
   fails(2, /listen|address|port/i, "serve", "--listen", "127.0.0.1:99999");
+  for (const option of ["--scale", "--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data"]) {
+    fails(2, new RegExp(`${option}: it is empty`), "info", demo, option, "");
+  }
 });
 
 test("a failed job is 1 and names the file", () => {

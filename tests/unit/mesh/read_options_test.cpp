@@ -79,6 +79,31 @@ TEST(ReadOptions, NameValuesThatAreNone) {
   EXPECT_FLOAT_EQ(scene.mesh.temperature_celsius()[3], 26.85F);
 }
 
+std::string unused_text(const LoadedScene& scene) {
+  for (const Note& note : scene.notes) {
+    if (note.id == "unused_options") return note.message;
+  }
+  return {};
+}
+
+TEST(ReadOptions, WithoutEffectAreSaid) {
+  ReadOptions options;
+  options.no_data = {-9999, 65535, 12345.5};
+  const std::string file = cloud("float temperature", {"20", "65535", "21"});
+  EXPECT_EQ(unused_text(loaded(file, options)),
+            "No temperature of the file, in its own unit, has this --no-data value: -9999, 12345.5");
+  EXPECT_EQ(unused_text(loaded(cloud("float temperature", {"-9999", "65535", "12345.5"}), options)), "");
+  EXPECT_EQ(unused_text(loaded(file)), "");
+  options.temperature_offset = 1;
+  EXPECT_EQ(unused_text(loaded(cloud("uchar red", {"20"}), options)),
+            "There is no temperature, so these have no effect: --temperature-offset, --no-data");
+  EXPECT_EQ(unused_text(loaded(cloud("uchar red", {"20"}), unit_option("kelvin"))),
+            "There is no temperature, so these have no effect: --temperature-unit");
+  options = {};
+  options.metres_per_unit = 0.001;
+  EXPECT_EQ(unused_text(loaded(cloud("uchar red", {"20"}), options)), "");
+}
+
 TEST(ReadOptions, NameThePropertyOfTheTemperature) {
   ReadOptions options;
   options.temperature_property = "Quality";
