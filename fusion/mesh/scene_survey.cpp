@@ -5,7 +5,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "fusion/mesh/comment_words.hpp"
 #include "fusion/mesh/distance_text.hpp"
 #include "fusion/mesh/stray_points.hpp"
 #include "fusion/mesh/up_search.hpp"
@@ -66,6 +68,56 @@ bool speaks_of_metres(const LoadedScene& scene) {
   });
 }
 
+struct LengthUnit {
+  std::string_view name;
+  std::string_view metres;  ///< In one of it.
+  std::array<std::string_view, 6> words;
+};
+
+constexpr std::array<LengthUnit, 5> kLengthUnits = {
+    {{"millimetres", "0.001", {"mm", "millimetre", "millimetres", "millimeter", "millimeters", "millimetric"}},
+     {"centimetres", "0.01", {"cm", "centimetre", "centimetres", "centimeter", "centimeters", "centimetric"}},
+     {"inches", "0.0254", {"inch", "inches", "in"}},
+     {"feet", "0.3048", {"foot", "feet", "ft"}},
+     {"micrometres", "0.000001", {"um", "micrometre", "micrometres", "micrometer", "micrometers", "microns"}}}};
+
+/// The unit of length that a comment gives the positions. A bare "2 mm" may be the accuracy of a scanner.
+const LengthUnit* unit_told(const std::vector<std::string>& comments) {
+  const auto is_about_all = [](const std::string& word) {
+    constexpr std::array<std::string_view, 12> kWords = {"unit",     "units",      "values", "coordinates",
+                                                         "coords",   "positions",  "points", "lengths",
+                                                         "vertices", "dimensions", "xyz",    "distances"};
+    return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
+  };
+  const auto is_number = [](const std::string& word) { return word.find_first_of("0123456789") != std::string::npos; };
+  for (const std::string& comment : comments) {
+    const std::vector<std::string> words = comment_words(comment);
+    const auto about = std::find_if(words.begin(), words.end(), is_about_all);
+    for (auto word = about; word != words.end(); ++word) {
+      // "in" is an inch only where it is all that is said of the unit.
+      const bool is_whole = word != about && (*(word - 1) == "=" || (word - 1)->starts_with("unit")) &&
+                            (word + 1 == words.end() || *(word + 1) == ",");
+      if (*word == "in" && !is_whole) continue;
+      if (word != words.begin() && is_number(*(word - 1))) continue;
+      for (const LengthUnit& unit : kLengthUnits) {
+        if (std::find(unit.words.begin(), unit.words.end(), *word) != unit.words.end()) return &unit;
+      }
+    }
+  }
+  return nullptr;
+}
+
+/// True when there was something to say.
+bool judge_unit(LoadedScene& scene) {
+  const LengthUnit* const unit = scene.mesh.is_metric ? nullptr : unit_told(scene.comments);
+  if (unit == nullptr) return false;
+  scene.notes.push_back({"unit_told", 1,
+                         "The file's comments speak of " + std::string(unit->name) + ": --scale " +
+                             std::string(unit->metres) + " makes metres of them",
+                         true});
+  return true;
+}
+
 /// Rooms and machines measured in millimetres look like mountains. Maps are flatter, or lie at map coordinates (then
 /// there is an origin), or say what they count in.
 void judge_size(LoadedScene& scene) {
@@ -88,7 +140,7 @@ void survey(LoadedScene& scene, const ReadOptions& options) {
   find_strays(scene);
   find_up(scene, options.up);
   scene.mesh.is_metric = scene.mesh.is_metric || options.metres_per_unit || speaks_of_metres(scene);
-  judge_size(scene);
+  if (!judge_unit(scene)) judge_size(scene);
 }
 
 }  // namespace spectra::fusion

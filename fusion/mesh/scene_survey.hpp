@@ -11,6 +11,7 @@ namespace spectra::fusion {
 /// know of it is added to the notes:
 /// - "stray_points": vertices far from everything else;
 /// - "up_found": up is not z, and nobody said so;
+/// - "unit_told": the comments name another unit than metres, and nobody gave a scale;
 /// - "may_be_millimetres": the size is one of a room, but in millimetres.
 void survey(LoadedScene& scene, const ReadOptions& options = {});
 

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fusion/mesh/comment_words.hpp"
+
 namespace spectra::fusion {
 
 namespace {
@@ -22,40 +24,6 @@ constexpr double kFacing = 1.5;
 
 UpAxis opposite(UpAxis up) {
   return static_cast<UpAxis>((static_cast<int>(up) + 3) % 6);
-}
-
-bool is_letter(char c) {
-  return c >= 'a' && c <= 'z';
-}
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-/// The words and numbers of a line in lower case. ':' and '=' become "="; a comma or semicolon between words becomes "," and parts
-/// them; brackets vanish. A sign belongs to what follows it, except behind a letter, where '-' and '_' only part words.
-std::vector<std::string> words_of(std::string_view line) {
-  std::vector<std::string> words;
-  std::string word;
-  const auto finish = [&] {
-    if (!word.empty() && word != "-") words.push_back(word);
-    word.clear();
-  };
-  char before = ' ';
-  for (const char raw : line) {
-    const char c = raw >= 'A' && raw <= 'Z' ? static_cast<char>(raw - 'A' + 'a') : raw;
-    const bool is_part = is_letter(c) || is_digit(c) || c == '.';
-    if (is_part) {
-      word += c;
-    } else {
-      finish();
-      if (c == ':' || c == '=') words.emplace_back("=");
-      if (c == ',' || c == ';') words.emplace_back(",");
-      if (c == '-' && !is_letter(before) && !is_digit(before)) word = "-";
-    }
-    before = c;
-  }
-  finish();
-  return words;
 }
 
 bool is_one_of(std::string_view word, std::initializer_list<std::string_view> words) {
@@ -91,10 +59,7 @@ std::optional<UpAxis> axis_of_vector(const std::vector<std::string>& words, std:
 /// All that one line says about up.
 std::vector<UpAxis> told_by(const std::string& line) {
   std::vector<UpAxis> told;
-  std::vector<std::string> words = words_of(line);
-  if (!words.empty() && is_one_of(words[0], {"comment", "obj"})) {
-    words.erase(words.begin(), words.begin() + (words[0] == "obj" && words.size() > 1 && words[1] == "info" ? 2 : 1));
-  }
+  const std::vector<std::string> words = comment_words(line);
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (word == "enu") told.push_back(UpAxis::Z);
@@ -102,6 +67,8 @@ std::vector<UpAxis> told_by(const std::string& line) {
     if (word.size() == 3 && word.ends_with("up")) {
       if (const auto axis = up_axis(word.substr(0, 1))) told.push_back(*axis);
     }
+    const bool is_denied = i > 0 && words[i - 1] == "not";
+    if (is_denied) continue;
     std::size_t next = i + 1;
     if (const auto axis = up_axis(word)) {
       const auto is_filler = [](const std::string& w) {
@@ -117,19 +84,19 @@ std::vector<UpAxis> told_by(const std::string& line) {
     }
     const bool is_vertical =
         is_one_of(word, {"vertical", "height", "elevation"}) && next < words.size() && words[next] == "axis";
-    if (!is_vertical && !is_one_of(word, {"up", "upaxis", "upvector"})) continue;
+    const bool is_down = word == "gravity";
+    if (!is_vertical && !is_down && !is_one_of(word, {"up", "upaxis", "upvector"})) continue;
     const auto is_filler = [](const std::string& w) {
       return is_one_of(w, {"axis", "vector", "direction", "dir", "is", "along", "="});
     };
     while (next < words.size() && is_filler(words[next])) ++next;
     // "up x" within a sentence may mean anything.
-    const bool is_meant = i == 0 || word != "up" || next > i + 1;
+    const bool is_phrase = i > 0 && words[i - 1] == "," && (next + 1 >= words.size() || words[next + 1] == ",");
+    const bool is_meant = i == 0 || is_phrase || word != "up" || next > i + 1;
     if (!is_meant || next == words.size()) continue;
-    if (const auto axis = up_axis(words[next])) {
-      told.push_back(*axis);
-    } else if (const auto pointed_at = axis_of_vector(words, next)) {
-      told.push_back(*pointed_at);
-    }
+    auto axis = up_axis(words[next]);
+    if (!axis) axis = axis_of_vector(words, next);
+    if (axis) told.push_back(is_down ? opposite(*axis) : *axis);
   }
   return told;
 }

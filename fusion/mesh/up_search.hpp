@@ -11,7 +11,7 @@
 namespace spectra::fusion {
 
 /// Which way is up as the lines "comment ..." and "obj_info ..." of a file tell it, in the ways that programs and people write it: "up y",
-/// "Y-up", "Z_UP", "up axis: z", "up = -y", "up vector (0, 1, 0)", "y = elevation", "x right, y down", "ENU". Nothing when none
+/// "Y-up", "Z_UP", "up axis: z", "up = -y", "up vector (0, 1, 0)", "y = elevation", "x right, y down", "gravity 0 -9.81 0", "ENU". Nothing when none
 /// does, or when they do not agree.
 std::optional<UpAxis> up_told(std::span<const std::string> comments);
 

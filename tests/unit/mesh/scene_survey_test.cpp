@@ -34,16 +34,33 @@ TEST(UpAxis, HasSixNames) {
 }
 
 TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
-  for (const char* line :
-       {"comment up y", "comment up: y", "comment Y-up", "comment y up", "comment Z is not here, Y_UP",
-        "obj_info up axis: y", "obj_info up_axis = +Y", "comment upAxis y", "comment UpAxis=Y",
-        "comment vertical axis: y", "comment the y axis points up", "comment up vector (0, 1, 0)", "comment up = 0 1 0",
-        "comment up direction 0.0 1.0 0.0", "comment xyz metres, y = elevation above minimum", "comment y: height",
-        "comment yup", "comment scene up: y"}) {
+  for (const char* line : {"comment up y",
+                           "comment up: y",
+                           "comment Y-up",
+                           "comment y up",
+                           "comment Z is not here, Y_UP",
+                           "obj_info up axis: y",
+                           "obj_info up_axis = +Y",
+                           "comment upAxis y",
+                           "comment UpAxis=Y",
+                           "comment vertical axis: y",
+                           "comment the y axis points up",
+                           "comment up vector (0, 1, 0)",
+                           "comment up = 0 1 0",
+                           "comment up direction 0.0 1.0 0.0",
+                           "comment xyz metres, y = elevation above minimum",
+                           "comment y: height",
+                           "comment yup",
+                           "comment scene up: y",
+                           "comment gravity 0 -9.81 0",
+                           "obj_info gravity vector = [0, -1, 0]",
+                           "comment gravity: -y",
+                           "comment exported with forward -Z, up Y",
+                           "comment not z up, y up"}) {
     EXPECT_EQ(told({line}), "y") << line;
   }
   for (const char* line : {"comment x right, y down, z forward", "comment up -y", "comment up axis = -Y",
-                           "comment up vector: [0, -1, 0]", "comment -y up"}) {
+                           "comment up vector: [0, -1, 0]", "comment -y up", "comment gravity: 0 9.81 0"}) {
     EXPECT_EQ(told({line}), "-y") << line;
   }
   EXPECT_EQ(told({"comment frame ENU"}), "z");
@@ -56,7 +73,8 @@ TEST(UpSearch, ReadsNothingIntoOtherWords) {
        {"comment scaled up x 2", "comment cleaned up z noise", "comment max-z grid 3.0 m", "comment menu backup",
         "comment xyz metres; single frame back-projected", "comment x, y, z, up to date", "comment y 12 up",
         "comment up vector (1, 1, 0)", "comment up vector (0, 1", "comment up", "comment", "", "obj_info",
-        "comment height y", "comment up vector (0, nan, 0)"}) {
+        "comment height y", "comment up vector (0, nan, 0)", "comment not y up", "comment cleaned, up z noise",
+        "comment not up y", "comment gravity 1 1 1"}) {
     EXPECT_EQ(told({line}), "nothing") << line;
   }
   EXPECT_EQ(told({"comment y up", "comment z up"}), "nothing") << "they do not agree";
@@ -162,6 +180,38 @@ TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
   EXPECT_TRUE(is_metric({"obj_info unit: meter"}));
   EXPECT_TRUE(is_metric({}, 0.001));
   EXPECT_TRUE(is_metric({}, 1)) << "said, although it changes nothing";
+}
+
+TEST(SceneSurvey, NamesTheScaleOfTheUnitThatCommentsTell) {
+  const auto said = [](const std::string& comment, std::optional<double> metres_per_unit = {}) {
+    LoadedScene scene = sheet(3000, 400, 2);
+    scene.comments = {comment};
+    ReadOptions options;
+    options.metres_per_unit = metres_per_unit;
+    survey(scene, options);
+    EXPECT_EQ(note_count(scene, "unit_told") + note_count(scene, "may_be_millimetres"), scene.mesh.is_metric ? 0U : 1U)
+        << comment;
+    for (const Note& note : scene.notes) {
+      if (note.id == "unit_told") return note.message.substr(note.message.find("--scale"));
+    }
+    return std::string();
+  };
+  for (const char* line : {"comment units: mm", "comment all values in millimetres", "obj_info unit=MM",
+                           "comment coordinates (mm)", "comment XYZ in millimeters"}) {
+    EXPECT_EQ(said(line), "--scale 0.001 makes metres of them") << line;
+  }
+  EXPECT_EQ(said("obj_info units centimeters"), "--scale 0.01 makes metres of them");
+  EXPECT_EQ(said("comment Units: inch"), "--scale 0.0254 makes metres of them");
+  EXPECT_EQ(said("comment units in"), "--scale 0.0254 makes metres of them");
+  EXPECT_EQ(said("comment unit feet"), "--scale 0.3048 makes metres of them");
+  EXPECT_EQ(said("comment lengths in ft"), "--scale 0.3048 makes metres of them");
+  EXPECT_EQ(said("comment units: um"), "--scale 0.000001 makes metres of them");
+  for (const char* line :
+       {"comment accuracy 2 mm", "comment points every 5 mm", "comment values in order", "comment mm",
+        "comment unit: metre", "comment units in use", "comment scale 0.001 (mm to m)", "comment a foot"}) {
+    EXPECT_EQ(said(line), "") << line;
+  }
+  EXPECT_EQ(said("comment units: mm", 0.001), "");
 }
 
 TEST(SceneSurvey, BearsScenesOfNothing) {
