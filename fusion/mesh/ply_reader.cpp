@@ -208,7 +208,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
     // Its faces and colours are not asked for, and the gaps are counted again after the join.
     const bool is_asked_for = is_about_temperature(note) && note.id != "missing_temperatures";
     if (note.id != "skipped_vertex_properties" && note.id != "trailing_bytes" && note.id != "left_out_vertices" &&
-        !is_asked_for) {
+        note.id != "hole_vertices" && !is_asked_for) {
       continue;
     }
     scene.notes.push_back({"thermal_" + note.id, note.count, thermal.mesh.name + ": " + note.message});

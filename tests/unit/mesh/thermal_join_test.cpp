@@ -204,6 +204,23 @@ TEST(ThermalJoin, ReachesTheHillsThatACoarserSurfaceCutsOff) {
   }
 }
 
+/// Holes of either file that are written as a number lend and take nothing.
+TEST(ThermalJoin, PassesOverHolesWrittenAsANumber) {
+  std::string visible;
+  std::string thermal;
+  for (int i = 0; i < 100; ++i) {
+    const std::string place = i % 3 == 0 ? "0 0 0" : std::to_string(i % 10) + " " + std::to_string(i / 10) + " 50";
+    visible += place + "\n";
+    thermal += place + (i % 3 == 0 ? " 0\n" : " 2" + std::to_string(i % 10) + "\n");
+  }
+  const auto scene = joined(visible_file(visible, 100), thermal_file(thermal, 100));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene.value().mesh.vertex_count(), 66U);
+  EXPECT_EQ(note_count(scene.value(), "hole_vertices"), 34U);
+  EXPECT_EQ(note_count(scene.value(), "thermal_hole_vertices"), 34U);
+  EXPECT_EQ(scene.value().mesh.temperature_celsius()[1], 22);
+}
+
 TEST(ThermalJoin, DoesNotReachBeyondTheBorderOfTheThermalSurface) {
   const auto scene = joined(square_file(61, 3, 1, {}, false, true), square_file(41, 2, 1, {}, true, true));
   ASSERT_TRUE(scene) << scene.error().message;
