@@ -10,7 +10,7 @@ namespace spectra::fusion {
 
 namespace {
 
-constexpr std::uint64_t kMostEntries = 8192;
+constexpr std::uint64_t kMostEntries = 16'384;
 constexpr std::size_t kFewestInAHole = 12;
 constexpr std::size_t kFewestElsewhere = 12;
 /// Where many places have several vertices each, none of them is a hole.
@@ -48,6 +48,7 @@ double Bulk::extent() const {
 
 PositionSample::PositionSample(std::uint64_t vertex_count)
     : bucket_size_(std::max<std::uint64_t>(1, (vertex_count + kMostEntries - 1) / kMostEntries)) {
+  entries_.reserve(static_cast<std::size_t>(std::min(vertex_count, kMostEntries)));
   choose_next();
 }
 

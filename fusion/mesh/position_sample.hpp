@@ -23,7 +23,7 @@ struct HolePlace {
   bool is_far = false;                  ///< Farther from the bulk than that is large.
 };
 
-/// Up to 8192 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a
+/// Up to 16,384 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a
 /// grid alone). Tells what a few strays cannot disturb.
 class PositionSample {
  public:

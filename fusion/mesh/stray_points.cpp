@@ -245,7 +245,7 @@ class Search {
       const double size = piece.box.diagonal();
       const double core_size = std::max(heaviest->box.diagonal(), cell_m);
       const bool is_few =
-          piece.vertex_count < kPartVertices || (piece.vertex_count < tiny_share && size < core_size / 20);
+          piece.vertex_count < kPartVertices || size == 0 || (piece.vertex_count < tiny_share && size < core_size / 20);
       const bool is_large_surface = piece.has_surface && size >= core_size / 4;
       if (is_few && !is_large_surface && piece.vertex_count <= count_limit_) {
         is_far[p] = true;

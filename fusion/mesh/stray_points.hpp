@@ -17,7 +17,8 @@ struct StrayPoints {
 
 /// Finds the few vertices that would make a scene look empty: single points, triangles and tiny pieces that are farther from
 /// the rest than the rest is large. No stray is
-/// - a piece of 50 vertices or more, unless it is both less than 1/2000 of the vertices and of a twentieth of the size;
+/// - a piece of 50 vertices or more, unless it is both less than 1/2000 of the vertices and of a twentieth of the size, or all in
+///   exactly one place;
 /// - a piece of surface of a quarter of the size of the rest, or one that reaches round it;
 /// - anything when there would be more of them than a tenth of the vertices, or than 50 and a thousandth.
 /// A vertex whose triangles all stand on the rest with their other two corners is one (a spike); any other

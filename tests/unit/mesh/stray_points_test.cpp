@@ -69,6 +69,16 @@ void expect_core_of_square(const Shape& shape, std::uint64_t stray_count, const 
   EXPECT_LT(strays.core.max.z, 0.3F) << what;
 }
 
+/// As many as make a part elsewhere, but it has no size.
+TEST(StrayPoints, AreAllThatIsInOnePlace) {
+  for (const float spread : {0.0F, 0.01F}) {
+    Shape shape;
+    shape.add_patch({0, 0, 0}, 3, 100, true);
+    for (int i = 0; i < 55; ++i) shape.positions.push_back({-9999, -9999 + spread * static_cast<float>(i), -9999});
+    EXPECT_EQ(shape.strays().count, spread == 0 ? 55U : 0U);
+  }
+}
+
 TEST(StrayPoints, AreFoundWhereverTheyAre) {
   for (const bool has_triangles : {true, false}) {
     Shape shape = square(has_triangles);
