@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -166,26 +167,44 @@ void ViewerSession::binary_received() {
       std::nullopt, {RpcErrorCode::InvalidRequest, "binary messages are not accepted from a viewer", "", "JSON text"}));
 }
 
+template <auto function>
+void ViewerSession::answered(const Id& id, const json& params) {
+  answer(id, (this->*function)(params));
+}
+
+std::span<const ViewerSession::Request> ViewerSession::requests() {
+  using Self = ViewerSession;
+  static constexpr Request kRequests[] = {
+      {"stream.ack", Cost::Free, &Self::answered<&Self::acknowledge>},
+      {"camera.set", Cost::Free, &Self::answered<&Self::set_camera>},
+      {"fusion.set", Cost::Request, &Self::fusion_set},
+      {"fusion.get", Cost::Request, &Self::answered<&Self::fusion_get>},
+      {"quality.set", Cost::Request, &Self::answered<&Self::set_quality>},
+      {"scene.get", Cost::Request, &Self::answered<&Self::scene_get>},
+      {"scene.subscribe", Cost::Request, &Self::answered<&Self::subscribe>},
+      {"scene.unsubscribe", Cost::Request, &Self::answered<&Self::unsubscribe>},
+      {"scene.histogram", Cost::Request, &Self::histogram},
+      {"scene.probe", Cost::Request, &Self::probe},
+      {"scene.extremes", Cost::Request, &Self::extremes},
+  };
+  return kRequests;
+}
+
 void ViewerSession::handle(const protocol::IncomingMessage& message) {
-  const std::string& method = message.method;
-  const auto& params = message.params;
-  const Id& id = message.id;
-  if (method == "stream.ack") return answer(id, acknowledge(params));
-  if (method == "camera.set") return answer(id, set_camera(params));
-  if (!requests_.take(steady_seconds())) {
+  const auto known = requests();
+  const auto request = std::find_if(
+      known.begin(), known.end(), [&message](const Request& candidate) { return candidate.method == message.method; });
+  const bool is_known = request != known.end();
+  if ((!is_known || request->cost != Cost::Free) && !requests_.take(steady_seconds())) {
     const auto allowed = static_cast<long>(limits_.requests_per_s);
-    return answer(id, refusal(RpcErrorCode::Busy, "too many requests", "", std::to_string(allowed) + " a second"));
+    return answer(message.id,
+                  refusal(RpcErrorCode::Busy, "too many requests", "", std::to_string(allowed) + " a second"));
   }
-  if (method == "fusion.set") return fusion_set(id, params);
-  if (method == "fusion.get") return answer(id, fusion_get());
-  if (method == "scene.get") return answer(id, scene_get());
-  if (method == "scene.subscribe") return answer(id, subscribe(params));
-  if (method == "scene.unsubscribe") return answer(id, unsubscribe());
-  if (method == "quality.set") return answer(id, set_quality(params));
-  if (method == "scene.histogram") return histogram(id, params);
-  if (method == "scene.probe") return probe(id, params);
-  if (method == "scene.extremes") return extremes(id, params);
-  answer(id, refusal(RpcErrorCode::MethodNotFound, "there is no method \"" + method.substr(0, 64) + "\"", "method"));
+  if (!is_known) {
+    return answer(message.id, refusal(RpcErrorCode::MethodNotFound,
+                                      "there is no method \"" + message.method.substr(0, 64) + "\"", "method"));
+  }
+  (this->*request->handle)(message.id, message.params);
 }
 
 void ViewerSession::answer(const Id& id, const Answer& answer) {
@@ -200,7 +219,7 @@ void ViewerSession::notify(std::string_view method, const json& params) {
   peer_.send(protocol::notification_text(method, params));
 }
 
-ViewerSession::Answer ViewerSession::scene_get() const {
+ViewerSession::Answer ViewerSession::scene_get(const json& /*params*/) {
   if (!scene_) return no_scene();
   return protocol::to_json(to_message(*scene_));
 }
@@ -238,13 +257,13 @@ std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
   return stream_->resume(tiles);
 }
 
-ViewerSession::Answer ViewerSession::unsubscribe() {
+ViewerSession::Answer ViewerSession::unsubscribe(const json& /*params*/) {
   is_subscribed_ = false;
   if (stream_) stream_->unsubscribe();
   return json::object();
 }
 
-ViewerSession::Answer ViewerSession::fusion_get() const {
+ViewerSession::Answer ViewerSession::fusion_get(const json& /*params*/) {
   return protocol::to_json(fusion_reply());
 }
 

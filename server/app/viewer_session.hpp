@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,16 +45,32 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   };
   struct Preparation;
 
+  /// What a request counts against.
+  enum class Cost {
+    Free,     ///< Nothing: it only steers what is sent anyway, and comes with every picture.
+    Request,  ///< The requests a second of NetLimits.
+  };
+  /// One of the methods that a viewer may call.
+  struct Request {
+    std::string_view method;
+    Cost cost;
+    void (ViewerSession::*handle)(const Id& id, const nlohmann::json& params);
+  };
+  static std::span<const Request> requests();
+  /// The handler that answers with what a function returns.
+  template <auto function>
+  void answered(const Id& id, const nlohmann::json& params);
+
   void handle(const protocol::IncomingMessage& message);
   void answer(const Id& id, const Answer& answer);
   void notify(std::string_view method, const nlohmann::json& params);
 
-  Answer scene_get() const;
+  Answer scene_get(const nlohmann::json& params);
   Answer subscribe(const nlohmann::json& params);
   /// Returns the number of tiles that need not be sent again.
   std::uint32_t resume(const protocol::ResumeRequest& request);
-  Answer unsubscribe();
-  Answer fusion_get() const;
+  Answer unsubscribe(const nlohmann::json& params);
+  Answer fusion_get(const nlohmann::json& params);
   Answer set_quality(const nlohmann::json& params);
   Answer set_camera(const nlohmann::json& params);
   Answer acknowledge(const nlohmann::json& params);
