@@ -34,7 +34,7 @@ struct Tile {
   protocol::TileId id;
   std::uint8_t child_mask = 0;
   float geometric_error_m = 0;  ///< Against the full mesh; 0 at leaves.
-  /// Largest difference of a channel from the full mesh, 95th percentile of the worst eighth of the tile; 0 at leaves.
+  /// Largest difference of a channel from the full mesh, 95th percentile of the worst part of the tile; 0 at leaves.
   float colour_error_levels = 0;
   float temperature_error_celsius = 0;  ///< The same of the temperature; NaN = none has one.
   float lost_detail_m = 0;              ///< Size of the largest detail that is seen wrong; 0 at leaves.

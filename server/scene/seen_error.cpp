@@ -19,8 +19,9 @@ constexpr std::size_t kLeafSamples = 1024;
 constexpr std::size_t kMostSamples = 4096;
 /// 95 % of the surface, and what chance may do to a share of the samples: 1.5 of its deviations, and no less than this.
 constexpr double kShare = 0.95, kLeastMargin = 0.015;
-/// Of a tile's surface: an eighth of the tile that holds less of it is not looked at by itself.
-constexpr double kLeastShare = 1.0 / 16;
+/// A tile is looked at in up to so many parts (a power of two) along each axis, but not in those that hold a smaller share of its surface.
+constexpr std::size_t kParts = 4;
+constexpr double kLeastShare = 1.0 / 32;
 /// Cells from a 1024th to an eighth of the tile.
 constexpr int kFinestBits = 10, kCoarsestBits = 3;
 
@@ -77,23 +78,35 @@ struct Differences {
   }
 };
 
-using Parts = std::array<Differences, 8>;
+using Parts = std::array<Differences, kParts * kParts * kParts>;
 
-/// The largest of the tile as a whole and of its eighths: whoever is near has one of them alone on the screen.
-double largest_percentile(Parts& parts) {
-  Differences whole;
-  for (const Differences& part : parts) whole.join(part);
-  double largest = whole.percentile();
-  for (Differences& part : parts) {
-    if (part.weight > kLeastShare * whole.weight) largest = std::max(largest, part.percentile());
+/// The largest of the tile as a whole, of its eighths and of its parts: whoever is near has few of them on the screen.
+double largest_percentile(const Parts& parts) {
+  double largest = 0;
+  double whole_weight = 0;
+  for (std::size_t along = 1; along <= kParts; along *= 2) {
+    std::vector<Differences> joined(along * along * along);
+    for (std::size_t part = 0; part < parts.size(); ++part) {
+      const auto place = [&](std::size_t in_parts) { return in_parts % kParts * along / kParts; };
+      joined[(place(part / kParts / kParts) * along + place(part / kParts)) * along + place(part)].join(parts[part]);
+    }
+    if (along == 1) whole_weight = joined[0].weight;
+    for (Differences& some : joined) {
+      if (along == 1 || some.weight > kLeastShare * whole_weight) largest = std::max(largest, some.percentile());
+    }
   }
   return largest;
 }
 
-std::size_t octant_of(const Vec3f& p, const Bounds& bounds) {
-  const auto is_upper = [](float at, float low, float high) { return at > low + (high - low) / 2 ? 1U : 0U; };
-  return is_upper(p.x, bounds.min.x, bounds.max.x) | is_upper(p.y, bounds.min.y, bounds.max.y) << 1U |
-         is_upper(p.z, bounds.min.z, bounds.max.z) << 2U;
+std::size_t part_of(const Vec3f& p, const Bounds& bounds) {
+  const auto along = [](float at, float low, float high) {
+    const double share = high > low ? (static_cast<double>(at) - static_cast<double>(low)) /
+                                          (static_cast<double>(high) - static_cast<double>(low))
+                                    : 0;
+    return static_cast<std::size_t>(std::clamp(share * kParts, 0.0, kParts - 1.0));
+  };
+  return (along(p.x, bounds.min.x, bounds.max.x) * kParts + along(p.y, bounds.min.y, bounds.max.y)) * kParts +
+         along(p.z, bounds.min.z, bounds.max.z);
 }
 
 }  // namespace
@@ -165,14 +178,14 @@ void thin_out(std::vector<FullSample>& samples) {
 void measure_seen_error(Tile& tile, const Surface& surface, std::span<const FullSample> samples) {
   Parts colour, temperature;
   for (const FullSample& sample : samples) {
-    const std::size_t octant = octant_of(sample.position, tile.bounds);
+    const std::size_t part = part_of(sample.position, tile.bounds);
     const Shown shown = shown_at(tile, surface, sample.position, sample.near);
     const auto channels = channels_of(sample.visible);
     double largest = 0;
     for (unsigned j = 0; j < 3; ++j) largest = std::max(largest, std::fabs(channels[j] - shown.channels[j]));
-    colour[octant].add(largest, sample.weight);
+    colour[part].add(largest, sample.weight);
     const double difference = std::fabs(static_cast<double>(sample.celsius) - shown.celsius);
-    if (std::isfinite(difference)) temperature[octant].add(difference, sample.weight);
+    if (std::isfinite(difference)) temperature[part].add(difference, sample.weight);
   }
   const auto raise = [](float& error, double by) { error = std::fmax(error, static_cast<float>(by)); };
   raise(tile.colour_error_levels, largest_percentile(colour));

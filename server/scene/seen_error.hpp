@@ -32,8 +32,8 @@ struct Shown {
   double celsius = 0;  ///< NaN where no corner has a temperature.
 };
 
-/// Sets the colour and the temperature error of a tile: 95th percentiles of the tile or of that eighth of it where they are
-/// the largest, with a margin for having looked at samples only. `surface` is that of the tile; empty for a point cloud.
+/// Sets the colour and the temperature error of a tile: 95th percentiles of the tile or of that part of it (an eighth or a 64th, by place) where
+/// they are the largest, with a margin for having looked at samples only. `surface` is that of the tile; empty for a point cloud.
 void measure_seen_error(Tile& tile, const Surface& surface, std::span<const FullSample> samples);
 
 /// What difference of colour or temperature catches the eye.
