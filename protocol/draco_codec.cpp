@@ -397,8 +397,9 @@ Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> paylo
   auto decoded = decoder.DecodePointCloudFromBuffer(&stream);
   if (!decoded.ok()) return internal("does not decode: " + decoded.status().error_msg_string());
   const draco::PointCloud& cloud = *decoded.value();
-  const draco::PointAttribute* last = cloud.attribute(cloud.num_attributes() - 1);
   std::vector<std::uint8_t> marks;
+  if (cloud.num_attributes() == 0) return marks;
+  const draco::PointAttribute* last = cloud.attribute(cloud.num_attributes() - 1);
   if (last->attribute_type() != draco::GeometryAttribute::GENERIC || !is_of_bytes(last, 1)) return marks;
   marks.resize(cloud.num_points());
   for (std::uint32_t i = 0; i < cloud.num_points(); ++i) last->GetMappedValue(draco::PointIndex(i), &marks[i]);
