@@ -159,14 +159,8 @@ protocol::MethodDescription to_message(const fusion::Method& method) {
   return message;
 }
 
-/// To a tenth of a level: the digits beyond it cannot be seen and are half of what a viewer gets first.
 protocol::PaletteDescription to_message(const fusion::Palette& palette) {
-  protocol::PaletteDescription message{palette.id, palette.label, palette.fusion_safe, {}};
-  for (const auto& colour : palette.table) {
-    auto& rounded = message.colours.emplace_back(colour);
-    for (double& channel : rounded) channel = std::round(channel * 10) / 10;
-  }
-  return message;
+  return {palette.id, palette.label, palette.fusion_safe, {palette.table.begin(), palette.table.end()}};
 }
 
 std::vector<protocol::MethodDescription> method_messages() {

@@ -21,18 +21,6 @@ namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
-namespace {
-
-/// Of texts: hello is 80 kB as it is and 25 kB compressed. Less than one packet goes as it is.
-websocket::permessage_deflate compression() {
-  websocket::permessage_deflate compression;
-  compression.server_enable = true;
-  compression.msg_size_threshold = 1024;
-  return compression;
-}
-
-}  // namespace
-
 WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context)
     : ws_(std::move(stream)),
       context_(context),
@@ -59,7 +47,6 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   }));
   ws_.read_message_max(limits.message_size_bytes);
   ws_.auto_fragment(false);
-  ws_.set_option(compression());
   ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
     if (kind == websocket::frame_type::pong && is_pinging_) {
       is_pinging_ = false;
@@ -118,8 +105,6 @@ asio::awaitable<void> WebSocketSession::read_messages() {
 template <class Buffers>
 asio::awaitable<bool> WebSocketSession::write(Buffers buffers, bool is_text) {
   ws_.text(is_text);
-  // What Draco has written does not get smaller.
-  ws_.compress(is_text);
   is_writing_ = true;
   const auto [error, size] = co_await ws_.async_write(buffers, kAwait);
   is_writing_ = false;

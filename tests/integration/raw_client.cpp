@@ -96,10 +96,10 @@ unsigned WebSocketFrame::close_code() const {
   return static_cast<unsigned>(static_cast<unsigned char>(payload[0])) * 256U + static_cast<unsigned char>(payload[1]);
 }
 
-std::string masked_frame(unsigned opcode, std::string_view payload, bool is_final, bool is_compressed) {
+std::string masked_frame(unsigned opcode, std::string_view payload, bool is_final) {
   constexpr char kMask[4] = {0x12, 0x34, 0x56, 0x78};
   std::string frame;
-  frame.push_back(static_cast<char>(opcode | (is_final ? 0x80U : 0U) | (is_compressed ? 0x40U : 0U)));
+  frame.push_back(static_cast<char>(opcode | (is_final ? 0x80U : 0U)));
   const auto append_size = [&frame, &payload](int byte_count) {
     for (int shift = 8 * (byte_count - 1); shift >= 0; shift -= 8) {
       frame.push_back(static_cast<char>(payload.size() >> static_cast<unsigned>(shift) & 0xffU));
@@ -139,8 +139,8 @@ RawWebSocket::RawWebSocket(std::uint16_t port, std::string_view extra_headers, s
   is_open_ = status_of(upgrade_response_) == 101;
 }
 
-bool RawWebSocket::send_frame(unsigned opcode, std::string_view payload, bool is_final, bool is_compressed) {
-  return client_.send(masked_frame(opcode, payload, is_final, is_compressed));
+bool RawWebSocket::send_frame(unsigned opcode, std::string_view payload, bool is_final) {
+  return client_.send(masked_frame(opcode, payload, is_final));
 }
 
 std::optional<WebSocketFrame> RawWebSocket::receive(std::chrono::milliseconds timeout) {
@@ -156,8 +156,7 @@ std::optional<WebSocketFrame> RawWebSocket::receive(std::chrono::milliseconds ti
         if (extra > 0) size = 0;
         for (std::size_t i = 0; i < extra; ++i) size = size * 256 + byte(2 + i);
         if (buffer_.size() >= header_size + size) {
-          WebSocketFrame frame{byte(0) & 0x0fU, (byte(0) & 0x80U) != 0, (byte(0) & 0x40U) != 0,
-                               buffer_.substr(header_size, size)};
+          WebSocketFrame frame{byte(0) & 0x0fU, (byte(0) & 0x80U) != 0, buffer_.substr(header_size, size)};
           buffer_.erase(0, header_size + size);
           return frame;
         }

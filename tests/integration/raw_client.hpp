@@ -44,7 +44,6 @@ int status_of(std::string_view response);
 struct WebSocketFrame {
   unsigned opcode = 0;
   bool is_final = false;
-  bool is_compressed = false;
   std::string payload;
   /// The code of a close frame, 0 for another one.
   unsigned close_code() const;
@@ -61,7 +60,7 @@ class RawWebSocket {
   const std::string& upgrade_response() const { return upgrade_response_; }
   RawClient& client() { return client_; }
 
-  bool send_frame(unsigned opcode, std::string_view payload, bool is_final = true, bool is_compressed = false);
+  bool send_frame(unsigned opcode, std::string_view payload, bool is_final = true);
   bool send_text(std::string_view text) { return send_frame(1, text); }
   /// The next frame; nothing at the end of the connection or after the timeout.
   std::optional<WebSocketFrame> receive(std::chrono::milliseconds timeout = std::chrono::seconds(10));
@@ -78,6 +77,6 @@ class RawWebSocket {
 };
 
 /// A client frame with a mask.
-std::string masked_frame(unsigned opcode, std::string_view payload, bool is_final = true, bool is_compressed = false);
+std::string masked_frame(unsigned opcode, std::string_view payload, bool is_final = true);
 
 }  // namespace spectra::tests
