@@ -14,6 +14,7 @@ build_packages=(
   libboost1.81-dev nlohmann-json3-dev libspdlog-dev libcli11-dev
   libdraco-dev libopenmesh-dev libmeshoptimizer-dev libhwy-dev
   prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev zlib1g-dev
+  libsqlite3-dev libssl-dev
 )
 test_packages=(
   libgtest-dev libgmock-dev librapidcheck-dev

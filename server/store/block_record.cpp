@@ -1,0 +1,50 @@
+#include "server/store/block_record.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spectra::store {
+namespace {
+
+bool is_finite(const fusion::Vec3d& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+}  // namespace
+
+bool is_block_id(std::string_view id) {
+  constexpr std::size_t kLongest = 64;
+  return !id.empty() && id.size() <= kLongest && std::all_of(id.begin(), id.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-';
+  });
+}
+
+StoreResult<void> check_record(const BlockRecord& record) {
+  const auto& d = record.description;
+  if (!is_block_id(d.id)) {
+    return failure(StoreErrorCode::InvalidRecord, "the id of a block is 1 to 64 of the characters a-z A-Z 0-9 . _ -");
+  }
+  if (d.observed_at && !std::isfinite(*d.observed_at)) {
+    return failure(StoreErrorCode::InvalidRecord, "observed_at is a finite number of Unix seconds");
+  }
+  if (d.sensor && !is_finite(*d.sensor)) {
+    return failure(StoreErrorCode::InvalidRecord, "the sensor's position is three finite numbers of metres");
+  }
+  if (!is_finite(d.bounds.min) || !is_finite(d.bounds.max)) {
+    return failure(StoreErrorCode::InvalidRecord, "the bounds of block " + d.id + " are not finite");
+  }
+  if (!record.ply) return failure(StoreErrorCode::InvalidRecord, "block " + d.id + " comes without bytes");
+  if (d.read_options.size() > kLongestReadOptions) {
+    return failure(StoreErrorCode::TooLarge, "the reading options of block " + d.id + " are longer than " +
+                                                 std::to_string(kLongestReadOptions) + " bytes");
+  }
+  if (record.ply->size() > kLargestBlockBytes) {
+    return failure(StoreErrorCode::TooLarge, "block " + d.id + " has " + std::to_string(record.ply->size()) +
+                                                 " bytes; the store takes at most " +
+                                                 std::to_string(kLargestBlockBytes) + " in one block");
+  }
+  return success();
+}
+
+}  // namespace spectra::store
