@@ -73,6 +73,11 @@ static void describe(auto& fields, Is<Limits> auto& message) {
   fields.require("max_requests_per_s", message.max_requests_per_s > 0, "a number above 0");
 }
 
+static void describe(auto& fields, Is<Catalogue> auto& message) {
+  fields.field("methods", message.methods);
+  fields.field("palettes", message.palettes);
+}
+
 static void describe(auto& fields, Is<Hello> auto& message) {
   fields.field("protocol", message.protocol);
   fields.require("protocol", message.protocol == kProtocolName, "\"spectra.v1\"");
@@ -82,8 +87,11 @@ static void describe(auto& fields, Is<Hello> auto& message) {
   fields.field("capabilities", message.capabilities);
   fields.field("limits", message.limits);
   fields.nullable("scene", message.scene);
-  fields.field("methods", message.methods);
-  fields.field("palettes", message.palettes);
+  fields.optional("methods", message.methods);
+  fields.optional("palettes", message.palettes);
+  fields.optional("catalogue", message.catalogue);
+  fields.require("methods", message.methods || message.catalogue, "a list, where catalogue is absent");
+  fields.require("palettes", message.palettes || message.catalogue, "a list, where catalogue is absent");
   fields.field("fusion", message.fusion);
   fields.field("quality", message.quality);
 }
@@ -95,6 +103,7 @@ template struct Wire<SceneDescription>;
 template struct Wire<SceneChanged>;
 template struct Wire<ServerInfo>;
 template struct Wire<Limits>;
+template struct Wire<Catalogue>;
 template struct Wire<Hello>;
 
 }  // namespace spectra::protocol

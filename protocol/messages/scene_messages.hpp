@@ -82,7 +82,14 @@ enum class Role { Operator, Viewer };
 
 inline constexpr const char* kProtocolName = "spectra.v1";
 
-/// Params of hello, the first message of every connection.
+/// Methods and palettes: the same for every viewer of a server. What is found where Hello::catalogue says.
+struct Catalogue {
+  std::vector<MethodDescription> methods;
+  std::vector<PaletteDescription> palettes;
+};
+
+/// Params of hello, the first message of every connection. Either it holds methods and palettes, or it is brief and tells
+/// where they are.
 struct Hello {
   std::string protocol = kProtocolName;
   ServerInfo server;
@@ -91,8 +98,9 @@ struct Hello {
   std::vector<std::string> capabilities;
   Limits limits;
   std::optional<SceneDescription> scene;  ///< null: none yet.
-  std::vector<MethodDescription> methods;
-  std::vector<PaletteDescription> palettes;
+  std::optional<std::vector<MethodDescription>> methods;
+  std::optional<std::vector<PaletteDescription>> palettes;
+  std::optional<std::string> catalogue;  ///< Path of a Catalogue over HTTP, relative to the folder of /ws.
   FusionState fusion;
   QualityState quality;
 };
@@ -104,6 +112,7 @@ extern template struct Wire<SceneDescription>;
 extern template struct Wire<SceneChanged>;
 extern template struct Wire<ServerInfo>;
 extern template struct Wire<Limits>;
+extern template struct Wire<Catalogue>;
 extern template struct Wire<Hello>;
 
 }  // namespace spectra::protocol

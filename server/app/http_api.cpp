@@ -120,6 +120,9 @@ void HttpApi::handle(const HttpRequest& request, const std::function<void(HttpRe
     if (!scene) return reply(no_scene_reply());
     return reply(text_reply(200, protocol::to_json(to_message(*scene)).dump() + "\n", "application/json"));
   }
+  if (path == Catalogue::kPath || path.starts_with(std::string(Catalogue::kPath) + '/')) {
+    return reply(served_.catalogue.reply(request));
+  }
   if (path.starts_with(kExportPrefix)) return handle_export(request.target, reply);
   reply(text_reply(404, "not found\n"));
 }

@@ -9,7 +9,7 @@
 
 namespace spectra::server {
 
-/// The paths of docs/protocol.md, "HTTP", beside the web client: health, metrics, the scene and its exports. What takes
+/// The paths of docs/protocol.md, "HTTP", beside the web client: health, metrics, methods and palettes, the scene and its exports. What takes
 /// time runs on the worker pool; at most two exports are in memory at a time, further ones are told to come back.
 class HttpApi {
  public:

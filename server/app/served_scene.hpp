@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "server/app/catalogue.hpp"
 #include "server/app/session_ids.hpp"
 #include "server/scene/scene_store.hpp"
 #include "server/scene/worker_pool.hpp"
@@ -42,6 +43,7 @@ struct ServedScene {
   SceneStore scenes;
   LoadingProgress progress;
   const SessionIds session_ids;
+  const Catalogue catalogue;
   std::atomic<std::uint64_t> viewer_count{0};
   FrameCache cache;
   WorkerPool pool;  ///< Last, so that it stops first: its jobs use the others.

@@ -132,11 +132,9 @@ void ViewerSession::opened() {
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
-  hello.methods = method_messages();
-  hello.palettes = palette_messages();
   hello.fusion = to_message(*plan_, temperature_of(scene_).summary);
   hello.quality = to_message(quality());
-  notify("hello", protocol::to_json(hello));
+  peer_.send(served_.catalogue.hello_text(std::move(hello), peer_.hello_form()));
   if (stream_) set_plan(*plan_);
   tell_notes();
   if (const auto message = served_.progress.message()) {

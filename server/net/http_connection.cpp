@@ -55,6 +55,17 @@ std::string joined(const http::fields& fields, http::field name) {
   return all;
 }
 
+/// What an upgrade asks hello to hold; nothing for a word that means nothing.
+std::optional<HelloForm> hello_form_of(const RequestTarget& target) {
+  HelloForm form = HelloForm::Full;
+  for (const auto& [name, value] : target.query) {
+    if (name != "hello") continue;
+    if (value != "full" && value != "brief") return std::nullopt;
+    form = value == "brief" ? HelloForm::Brief : HelloForm::Full;
+  }
+  return form;
+}
+
 /// Where a handler leaves its answer; outlives both the connection and the handler.
 struct PendingReply {
   explicit PendingReply(const asio::any_io_executor& executor)
@@ -145,11 +156,11 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   auto target = *parsed_target(view(request.target()));
 
   if (target.path == "/ws") {
-    if (auto refused = upgrade_refusal_of(request)) {
+    if (auto refused = upgrade_refusal_of(request, target)) {
       context_.metrics.requests_refused += 1;
       co_return co_await write(*refused, request.version(), is_head, false);
     }
-    const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_);
+    const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *hello_form_of(target));
     context_.remove(this);
     co_await session->run(request);
     co_return false;
@@ -176,7 +187,7 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) cons
   return std::nullopt;
 }
 
-std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request) const {
+std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request, const RequestTarget& target) const {
   // RFC 6455, 4.1; what came early is in our buffer and would be lost.
   if (buffer_.size() > 0) return text_reply(400, "nothing may follow an upgrade before it is answered\n");
   if (!beast::websocket::is_upgrade(request)) {
@@ -189,6 +200,7 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
       (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
     return text_reply(403, "pages of that origin may not connect; see --allow-host\n");
   }
+  if (!hello_form_of(target)) return text_reply(400, "hello in the query must be full or brief\n");
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto it = begin; it != end; ++it) {
     for (const auto& offered : http::token_list(it->value())) {
@@ -205,20 +217,7 @@ HttpReply HttpConnection::static_reply(const HttpRequest& request) const {
     if (path == "/") return text_reply(200, std::string(kNoWebClient), "text/html; charset=utf-8");
     return text_reply(404, "not found\n");
   }
-  const StaticVersion* const version = file->version_for(request.accept_encoding);
-  HttpReply reply = version ? HttpReply{} : text_reply(406, "there is no version in such a content coding\n");
-  if (file->versions.size() > 1) reply.headers.emplace_back("Vary", "Accept-Encoding");
-  if (!version) return reply;
-  reply.headers.emplace_back("ETag", version->etag);
-  reply.headers.emplace_back("Cache-Control", file->immutable ? "public, max-age=31536000, immutable" : "no-cache");
-  if (names_etag(request.if_none_match, version->etag)) {
-    reply.status = 304;
-    return reply;
-  }
-  if (!version->coding.empty()) reply.headers.emplace_back("Content-Encoding", version->coding);
-  reply.content_type = file->content_type;
-  reply.body = std::shared_ptr<const std::string>(file, &version->content);
-  return reply;
+  return file_reply(file, request, file->immutable);
 }
 
 asio::awaitable<HttpReply> HttpConnection::answer(const HttpRequest& request) {

@@ -33,7 +33,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   HttpReply static_reply(const HttpRequest& request) const;
   /// Why the request is refused before anything looks at what it asks for.
   std::optional<HttpReply> refusal_of(const Request& request) const;
-  std::optional<HttpReply> upgrade_refusal_of(const Request& request) const;
+  std::optional<HttpReply> upgrade_refusal_of(const Request& request, const RequestTarget& target) const;
 
   ConnectionStream stream_;
   ServerContext& context_;

@@ -53,12 +53,7 @@ constexpr double kUnnamedIdentity = 1e-6;
 std::optional<StaticVersion> read_version(const fs::path& path, std::string_view coding) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return std::nullopt;
-  StaticVersion version;
-  version.coding = coding;
-  version.content.assign(std::istreambuf_iterator<char>(in), {});
-  version.etag = '"' + std::to_string(version.content.size()) + '-' +
-                 std::to_string(std::hash<std::string>{}(version.content)) + '"';
-  return version;
+  return version_of({std::istreambuf_iterator<char>(in), {}}, coding);
 }
 
 /// Whether a file is another one in a content coding.
@@ -116,6 +111,14 @@ bool same_word(std::string_view a, std::string_view b) {
 
 }  // namespace
 
+StaticVersion version_of(std::string content, std::string_view coding) {
+  StaticVersion version;
+  version.coding = coding;
+  version.etag = '"' + std::to_string(content.size()) + '-' + std::to_string(std::hash<std::string>{}(content)) + '"';
+  version.content = std::move(content);
+  return version;
+}
+
 double liking(std::string_view accept_encoding, std::string_view coding) {
   std::optional<double> of_others;
   while (!accept_encoding.empty()) {
@@ -151,6 +154,23 @@ const StaticVersion* StaticFile::version_for(std::string_view accept_encoding) c
     best_liking = its_liking;
   }
   return best;
+}
+
+HttpReply file_reply(const std::shared_ptr<const StaticFile>& file, const HttpRequest& request, bool is_immutable) {
+  const StaticVersion* const version = file->version_for(request.accept_encoding);
+  HttpReply reply = version ? HttpReply{} : text_reply(406, "there is no version in such a content coding\n");
+  if (file->versions.size() > 1) reply.headers.emplace_back("Vary", "Accept-Encoding");
+  if (!version) return reply;
+  reply.headers.emplace_back("ETag", version->etag);
+  reply.headers.emplace_back("Cache-Control", is_immutable ? "public, max-age=31536000, immutable" : "no-cache");
+  if (names_etag(request.if_none_match, version->etag)) {
+    reply.status = 304;
+    return reply;
+  }
+  if (!version->coding.empty()) reply.headers.emplace_back("Content-Encoding", version->coding);
+  reply.content_type = file->content_type;
+  reply.body = std::shared_ptr<const std::string>(file, &version->content);
+  return reply;
 }
 
 std::string_view content_type_of(std::string_view file_name) {

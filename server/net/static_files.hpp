@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "server/net/http_types.hpp"
+
 namespace spectra::server {
 
 /// A file's content in one content coding.
@@ -18,7 +20,10 @@ struct StaticVersion {
   std::string etag;  ///< With its quotes; each version has its own.
 };
 
-/// One file of the web client, held in memory.
+/// A version with a tag made from its content.
+StaticVersion version_of(std::string content, std::string_view coding);
+
+/// A file of the web client, or one like it, held in memory.
 struct StaticFile {
   std::vector<StaticVersion> versions;  ///< The smallest first.
   std::string content_type;
@@ -35,6 +40,10 @@ double liking(std::string_view accept_encoding, std::string_view coding);
 
 /// Whether a value of If-None-Match names the tag (RFC 9110, 13.1.2: a weak one, as proxies make it, is as good).
 bool names_etag(std::string_view if_none_match, std::string_view etag);
+
+/// The answer to a request for a file: the version that is liked best, 304 where the client has that one already, 406 where
+/// it likes none. `is_immutable`: under this name there will never be another content.
+HttpReply file_reply(const std::shared_ptr<const StaticFile>& file, const HttpRequest& request, bool is_immutable);
 
 /// The MIME type that a browser needs for a file of this name.
 std::string_view content_type_of(std::string_view file_name);

@@ -11,6 +11,24 @@
 
 namespace spectra::server {
 
+/// What hello is to hold: everything, or all but what is the same for every viewer.
+enum class HelloForm { Full, Brief };
+
+/// A text for one viewer. The middle of it may be one that many are sent; it is not copied.
+struct OutgoingText {
+  OutgoingText(std::string whole) : begin(std::move(whole)) {}  // NOLINT(google-explicit-constructor)
+  OutgoingText(std::string begin_in, std::shared_ptr<const std::string> middle, std::string_view shared_in,
+               std::string end_in)
+      : begin(std::move(begin_in)), owner(std::move(middle)), shared(shared_in), end(std::move(end_in)) {}
+
+  std::size_t size_bytes() const { return begin.size() + shared.size() + end.size(); }
+
+  std::string begin;
+  std::shared_ptr<const std::string> owner;  ///< Holds what `shared` is a part of.
+  std::string_view shared;
+  std::string end;
+};
+
 /// The network's side of one viewer. Everything of a session runs on its strand, one thing at a time; what is callable
 /// from any thread says so.
 class ViewerPeer {
@@ -25,7 +43,10 @@ class ViewerPeer {
 
   /// Puts a JSON text on the control lane, which goes before frames and never loses anything; when it grows beyond its
   /// bound the viewer is cut.
-  virtual void send(std::string text) = 0;
+  virtual void send(OutgoingText text) = 0;
+
+  /// What the viewer asked for as it connected.
+  virtual HelloForm hello_form() const = 0;
 
   /// Round trip of the last answered ping, milliseconds; 0 before the first.
   virtual double round_trip_ms() const = 0;

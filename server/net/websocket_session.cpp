@@ -21,14 +21,15 @@ namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
-WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context)
+WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form)
     : ws_(std::move(stream)),
       context_(context),
       writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
       minder_timer_(ws_.get_executor()),
       reader_timer_(ws_.get_executor()),
       messages_(context.options.limits.messages_per_s,
-                context.options.limits.messages_per_s * context.options.limits.message_burst_s) {}
+                context.options.limits.messages_per_s * context.options.limits.message_burst_s),
+      hello_form_(hello_form) {}
 
 asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
@@ -120,10 +121,12 @@ asio::awaitable<void> WebSocketSession::write_messages() {
       co_return;
     }
     if (!control_.empty()) {
-      const std::string text = std::move(control_.front());
+      const OutgoingText text = std::move(control_.front());
       control_.pop_front();
-      if (!co_await write(asio::buffer(text), true)) co_return;
-      control_bytes_ -= text.size();
+      const std::array<asio::const_buffer, 3> buffers{asio::buffer(text.begin), asio::buffer(text.shared),
+                                                      asio::buffer(text.end)};
+      if (!co_await write(buffers, true)) co_return;
+      control_bytes_ -= text.size_bytes();
       context_.metrics.messages_sent += 1;
       continue;
     }
@@ -213,9 +216,9 @@ void WebSocketSession::wake() {
   });
 }
 
-void WebSocketSession::send(std::string text) {
+void WebSocketSession::send(OutgoingText text) {
   if (is_ended_ || closing_) return;
-  control_bytes_ += text.size();
+  control_bytes_ += text.size_bytes();
   control_.push_back(std::move(text));
   if (control_bytes_ > context_.options.limits.control_queue_bytes) {
     context_.metrics.viewers_cut += 1;

@@ -26,14 +26,15 @@ class WebSocketSession final : public ViewerPeer,
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  WebSocketSession(ConnectionStream stream, ServerContext& context);
+  WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
 
   void post(std::function<void()> job) override;
   void wake() override;
-  void send(std::string text) override;
+  void send(OutgoingText text) override;
+  HelloForm hello_form() const override { return hello_form_; }
   double round_trip_ms() const override { return round_trip_ms_; }
   std::size_t queued_bytes() const override { return control_bytes_; }
 
@@ -60,7 +61,8 @@ class WebSocketSession final : public ViewerPeer,
   boost::asio::steady_timer minder_timer_;
   boost::asio::steady_timer reader_timer_;
   TokenBucket messages_;
-  std::deque<std::string> control_;
+  const HelloForm hello_form_;
+  std::deque<OutgoingText> control_;
   std::size_t control_bytes_ = 0;
   bool is_open_ = false;
   bool is_ended_ = false;

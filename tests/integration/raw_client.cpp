@@ -119,11 +119,12 @@ std::string masked_frame(unsigned opcode, std::string_view payload, bool is_fina
   return frame;
 }
 
-RawWebSocket::RawWebSocket(std::uint16_t port, std::string_view extra_headers, std::string_view subprotocol)
+RawWebSocket::RawWebSocket(std::uint16_t port, std::string_view extra_headers, std::string_view subprotocol,
+                           std::string_view target)
     : client_(port) {
-  std::string request =
-      "GET /ws HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
-      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+  std::string request = "GET " + std::string(target) +
+                        " HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
   if (!subprotocol.empty()) request.append("Sec-WebSocket-Protocol: ").append(subprotocol).append("\r\n");
   request.append(extra_headers).append("\r\n");
   client_.send(request);

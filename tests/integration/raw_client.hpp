@@ -54,7 +54,7 @@ class RawWebSocket {
  public:
   /// Connects and upgrades; check is_open(). `extra_headers` are whole lines that end in CRLF.
   explicit RawWebSocket(std::uint16_t port, std::string_view extra_headers = "",
-                        std::string_view subprotocol = "spectra.v1");
+                        std::string_view subprotocol = "spectra.v1", std::string_view target = "/ws");
 
   bool is_open() const { return is_open_; }
   const std::string& upgrade_response() const { return upgrade_response_; }

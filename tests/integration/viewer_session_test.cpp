@@ -52,7 +52,7 @@ fusion::MultispectralMesh sheet(std::uint32_t side, bool with_temperature = true
 /// A client that speaks the protocol.
 class Viewer {
  public:
-  explicit Viewer(std::uint16_t port) : socket_(port) {}
+  explicit Viewer(std::uint16_t port, std::string_view target = "/ws") : socket_(port, "", "spectra.v1", target) {}
 
   bool is_open() const { return socket_.is_open(); }
   RawWebSocket& socket() { return socket_; }
@@ -177,6 +177,35 @@ TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
   EXPECT_EQ(hello["fusion"]["range"]["low"], 0.5);
   EXPECT_EQ(hello["fusion"]["range"]["high"], 99.5);
   EXPECT_EQ(hello["limits"]["max_message_bytes"], 65536);
+}
+
+TEST_F(ViewerSessionTest, ABriefHelloTellsWhereMethodsAndPalettesAre) {
+  const auto body_of = [](const std::string& response) {
+    const auto end = response.find("\r\n\r\n");
+    return end == std::string::npos ? json() : json::parse(response.substr(end + 4));
+  };
+  serve(sheet(60));
+  json full = *Viewer(server_->port()).wait_for("hello");
+  json brief = *Viewer(server_->port(), "/ws?hello=brief").wait_for("hello");
+  EXPECT_FALSE(full.contains("catalogue"));
+  EXPECT_LT(brief.dump().size(), 3000U);
+  const auto path = brief["catalogue"].get<std::string>();
+
+  const auto named = get("/" + path);
+  EXPECT_EQ(status_of(named), 200);
+  EXPECT_NE(named.find("Cache-Control: public, max-age=31536000, immutable\r\n"), std::string::npos);
+  EXPECT_EQ(body_of(named), (json{{"methods", full["methods"]}, {"palettes", full["palettes"]}}));
+  const auto newest = get("/api/v1/catalogue");
+  EXPECT_EQ(status_of(newest), 200);
+  EXPECT_NE(newest.find("Cache-Control: no-cache\r\n"), std::string::npos);
+  EXPECT_EQ(body_of(newest), body_of(named));
+  for (const auto* other : {"/api/v1/catalogue/", "/api/v1/catalogue/0", "/api/v1/catalogues"}) {
+    EXPECT_EQ(status_of(get(other)), 404) << other;
+  }
+
+  for (const auto* field : {"methods", "palettes", "session_id"}) full.erase(field);
+  for (const auto* field : {"catalogue", "session_id"}) brief.erase(field);
+  EXPECT_EQ(brief, full) << "all else is the same";
 }
 
 TEST_F(ViewerSessionTest, ServesBeforeThereIsAScene) {

@@ -32,7 +32,7 @@ class EchoViewer final : public server::ViewerClient {
   EchoViewer(std::shared_ptr<server::ViewerPeer> peer, Record& record) : peer_(std::move(peer)), record_(record) {}
   void opened() override {
     record_.opened += 1;
-    peer_.lock()->send("hello");
+    peer_.lock()->send(std::string("hello"));
     peer_.lock()->wake();
   }
   void text_received(std::string_view text) override { peer_.lock()->send(std::string(text)); }
@@ -95,6 +95,16 @@ TEST_F(WebSocketTest, WantsItsSubprotocol) {
   }
   EXPECT_TRUE(RawWebSocket(port(), "", "chat, spectra.v1").is_open());
   EXPECT_TRUE(eventually([this] { return record_.opened == 1; }));
+}
+
+TEST_F(WebSocketTest, KnowsTheFormsOfHello) {
+  for (const auto* target : {"/ws?hello=short", "/ws?hello=", "/ws?hello=brief&hello=BRIEF"}) {
+    const RawWebSocket viewer(port(), "", "spectra.v1", target);
+    EXPECT_EQ(status_of(viewer.upgrade_response()), 400) << target;
+  }
+  for (const auto* target : {"/ws?hello=full", "/ws?hello=brief", "/ws?another=x"}) {
+    EXPECT_TRUE(RawWebSocket(port(), "", "spectra.v1", target).is_open()) << target;
+  }
 }
 
 TEST_F(WebSocketTest, WantsAnOriginOfItsList) {

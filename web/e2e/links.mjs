@@ -17,6 +17,11 @@ function sample(image) {
 /** Of the client itself, everything up to the first picture, headers with it. */
 const LARGEST_CLIENT_BYTES = 280_000;
 
+/** Waits until the scene is there. */
+async function ready(server) {
+  while ((await fetch(`${server.url}readyz`)).status !== 200) await new Promise((resolve) => setTimeout(resolve, 100));
+}
+
 const shownTiles = (page) => page.evaluate(() => globalThis.spectra.store.shown.tiles);
 
 export function addLinkTests(browser) {
@@ -66,8 +71,8 @@ export function addLinkTests(browser) {
   test('The client is small: over a thin link it leaves the line to the scene', async () => {
     // 1 Mbit/s, 200 ms there and back. How long it takes is said, not judged: decoding and drawing without a GPU are a part of it.
     const server = await startServer(['--demo']);
-    // The scene is there: what it takes to make it is not counted.
-    while ((await fetch(`${server.url}readyz`)).status !== 200) await new Promise((resolve) => setTimeout(resolve, 100));
+    // What it takes to make the scene is not counted.
+    await ready(server);
     const proxy = await linkProxy(server.url, { rate_bytes_per_s: 125_000, delay_ms: 100 });
     const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
     await context.addInitScript(() => {
@@ -80,6 +85,11 @@ export function addLinkTests(browser) {
       look();
     });
     const page = await context.newPage();
+    let catalogue_bytes = 0;
+    page.on('requestfinished', async (request) => {
+      const { responseHeadersSize, responseBodySize } = await request.sizes();
+      if (request.url().includes('/api/v1/catalogue/')) catalogue_bytes = responseHeadersSize + responseBodySize;
+    });
     await page.goto(proxy.url);
     await page.waitForFunction(() => globalThis.firstPicture_ms, null, { timeout: 120_000 });
     const { tile_ms, picture_ms } = await page.evaluate(() => ({
@@ -87,8 +97,8 @@ export function addLinkTests(browser) {
       picture_ms: Math.round(globalThis.firstPicture_ms),
     }));
     const sum = (wanted) => proxy.connections.filter(wanted).reduce((all, { received_bytes }) => all + received_bytes, 0);
-    const client_bytes = sum(({ path }) => path !== '/ws');
-    const scene_bytes = sum(({ path }) => path === '/ws');
+    const client_bytes = sum(({ path }) => !path.startsWith('/ws')) - catalogue_bytes;
+    const scene_bytes = sum(({ path }) => path.startsWith('/ws'));
     const link_ms = Math.round((client_bytes + scene_bytes) / 125);
     console.log(
       `        first picture decoded after ${tile_ms} ms, on the screen after ${picture_ms} ms: client ${client_bytes} bytes, scene ${scene_bytes} bytes so far, which take the link ${link_ms} ms`,
@@ -118,7 +128,7 @@ export function addLinkTests(browser) {
       };
     });
     const page = await context.newPage();
-    const early = [/^\/ws$/, /render_worker/, /\/worker-/];
+    const early = [/^\/ws\?hello=brief$/, /render_worker/, /\/worker-/];
     let hasBegun = false;
     await page.route(/\/program-/, async (route) => {
       for (let i = 0; i < 1500; i += 1) {
@@ -132,12 +142,69 @@ export function addLinkTests(browser) {
     await settled(page);
     assert.ok(hasBegun, `before the program had come, this was asked for: ${proxy.requests.join(' ')}`);
     assert.equal(
-      proxy.requests.filter((path) => path === '/ws').length,
+      proxy.requests.filter((path) => path.startsWith('/ws')).length,
       1,
       'the socket that was opened early is the one that is used',
     );
     const eyes = await page.evaluate(() => globalThis.eyes);
     assert.equal(new Set(eyes).size, 1, 'the scene was seen from another place first');
+    await context.close();
+    await proxy.close();
+    await server.stop();
+  });
+
+  test('Methods and palettes come after the first picture, once, and are asked for again when they do not come', async () => {
+    const server = await startServer(['--demo']);
+    await ready(server);
+    const proxy = await linkProxy(server.url);
+    const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
+    const page = await context.newPage();
+    const asked = [];
+    let hello = '';
+    let hasColours = false;
+    page.on('websocket', (socket) =>
+      socket.on('framereceived', ({ payload }) => {
+        if (typeof payload === 'string') hello ||= payload;
+        else hasColours ||= COLOURS.includes(payload[4]);
+      }),
+    );
+    let isBroken = true;
+    await page.route(/\/api\/v1\/catalogue\//, async (route) => {
+      asked.push({ hasColours });
+      if (isBroken) await route.fulfill({ status: 503 });
+      else await route.continue();
+    });
+    await page.goto(proxy.url);
+    const failure = page.locator('[data-catalogue-failure]');
+    await failure.getByText('the server answered with 503').waitFor();
+    assert.ok(hello.length < 4000, `hello has ${hello.length} bytes`);
+    assert.ok(
+      asked.every((request) => request.hasColours),
+      'methods and palettes were asked for before the first tile had come',
+    );
+    // What needs none of them works: the view of the visible colours, by its key.
+    await page.keyboard.press('2');
+    await settled(page);
+    assert.equal(await page.locator('aside.panel').count(), 0);
+    await screenshot(page, 'no-catalogue');
+
+    isBroken = false;
+    await failure.getByText('Try now').click();
+    await page.locator('aside.panel').waitFor();
+    assert.equal(await failure.count(), 0);
+    const methods = await page.evaluate(() => globalThis.spectra.store.methods.length);
+    assert.ok(methods >= 10, `${methods} methods`);
+
+    // The browser keeps it; not while its requests are looked into, as they were so far.
+    await page.unroute(/\/api\/v1\/catalogue\//);
+    const times = [];
+    for (let i = 0; i < 2; i += 1) {
+      await page.reload();
+      await page.locator('aside.panel').waitFor();
+      times.push(proxy.requests.filter((path) => path.startsWith('/api/v1/catalogue/')).length);
+    }
+    assert.ok(times[0] >= 1);
+    assert.equal(times[1], times[0], 'it was asked for again');
     await context.close();
     await proxy.close();
     await server.stop();

@@ -46,7 +46,8 @@ const openSocket = (url: string): SocketLike => new WebSocket(url, SUBPROTOCOL);
 /** Where the server of this page is spoken with. */
 export function serverAddress(): string {
   const folder = location.pathname.replace(/[^/]*$/, '');
-  return `${location.protocol === 'https:' ? 'wss:' : 'ws:'}//${location.host}${folder}ws`;
+  // What is the same for everybody, and most of hello, is got in another way when the picture has come.
+  return `${location.protocol === 'https:' ? 'wss:' : 'ws:'}//${location.host}${folder}ws?hello=brief`;
 }
 
 export function beginHeadStart(): void {

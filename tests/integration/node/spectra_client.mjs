@@ -135,17 +135,18 @@ export class DracoReader {
 
 /** One connection: requests, notifications, tiles. Frames are decoded as they come and acknowledged. */
 export class SpectraClient {
-  static async connect(httpUrl, { decode = true, acknowledge = true } = {}) {
+  static async connect(httpUrl, { decode = true, acknowledge = true, hello: form } = {}) {
     const client = new SpectraClient();
     client.draco = await DracoReader.create();
     client.decode = decode;
     client.acknowledge = acknowledge;
-    client.socket = new WebSocket(`${httpUrl.replace(/^http/, "ws").replace(/\/$/, "")}/ws`, "spectra.v1", {
+    client.socket = new WebSocket(`${httpUrl.replace(/^http/, "ws").replace(/\/$/, "")}/ws${form ? `?hello=${form}` : ""}`, "spectra.v1", {
       perMessageDeflate: false,
     });
     client.socket.binaryType = "nodebuffer";
     const hello = client.notification("hello", 30_000);
     client.socket.on("message", (data, isBinary) => client.#receive(data, isBinary));
+    hello.catch(() => {});
     await new Promise((resolve, reject) => {
       client.socket.once("open", resolve);
       client.socket.once("error", reject);

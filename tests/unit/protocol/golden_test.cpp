@@ -137,6 +137,22 @@ TEST(GoldenMessages, SurviveDecodingAndEncoding) {
   for (const auto& [method, passages] : kMethods) EXPECT_TRUE(seen.contains(method)) << "no example of " << method;
 }
 
+TEST(GoldenMessages, TheCatalogueOverHttpSurvives) {
+  const json catalogue = json::parse(content(kGolden / "http" / "catalogue.json"));
+  const Result<json> again = through<Catalogue>()(catalogue);
+  ASSERT_TRUE(again.has_value()) << again.error().message;
+  EXPECT_EQ(again.value(), catalogue);
+}
+
+TEST(GoldenMessages, AHelloHasMethodsAndPalettesOrTellsWhereTheyAre) {
+  json hello = json::parse(content(kGolden / "messages" / "hello.brief.notification.json")).at("params");
+  EXPECT_TRUE(from_json<Hello>(hello).has_value());
+  hello.erase("catalogue");
+  const auto refused = from_json<Hello>(hello);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().field, "methods");
+}
+
 TEST(GoldenMessages, CoverEveryMethodOfTheSchema) {
   const json methods = json::parse(content(fs::path(SPECTRA_PROTOCOL_DIR) / "schema" / "methods.json"));
   std::set<std::string> named;

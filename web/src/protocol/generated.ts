@@ -8,7 +8,11 @@ export type BeyondRange = "over" | "under";
  * @maxItems 3
  */
 export type Vector3 = [number, number, number];
-export type Channel = "fused" | "temperature" | "visible";
+export type ParameterKind = "number" | "integer" | "toggle" | "choice" | "temperature";
+/**
+ * number, integer, toggle (boolean), choice (string) or temperature (degC; null = automatic).
+ */
+export type ParameterValue = number | string | boolean | null;
 /**
  * r, g, b, sRGB-encoded, 0..255.
  *
@@ -16,6 +20,7 @@ export type Channel = "fused" | "temperature" | "visible";
  * @maxItems 3
  */
 export type Colour = [number, number, number];
+export type Channel = "fused" | "temperature" | "visible";
 /**
  * r, g, b.
  *
@@ -41,17 +46,12 @@ export type Vector31 = [number, number, number];
  * @maxItems 3
  */
 export type Vector32 = [number, number, number];
-/**
- * number, integer, toggle (boolean), choice (string) or temperature (degC; null = automatic).
- */
-export type ParameterValue = number | string | boolean | null;
 export type RangeMode = "auto" | "manual" | "percentile";
 /**
  * How vertices without temperature are shown: "visible" or a colour "#rrggbb".
  */
 export type MissingDisplay = string;
 export type UpAxis = "x" | "y" | "z" | "-x" | "-y" | "-z";
-export type ParameterKind = "number" | "integer" | "toggle" | "choice" | "temperature";
 export type QualityMode = "auto" | "manual";
 /**
  * Chosen by the client.
@@ -63,6 +63,7 @@ export interface ProtocolDefinitions {
   BeyondRange: BeyondRange;
   Bounds: Bounds;
   CameraSet: CameraSet;
+  Catalogue: Catalogue;
   Channel: Channel;
   Colour: Colour;
   ColourBytes: ColourBytes;
@@ -140,6 +141,78 @@ export interface CameraSet {
    * @maxItems 2
    */
   viewport: [number, number];
+}
+/**
+ * Body of GET /api/v1/catalogue: methods and palettes, the same for every viewer of a server.
+ */
+export interface Catalogue {
+  methods: MethodDescription[];
+  palettes: PaletteDescription[];
+}
+/**
+ * METHOD.
+ */
+export interface MethodDescription {
+  id: string;
+  label: string;
+  summary: string;
+  needs_temperature: boolean;
+  uses_palette: boolean;
+  /**
+   * A palette that is not fusion_safe loses temperature with this method.
+   */
+  wants_fusion_safe_palette: boolean;
+  params: ParameterDescription[];
+}
+/**
+ * One parameter of a method; enough to build its form. A bound that is absent is none.
+ */
+export interface ParameterDescription {
+  name: string;
+  label: string;
+  help: string;
+  kind: ParameterKind;
+  default: ParameterValue;
+  /**
+   * Smallest value, allowed itself.
+   */
+  min?: number;
+  /**
+   * Largest value, allowed itself.
+   */
+  max?: number;
+  /**
+   * Lower bound that is itself refused.
+   */
+  exclusive_min?: number;
+  /**
+   * A sensible slider step.
+   */
+  step?: number;
+  unit?: string;
+  /**
+   * Ids of a choice.
+   */
+  options?: string[];
+  /**
+   * Whether null = automatic is allowed; absent: it is not.
+   */
+  automatic?: boolean;
+}
+/**
+ * PALETTE.
+ */
+export interface PaletteDescription {
+  id: string;
+  label: string;
+  /**
+   * Carries temperature by hue alone.
+   */
+  fusion_safe: boolean;
+  /**
+   * Row 0 is the coldest.
+   */
+  colours: Colour[];
 }
 /**
  * An object of no known field.
@@ -260,8 +333,18 @@ export interface Hello {
    * null: no scene yet.
    */
   scene: SceneDescription | null;
-  methods: MethodDescription[];
-  palettes: PaletteDescription[];
+  /**
+   * Absent in the brief form.
+   */
+  methods?: MethodDescription[];
+  /**
+   * Absent in the brief form.
+   */
+  palettes?: PaletteDescription[];
+  /**
+   * Of the brief form only: where methods and palettes are, a path relative to the folder of /ws.
+   */
+  catalogue?: string;
   fusion: FusionState;
   quality: QualityState;
 }
@@ -361,71 +444,6 @@ export interface SceneNote {
    * One sentence for a person, with the count.
    */
   message: string;
-}
-/**
- * METHOD.
- */
-export interface MethodDescription {
-  id: string;
-  label: string;
-  summary: string;
-  needs_temperature: boolean;
-  uses_palette: boolean;
-  /**
-   * A palette that is not fusion_safe loses temperature with this method.
-   */
-  wants_fusion_safe_palette: boolean;
-  params: ParameterDescription[];
-}
-/**
- * One parameter of a method; enough to build its form. A bound that is absent is none.
- */
-export interface ParameterDescription {
-  name: string;
-  label: string;
-  help: string;
-  kind: ParameterKind;
-  default: ParameterValue;
-  /**
-   * Smallest value, allowed itself.
-   */
-  min?: number;
-  /**
-   * Largest value, allowed itself.
-   */
-  max?: number;
-  /**
-   * Lower bound that is itself refused.
-   */
-  exclusive_min?: number;
-  /**
-   * A sensible slider step.
-   */
-  step?: number;
-  unit?: string;
-  /**
-   * Ids of a choice.
-   */
-  options?: string[];
-  /**
-   * Whether null = automatic is allowed; absent: it is not.
-   */
-  automatic?: boolean;
-}
-/**
- * PALETTE.
- */
-export interface PaletteDescription {
-  id: string;
-  label: string;
-  /**
-   * Carries temperature by hue alone.
-   */
-  fusion_safe: boolean;
-  /**
-   * Row 0 is the coldest.
-   */
-  colours: Colour[];
 }
 /**
  * QUALITY: the knobs in force.

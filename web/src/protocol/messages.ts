@@ -36,7 +36,9 @@ export type FusionState = wire.FusionReply;
 export type FusionChange = wire.FusionChange;
 export type Quality = wire.QualityState;
 export type QualityChange = wire.QualityChange;
-export type Hello = Omit<wire.Hello, 'methods'> & { methods: Method[] };
+export type Catalogue = Omit<wire.Catalogue, 'methods'> & { methods: Method[] };
+/** With methods and palettes, or with where they are. */
+export type Hello = Omit<wire.Hello, 'methods' | 'palettes' | 'catalogue'> & (Catalogue | { catalogue: string });
 export type Histogram = wire.HistogramReply;
 export type Probe = wire.ProbeReply;
 export type Extreme = wire.Extreme;
@@ -142,7 +144,9 @@ export const quality: Decoder<Quality> = object({
   marks: boolean,
 });
 
-export const hello: Decoder<Hello> = object({
+export const catalogue: Decoder<Catalogue> = object({ methods: array(method), palettes: array(palette) });
+
+const helloWithoutCatalogue = object({
   protocol: oneOf('spectra.v1'),
   server: object({ name: string, version: string }),
   session_id: string,
@@ -154,11 +158,17 @@ export const hello: Decoder<Hello> = object({
     max_requests_per_s: number,
   }),
   scene: nullable(scene),
-  methods: array(method),
-  palettes: array(palette),
   fusion,
   quality,
 });
+
+export const hello: Decoder<Hello> = (value, path) => {
+  const { catalogue: address } = record(value, path);
+  return {
+    ...helloWithoutCatalogue(value, path),
+    ...(address === undefined ? catalogue(value, path) : { catalogue: string(address, `${path}.catalogue`) }),
+  };
+};
 
 export const fusionState: Decoder<FusionState> = object({ generation: count, fusion });
 

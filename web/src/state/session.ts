@@ -1,6 +1,6 @@
 import { DecodePool, Superseded } from '../decode/pool';
 import { takeDecodeWorker, takeSocket } from '../head_start';
-import { decodeTileFrame, type TileFrame } from '../protocol/frame';
+import { decodeTileFrame, FrameKind, type TileFrame } from '../protocol/frame';
 import {
   type CameraPose,
   type Extremes,
@@ -25,6 +25,7 @@ import type { Insets, UpAxis, View } from '../scene/first_view';
 import { FrameIntake } from '../scene/frame_intake';
 import { TileSet } from '../scene/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../scene/viewport';
+import { CatalogueLoader } from '../transport/catalogue_loader';
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost, RpcError } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
@@ -52,6 +53,7 @@ export class Session {
   readonly tiles: TileSet;
   readonly settings: Settings;
   readonly #connection: Connection;
+  readonly #catalogue: CatalogueLoader;
   readonly #qualitySender: Coalescer<QualityChange>;
   readonly #cameraSender: Coalescer<CameraPose>;
   readonly #histogramAsker: Coalescer<true>;
@@ -63,6 +65,8 @@ export class Session {
   readonly #markers: Markers;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   #connectionNumber = 0;
+  /** Where methods and palettes are; null when it is known, or being asked for. */
+  #catalogueAddress: string | null = null;
   /** Session whose server knows what the tile set claims. */
   #claimableSession: string | null = null;
   #isHovering = false;
@@ -75,7 +79,7 @@ export class Session {
   constructor(
     canvas: HTMLCanvasElement,
     readonly store: Store,
-    url: string,
+    private readonly url: string,
     drawing: { inWorker: boolean; onFailure: (message: string, everDrew: boolean) => void },
   ) {
     const events: ViewportEvents = {
@@ -148,6 +152,16 @@ export class Session {
       onInForce: () => this.#histogramAsker.push(true),
       onProblem: (error) => this.#say(error),
     });
+    this.#catalogue = new CatalogueLoader({
+      onLoaded: ({ methods, palettes }) => {
+        store.methods = methods;
+        store.palettes = palettes;
+        this.settings.catalogueCame();
+      },
+      onFailure: (failure) => {
+        store.catalogueFailure = failure;
+      },
+    });
     this.#qualitySender = new Coalescer({
       send: (change) => this.#sendQuality(change),
       merge: (earlier, later) => ({ ...earlier, ...later }),
@@ -184,6 +198,7 @@ export class Session {
     clearInterval(this.#ticker);
     clearTimeout(this.#nextPicture);
     this.#connection.stop();
+    this.#catalogue.dispose();
     this.#intake.dispose();
     this.#markers.dispose();
     this.tiles.clear();
@@ -280,6 +295,7 @@ export class Session {
 
   retryNow(): void {
     this.#connection.retryNow();
+    this.#catalogue.retryNow();
   }
 
   /** The pointer is over this place of the canvas; null when it has left. */
@@ -323,8 +339,16 @@ export class Session {
     this.#histogramAsker.reset();
 
     store.server = message;
-    store.methods = message.methods;
-    store.palettes = message.palettes;
+    if ('catalogue' in message) {
+      this.#catalogueAddress = new URL(message.catalogue, this.url.replace(/^ws/, 'http')).href;
+      // The first picture goes before it.
+      if (returning || message.scene === null) this.#askCatalogue();
+    } else {
+      this.#catalogueAddress = null;
+      this.#catalogue.wantNone();
+      store.methods = message.methods;
+      store.palettes = message.palettes;
+    }
     const before = this.settings.greeted(message.fusion, returning);
     store.quality = qualityBefore ?? message.quality;
     store.lostAt = null;
@@ -338,6 +362,12 @@ export class Session {
     void this.#subscribe(message, before, qualityBefore);
     // Before the stream, which is asked for at the end of this task at the earliest.
     this.#askMarks();
+  }
+
+  #askCatalogue(): void {
+    const address = this.#catalogueAddress;
+    this.#catalogueAddress = null;
+    if (address !== null) this.#catalogue.want(address);
   }
 
   #askMarks(): void {
@@ -395,6 +425,7 @@ export class Session {
         break;
       }
       case 'stream.complete':
+        this.#askCatalogue();
         this.#intake.completeAfterAll(streamComplete(params, method));
         break;
       case 'stream.stats':
@@ -488,6 +519,8 @@ export class Session {
       return;
     }
     this.#intake.receive(frame);
+    // The link is free while the first picture is decoded and drawn.
+    if (frame.kind !== FrameKind.geometry) this.#askCatalogue();
   }
 
   /** Brings decoded tiles into the picture. Returns true when the next one has work, too. */

@@ -224,6 +224,21 @@ describe('Settings', () => {
     expect(asked.at(-1)?.change).toEqual({ missing: '#808080' });
   });
 
+  it('says what has no temperature once the palettes are there', async () => {
+    const { store, settings, asked } = setUp();
+    store.scene = { temperature: { min: 1, max: 2 } } as unknown as NonNullable<Store['scene']>;
+    store.palettes = [];
+    settings.catalogueCame();
+    expect(asked).toEqual([]);
+    settings.setViewMode('thermal');
+    expect(asked.at(-1)?.change).toEqual({ method: 'thermal_only' });
+    await asked.at(-1)?.answer(1, { ...fusionWith(1, 'thermal_only'), missing: 'visible' });
+    const colours = Array.from({ length: 256 }, (_, i): [number, number, number] => [i, 0, 0]);
+    store.palettes = [{ id: 'iron', label: 'Iron', fusion_safe: true, colours }];
+    settings.catalogueCame();
+    expect(asked.at(-1)?.change).toEqual({ missing: '#808080' });
+  });
+
   it('holds the range where it is and lets it go again', async () => {
     const { settings, asked } = setUp();
     settings.toggleRangeLock();

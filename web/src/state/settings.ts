@@ -142,6 +142,14 @@ export class Settings {
     return before;
   }
 
+  /** Methods and palettes are there: what is said of vertices without temperature may have waited for them. */
+  catalogueCame(): void {
+    const { fusion } = this.store;
+    if (!this.#hasChosen || fusion === null) return;
+    const change = this.#missingFor(fusion.method, fusion.palette);
+    if (change.missing !== undefined) this.#change(change, true);
+  }
+
   /** Sends a change at once and takes in the answer; never rejects. */
   async send(change: FusionChange): Promise<void> {
     try {

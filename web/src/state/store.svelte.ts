@@ -17,6 +17,7 @@ import type {
 } from '../protocol/messages';
 import type { UpAxis } from '../scene/first_view';
 import type { DrawnError, TileCounts } from '../scene/tile_set';
+import type { CatalogueFailure } from '../transport/catalogue_loader';
 import type { LinkState } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
@@ -59,6 +60,8 @@ export class Store {
   scene = $state.raw<Scene | null | undefined>(undefined);
   methods = $state.raw<Method[]>([]);
   palettes = $state.raw<Palette[]>([]);
+  /** Why there are no methods and palettes, or only those of before. */
+  catalogueFailure = $state.raw<CatalogueFailure | null>(null);
   /** As the server last said it. */
   fusionInForce = $state.raw<Fusion | null>(null);
   generation = $state(0);
