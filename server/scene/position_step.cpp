@@ -39,10 +39,12 @@ constexpr std::size_t kVerticesToMerged = 5;
 constexpr double kReach = 0.25;
 constexpr double kTouch = 0.05;
 
-/// Balls of so many vertices are looked at, around every vertex (of more than the fewest: around every fourth) of cells that are
-/// thin; what they may reach beyond the cell, in parts of its longest side; and the change of a side that is left to them.
-constexpr std::array<std::size_t, 2> kBalls{50, 100};
-constexpr std::uint32_t kSeedsToLargerBall = 4;
+/// Balls around every vertex of cells that are thin are looked at: of so many vertices, and in so many steps up to those of so much the
+/// radius (squared; as many times the vertices, on a surface). What they may reach beyond the cell, in parts of its longest side; and the
+/// change of a side that is left to them.
+constexpr std::size_t kFewestOfBall = 50;
+constexpr std::size_t kRings = 14;
+constexpr float kLargestBall = 2.2F;
 constexpr double kBallReach = 0.8;
 constexpr double kMostSideChange = 0.095;
 constexpr int kRounds = 3;
@@ -220,13 +222,44 @@ class Pieces {
 
 }  // namespace
 
+namespace {
+
+/// The box of some vertices, as they are and as they are rounded.
+struct Extent {
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+  std::array<float, 3> low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  std::array<float, 3> rounded_low{low}, rounded_high{high};
+
+  void add(const std::array<float, 3>& place, const std::array<float, 3>& rounded) {
+    join({place, place, rounded, rounded});
+  }
+  void join(const Extent& other) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], other.low[axis]);
+      high[axis] = std::max(high[axis], other.high[axis]);
+      rounded_low[axis] = std::min(rounded_low[axis], other.rounded_low[axis]);
+      rounded_high[axis] = std::max(rounded_high[axis], other.rounded_high[axis]);
+    }
+  }
+  /// Whether a side changes by more than is left to it.
+  bool is_off() const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float side = high[axis] - low[axis], rounded_side = rounded_high[axis] - rounded_low[axis];
+      if (std::abs(rounded_side - side) > static_cast<float>(kMostSideChange) * side) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
 /// The vertices around a cell, seen from a corner of it.
 struct PositionSteps::Neighbourhood {
   std::array<float, 3> corner{};
   std::vector<std::uint32_t> points;
   std::vector<std::array<float, 3>> place, rounded;
   std::vector<float> distance;  ///< To a vertex of the cell, squared.
-  std::vector<std::uint32_t> near;
+  std::vector<std::uint32_t> near, ball;
   std::vector<float> near_distance;
 
   void resize(std::size_t count) {
@@ -234,6 +267,7 @@ struct PositionSteps::Neighbourhood {
     rounded.resize(count);
     distance.resize(count);
     near.resize(count);
+    ball.resize(count);
     near_distance.resize(count);
   }
 
@@ -646,37 +680,43 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
       const float x = p[0] - center[0], y = p[1] - center[1], z = p[2] - center[2];
       around.distance[n] = x * x + y * y + z * z;
     }
-    for (const std::size_t ball : kBalls) {
-      if (ball > count || (ball != kBalls.front() && seed % kSeedsToLargerBall != 0)) break;
-      // Among few, if it is about as large as the one before.
-      std::size_t near_count = around.gather(radius * (ball == kBalls.front() ? 1.5F : 4.0F));
-      if (near_count < ball) near_count = around.gather(kEverywhere);
-      const float ball_radius = around.radius_of(ball, near_count);
-      if (ball == kBalls.front()) radius = ball_radius;
+    if (count < kFewestOfBall) break;
+    // Among few, if it is about as large as the one before.
+    std::size_t near_count = around.gather(radius * 1.5F);
+    if (near_count < kFewestOfBall) near_count = around.gather(kEverywhere);
+    radius = around.radius_of(kFewestOfBall, near_count);
+    near_count = around.gather(radius * kLargestBall);
+    // What each ring between a ball and the next larger one adds to it.
+    const float ring_width = radius * (kLargestBall - 1) / kRings;
+    std::array<Extent, kRings + 1> rings{};
+    for (std::size_t n = 0; n < near_count; ++n) {
+      const std::uint32_t point = around.near[n];
+      const float beyond = around.distance[point] - radius;
+      const std::size_t ring =
+          beyond > 0 ? std::min(static_cast<std::size_t>(std::ceil(beyond / ring_width)), kRings) : 0;
+      rings[ring].add(around.place[point], around.rounded[point]);
+    }
+    Extent ball;
+    for (std::size_t ring = 0; ring <= kRings; ++ring) {
+      ball.join(rings[ring]);
+      if (!ball.is_off()) continue;
+      const float ball_radius = radius + static_cast<float>(ring) * ring_width;
       std::size_t kept = 0;
       for (std::size_t n = 0; n < near_count; ++n) {
         const std::uint32_t point = around.near[n];
-        around.near[kept] = point;
-        kept += around.distance[point] <= ball_radius ? 1u : 0u;
+        if (around.distance[point] <= ball_radius) around.ball[kept++] = point;
       }
-      keep_sides_of(around, std::span(around.near).first(kept), wanted);
+      keep_sides_of(around, std::span(around.ball).first(kept), wanted);
     }
   }
 }
 
 void PositionSteps::keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
                                   std::vector<StepHalvings>& wanted) {
-  constexpr float kFar = std::numeric_limits<float>::infinity();
   constexpr auto kMost = static_cast<float>(kMostSideChange);
-  std::array<float, 3> low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar}, rounded_low = low, rounded_high = high;
-  for (const std::uint32_t n : ball) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], around.place[n][axis]);
-      high[axis] = std::max(high[axis], around.place[n][axis]);
-      rounded_low[axis] = std::min(rounded_low[axis], around.rounded[n][axis]);
-      rounded_high[axis] = std::max(rounded_high[axis], around.rounded[n][axis]);
-    }
-  }
+  Extent extent;
+  for (const std::uint32_t n : ball) extent.add(around.place[n], around.rounded[n]);
+  const auto& [low, high, rounded_low, rounded_high] = extent;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float side = high[axis] - low[axis];
     const float at_low = low[axis] - rounded_low[axis], at_high = rounded_high[axis] - high[axis];

@@ -191,7 +191,7 @@ FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count) {
   const NearestPlaces places(before);
   const std::size_t stride = std::max<std::size_t>(1, before.size() / std::max<std::size_t>(1, seed_count));
   for (std::size_t seed = 0; seed < before.size(); seed += stride) {
-    for (const std::size_t count : {50u, 100u, 1000u}) {
+    for (const std::size_t count : {50u, 60u, 70u, 85u, 100u, 1000u}) {
       if (before.size() < count) break;
       // All that are as near as the last.
       auto ball = places.nearest(before[seed], 2 * count);
