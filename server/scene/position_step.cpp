@@ -691,9 +691,11 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
     std::array<Extent, kRings + 1> rings{};
     for (std::size_t n = 0; n < near_count; ++n) {
       const std::uint32_t point = around.near[n];
-      const float beyond = around.distance[point] - radius;
-      const std::size_t ring =
-          beyond > 0 ? std::min(static_cast<std::size_t>(std::ceil(beyond / ring_width)), kRings) : 0;
+      const float beyond = (around.distance[point] - radius) / ring_width;
+      // Where floats end it is no number.
+      const std::size_t ring = around.distance[point] <= radius ? 0
+                               : beyond < kRings                ? static_cast<std::size_t>(std::ceil(beyond))
+                                                                : kRings;
       rings[ring].add(around.place[point], around.rounded[point]);
     }
     Extent ball;
