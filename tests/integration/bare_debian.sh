@@ -20,13 +20,20 @@ if [ -e /etc/ssl/certs/ca-certificates.crt ]; then
   install -D /etc/ssl/certs/ca-certificates.crt "$root/etc/host-certificates.crt"
   printf 'cafile=/etc/host-certificates.crt\n' > "$root/root/.npmrc"
 fi
-if [ ! -e "$root/spectra" ]; then git clone -q "$source_root" "$root/spectra"; else git -C "$root/spectra" fetch -q origin HEAD && git -C "$root/spectra" reset -q --hard FETCH_HEAD; fi
+if [ ! -e "$root/spectra" ]; then git clone -q "$source_root" "$root/spectra"; else git -C "$root/spectra" fetch -q "$source_root" HEAD && git -C "$root/spectra" reset -q --hard FETCH_HEAD; fi
 for mount in proc sys dev dev/pts; do
   mountpoint -q "$root/$mount" || mount --rbind "/$mount" "$root/$mount"
   mount --make-rslave "$root/$mount"
 done
 mkdir -p "$root/dev/shm"
-trap 'for mount in dev/pts dev sys proc; do umount -lR "$root/$mount" 2>/dev/null || true; done' EXIT
+server=
+finish() {
+  # All that run.sh started: a group of its own, of which it is the leader.
+  if [ -n "$server" ]; then kill -TERM -- "-$server" 2>/dev/null || true; fi
+  for mount in dev/pts dev sys proc; do umount -lR "$root/$mount" 2>/dev/null || true; done
+}
+trap finish EXIT
+trap 'exit 130' INT TERM
 bare() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 chroot "$root" "$@"; }
 
 if [ "$what" = test ]; then
@@ -41,9 +48,11 @@ if [ "$what" = workstation ] && [ ! -e "$folder/packages_before.txt" ]; then
 fi
 
 # run.sh ends in the server itself, so this id is the server's.
+set -m
 (exec env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 \
   chroot "$root" /spectra/deploy/run.sh --listen 127.0.0.1:0) > "$folder/out.txt" &
 server=$!
+set +m
 for _ in $(seq 1 5400); do
   url=$(grep -om1 'http://127[^ ]*' "$folder/out.txt" 2>/dev/null || true)
   [ -n "$url" ] && break
@@ -54,8 +63,9 @@ for _ in $(seq 1 60); do curl -fsS "$url/readyz" > /dev/null 2>&1 && break; slee
 curl -fsS "$url/api/v1/scene"
 curl -fsS "$url/" | grep -qi '<!doctype html>'
 echo "served at $url"
-kill -TERM $server
-wait $server || true
+kill -TERM "$server"
+wait "$server" || true
+server=
 
 [ "$what" = workstation ] || exit 0
 packages > "$folder/packages_after.txt"
