@@ -36,7 +36,7 @@ constexpr std::size_t kVerticesToMerged = 5;
 
 /// How far the needs of a cell reach beyond it, in parts of its longest side. Those of what is much closer together than the usual
 /// step reach to the next vertices; others to what the cell touches, and with one halving less to the next vertices.
-constexpr double kReach = 0.25;
+constexpr double kReach = 0.2;
 constexpr double kTouch = 0.05;
 
 /// Balls around every vertex of cells that are thin are looked at: of so many vertices, and in so many steps up to those of so much the
@@ -46,7 +46,7 @@ constexpr std::size_t kFewestOfBall = 50;
 constexpr std::size_t kRings = 14;
 constexpr float kLargestBall = 2.2F;
 constexpr double kBallReach = 0.8;
-constexpr double kMostSideChange = 0.095;
+constexpr double kMostSideChange = 0.0985;
 constexpr int kRounds = 3;
 
 /// What is thinner beside its breadth is flat.

@@ -27,7 +27,7 @@ void measure(const std::string& path, std::size_t seed_count) {
   WorkerPool pool(2);
   const auto scene =
       SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
-  std::size_t root_bytes = 0, leaf_bytes = 0, bytes = 0, uniform_leaf_bytes = 0;
+  std::size_t root_bytes = 0, leaf_bytes = 0, bytes = 0, uniform_bytes = 0, uniform_leaf_bytes = 0;
   for (const auto& tile : scene->tiles()) {
     const auto geometry = encoded_tile(*tile, scene->suggested_position_step_m(), 7);
     if (!geometry) {
@@ -35,22 +35,27 @@ void measure(const std::string& path, std::size_t seed_count) {
       std::exit(1);
     }
     const std::size_t size = geometry.value().payload->size();
+    Tile uniform = *tile;
+    uniform.step_halvings.clear();
+    const std::size_t uniform_size =
+        encoded_tile(uniform, scene->suggested_position_step_m(), 7).value().payload->size();
     bytes += size;
+    uniform_bytes += uniform_size;
     if (tile->child_mask == 0) {
       leaf_bytes += size;
-      Tile uniform = *tile;
-      uniform.step_halvings.clear();
-      uniform_leaf_bytes += encoded_tile(uniform, scene->suggested_position_step_m(), 7).value().payload->size();
+      uniform_leaf_bytes += uniform_size;
     }
     if (tile->id.level == 0) root_bytes += size;
   }
   const testing::FormReport form = testing::form_of(*scene, seed_count);
   std::printf(
-      "%-30s step %-11.6g geometry: leaves %8zu (%.3f of one step) all %8zu root %6zu | pieces %5zu: flattened %zu, "
+      "%-30s step %-11.6g geometry: leaves %8zu (%.3f of one step) all %8zu (%.3f) root %6zu | pieces %5zu: flattened "
+      "%zu, "
       "merged %zu | "
       "patches %6zu: flattened %zu, merged %zu, worst side %.3f | torn %zu\n",
       name.c_str(), static_cast<double>(scene->suggested_position_step_m()), leaf_bytes,
-      static_cast<double>(leaf_bytes) / static_cast<double>(uniform_leaf_bytes), bytes, root_bytes, form.piece_count,
+      static_cast<double>(leaf_bytes) / static_cast<double>(uniform_leaf_bytes), bytes,
+      static_cast<double>(bytes) / static_cast<double>(uniform_bytes), root_bytes, form.piece_count,
       form.flattened_piece_count, form.merged_piece_count, form.patch_count, form.flattened_patch_count,
       form.merged_patch_count, form.worst_side_change, form.torn_count);
 }
