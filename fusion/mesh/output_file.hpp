@@ -21,6 +21,8 @@ class OutputFile {
   OutputFile& operator=(OutputFile&& other) noexcept;
 
   Result<void> write(std::span<const std::byte> bytes);
+  /// Where the bytes stand until commit(), for those who write them by other means; empty when it is written directly.
+  const std::filesystem::path& unfinished() const { return temporary_; }
   /// After this the file is there, and stays there through a power cut.
   Result<void> commit();
   /// The same for files that belong together: all are written out first, then put in place one right after the other.

@@ -57,6 +57,11 @@ struct TradeoffCommandOptions {
   fusion::ReadOptions read;
 };
 
+struct StoreSalvageOptions {
+  std::filesystem::path store;
+  std::filesystem::path output;  ///< Must not be there yet.
+};
+
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
 int run_fuse(const FuseOptions& options);
@@ -64,6 +69,8 @@ int run_info(const InfoOptions& options);
 int run_methods(bool as_json);
 int run_demo_scene(const DemoSceneFileOptions& options);
 int run_tradeoff(const TradeoffCommandOptions& options);
+int run_store_check(const std::filesystem::path& store);
+int run_store_salvage(const StoreSalvageOptions& options);
 
 /// Parses the arguments, runs the command, returns the exit status. Catches everything.
 int run_program(int argc, const char* const* argv);

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <new>
 #include <string>
@@ -134,6 +135,18 @@ void add_tradeoff(CLI::App& app, TradeoffCommandOptions& options, Run& run) {
   command->final_callback([&options, &run] { run = [&options] { return run_tradeoff(options); }; });
 }
 
+void add_store(CLI::App& app, std::filesystem::path& checked, StoreSalvageOptions& salvage, Run& run) {
+  auto* command = app.add_subcommand("store", "Check or rescue the file of serve --store");
+  command->require_subcommand(1);
+  auto* check = command->add_subcommand("check", "Read the whole file and say whether everything is as it was put");
+  check->add_option("file", checked, "The store")->required();
+  check->final_callback([&checked, &run] { run = [&checked] { return run_store_check(checked); }; });
+  auto* rescue = command->add_subcommand("salvage", "Write all that can be read of a damaged store into a new one");
+  rescue->add_option("file", salvage.store, "The store; it is not changed")->required();
+  rescue->add_option("new", salvage.output, "The new store, a file that is not there yet")->required();
+  rescue->final_callback([&salvage, &run] { run = [&salvage] { return run_store_salvage(salvage); }; });
+}
+
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
   app.set_version_flag("--version", "spectra " + std::string(kVersion));
@@ -148,6 +161,8 @@ int parse_and_run(int argc, const char* const* argv) {
   bool methods_as_json = false;
   DemoSceneFileOptions demo_scene;
   TradeoffCommandOptions tradeoff;
+  std::filesystem::path checked_store;
+  StoreSalvageOptions salvage;
   Run run;
   bool is_demo = false;  // what is served without a scene anyway
   add_serve(app, serve, is_demo, run);
@@ -156,10 +171,14 @@ int parse_and_run(int argc, const char* const* argv) {
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);
   add_tradeoff(app, tradeoff, run);
+  add_store(app, checked_store, salvage, run);
   bool is_quiet = false;
   constexpr auto* kQuietHelp = "No progress on the terminal";
   app.add_flag("--quiet", is_quiet, kQuietHelp);
-  for (auto* command : app.get_subcommands({})) command->add_flag("--quiet", is_quiet, kQuietHelp);
+  for (auto* command : app.get_subcommands({})) {
+    command->add_flag("--quiet", is_quiet, kQuietHelp);
+    for (auto* part : command->get_subcommands({})) part->add_flag("--quiet", is_quiet, kQuietHelp);
+  }
   // CLI11 would say that a command is missing, but not which word it did not know.
   const auto is_first_word = [argc, argv](const CLI::App* command) {
     return argc > 1 && command->get_name() == argv[1];

@@ -2,24 +2,12 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <ctime>
 #include <iterator>
 #include <set>
 
+#include "server/store/time_text.hpp"
+
 namespace spectra::store {
-namespace {
-
-std::string utc_text(StoreTime time) {
-  const std::time_t seconds = std::chrono::floor<std::chrono::seconds>(time).time_since_epoch().count();
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  std::string text(32, '\0');
-  text.resize(std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts));
-  return text;
-}
-
-}  // namespace
-
 Catalogue::Catalogue(std::vector<Change> changes, Revision last_revision, Revision history_floor,
                      StoreTime history_floor_at)
     : last_revision_(last_revision), history_floor_(history_floor), history_floor_at_(history_floor_at) {

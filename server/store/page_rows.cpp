@@ -104,7 +104,7 @@ ChecksummedBytes checksummed_bytes(std::string_view record) {
 BlobPlace only_blob(const PageRow& row) {
   const auto blobs = blobs_of(row.local);
   if (!blobs || blobs->count != 1 || blobs->offset + blobs->sizes[0] != row.record_bytes) return {};
-  return {blobs->offset, blobs->sizes[0]};
+  return {true, blobs->offset, blobs->sizes[0]};
 }
 
 bool is_right(RowKind kind, std::uint64_t number, const ChecksummedBytes& row) {

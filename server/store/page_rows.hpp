@@ -31,8 +31,9 @@ struct ChecksummedBytes {
 };
 ChecksummedBytes checksummed_bytes(std::string_view record);
 
-/// Where the blob of a record (number, bytes) begins, and how long it is; a length of 0 when it is no such record.
+/// Where the blob of a record (number, bytes) begins, and how long it is.
 struct BlobPlace {
+  bool is_one = false;  ///< Whether it is such a record.
   std::uint64_t offset = 0;
   std::uint64_t size = 0;
 };

@@ -84,24 +84,25 @@ StoreError StoreFile::damage(const std::string& what) const {
   return {StoreErrorCode::Damaged, path_ + " is damaged: " + what + kSalvage};
 }
 
+StoreResult<void> StoreFile::make(const std::string& path, const std::string& vfs) {
+  BOOST_OUTCOME_TRY(auto connection, Connection::open(path, Connection::Access::ReadWrite, vfs));
+  const std::string pages = "PRAGMA page_size=" + std::to_string(kPageBytes) + "; PRAGMA auto_vacuum=INCREMENTAL;";
+  BOOST_OUTCOME_TRYV(connection->run(pages.c_str()));
+  BOOST_OUTCOME_TRYV(connection->run(kSettings));
+  BOOST_OUTCOME_TRYV(connection->run("PRAGMA journal_mode=WAL;"));
+  BOOST_OUTCOME_TRYV(connection->run(kMaking));
+  BOOST_OUTCOME_TRY(auto set_state, connection->prepare(kSetState));
+  BOOST_OUTCOME_TRYV(write_state(set_state, StoreState{}));
+  return connection->run("COMMIT");
+}
+
 StoreResult<void> StoreFile::create(const std::string& path, const std::string& vfs) {
   const std::string making = path + ".new-" + std::to_string(::getpid());
   const auto remove = [&making] {
     for (const char* suffix : {"", "-wal", "-journal", "-shm"}) ::unlink((making + suffix).c_str());
   };
   remove();
-  const auto make = [&]() -> StoreResult<void> {
-    BOOST_OUTCOME_TRY(auto connection, Connection::open(making, Connection::Access::ReadWrite, vfs));
-    const std::string pages = "PRAGMA page_size=" + std::to_string(kPageBytes) + "; PRAGMA auto_vacuum=INCREMENTAL;";
-    BOOST_OUTCOME_TRYV(connection->run(pages.c_str()));
-    BOOST_OUTCOME_TRYV(connection->run(kSettings));
-    BOOST_OUTCOME_TRYV(connection->run("PRAGMA journal_mode=WAL;"));
-    BOOST_OUTCOME_TRYV(connection->run(kMaking));
-    BOOST_OUTCOME_TRY(auto set_state, connection->prepare(kSetState));
-    BOOST_OUTCOME_TRYV(write_state(set_state, StoreState{}));
-    return connection->run("COMMIT");
-  };
-  auto made = make();
+  auto made = make(making, vfs);
   if (made) made = sync(making, 0);
   if (made && ::link(making.c_str(), path.c_str()) != 0 && errno != EEXIST) {
     // A file system without links.
@@ -166,13 +167,34 @@ StoreResult<std::unique_ptr<StoreFile>> StoreFile::open(const std::string& given
     return failure(
         file->damage("its log " + path + "-wal has a bad place, and changes that were acknowledged behind it"));
   }
+  if (file->state_.is_open && !log.exists) {
+    return store::failure(
+        StoreErrorCode::Damaged,
+        path + " was not closed in order, and its log " + path +
+            "-wal is missing; bring the log back, or take what is in the file alone by spectra store salvage FILE NEW");
+  }
   if (!options.is_read_only) {
     file->connection_->keep_log(false);
     BOOST_OUTCOME_TRYV(file->prepare());
+    // A disk that is full now keeps nobody from looking at the map.
+    (void)file->mark(true);
   } else {
     BOOST_OUTCOME_TRYV(file->connection_->run("PRAGMA query_only=ON"));
   }
   return file;
+}
+
+StoreFile::~StoreFile() {
+  if (statements_) (void)mark(false);
+}
+
+StoreResult<void> StoreFile::mark(bool is_open) {
+  StoreState next = state_;
+  ++next.commit;
+  next.is_open = is_open;
+  BOOST_OUTCOME_TRYV(write_state(statements_->set_state, next));
+  state_ = next;
+  return is_open ? checkpoint() : success();
 }
 
 StoreResult<void> StoreFile::recognise() {
@@ -385,7 +407,8 @@ StoreResult<bool> StoreFile::give_back() {
   return true;
 }
 
-StoreResult<std::vector<std::string>> StoreFile::check(const Catalogue& catalogue) {
+StoreResult<std::vector<std::string>> StoreFile::check(const Catalogue& catalogue,
+                                                       const std::function<void(double)>& progress) {
   std::vector<std::string> wrong;
   BOOST_OUTCOME_TRY(auto select, connection_->prepare("PRAGMA integrity_check"));
   for (;;) {
@@ -394,6 +417,7 @@ StoreResult<std::vector<std::string>> StoreFile::check(const Catalogue& catalogu
     if (select.bytes(0) != "ok") wrong.emplace_back(select.bytes(0));
   }
   for (const auto& [revision, change] : catalogue.changes()) {
+    progress(static_cast<double>(revision) / static_cast<double>(catalogue.last_revision()));
     if (change.is_removal) continue;
     const auto bytes = read(change.facts);
     if (!bytes) wrong.push_back(bytes.error().message);

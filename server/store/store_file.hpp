@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,12 +28,19 @@ class StoreFile {
  public:
   struct Options {
     bool is_read_only = false;  ///< Nothing is written; the file must be there.
-    std::string vfs;            ///< SQLite's name of a file system, empty for the usual one.
+    std::string vfs = {};       ///< SQLite's name of a file system, empty for the usual one.
   };
 
+  /// Makes an empty store in a file that is empty or not there. Not whole when it fails.
+  static StoreResult<void> make(const std::string& path, const std::string& vfs);
   /// Opens the file for itself alone, makes it where there is none (whole or not at all), reads all rows but the blocks' bytes
   /// and believes none that is not proven. Every way a file can be refused is in the message.
   static StoreResult<std::unique_ptr<StoreFile>> open(const std::string& path, const Options& options);
+
+  /// The file is whole without its log after this.
+  ~StoreFile();
+  StoreFile(const StoreFile&) = delete;
+  StoreFile& operator=(const StoreFile&) = delete;
 
   /// As it was when the file was opened. To be taken once.
   Catalogue take_catalogue() { return std::move(catalogue_); }
@@ -50,8 +58,8 @@ class StoreFile {
   /// Bytes of the log since the last checkpoint.
   std::uint64_t log_bytes() const;
 
-  /// Looks at every page and every block's bytes. What is wrong, in sentences; empty: nothing.
-  StoreResult<std::vector<std::string>> check(const Catalogue& catalogue);
+  /// Looks at every page and every block's bytes. What is wrong, in sentences; empty: nothing. `progress` is told the share done.
+  StoreResult<std::vector<std::string>> check(const Catalogue& catalogue, const std::function<void(double)>& progress);
 
  private:
   struct Statements {
@@ -64,6 +72,8 @@ class StoreFile {
   StoreResult<void> recognise();
   StoreResult<void> load();
   StoreResult<void> prepare();
+  /// Writes whether the file is in use, so that it is missed when its log gets lost.
+  StoreResult<void> mark(bool is_open);
   StoreResult<void> write_rows(const Transaction& transaction, StoreState& next);
   StoreError damage(const std::string& what) const;
 

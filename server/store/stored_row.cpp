@@ -167,6 +167,7 @@ std::optional<Constant> decode_constant(std::string_view bytes) {
 std::string encode(const StoreState& state) {
   Writer writer;
   writer.integer(state.commit);
+  writer.integer(state.is_open ? 1 : 0);
   writer.integer(state.last_revision);
   writer.integer(state.history_floor);
   writer.time(state.history_floor_at);
@@ -179,6 +180,7 @@ std::optional<StoreState> decode_state(std::string_view bytes) {
   Reader reader(bytes);
   StoreState state;
   state.commit = reader.integer();
+  state.is_open = reader.integer() != 0;
   state.last_revision = reader.integer();
   state.history_floor = reader.integer();
   state.history_floor_at = reader.time();

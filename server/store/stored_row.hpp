@@ -46,6 +46,7 @@ std::optional<Constant> decode_constant(std::string_view bytes);
 /// Says what else must be there, so that a row that went missing is missed.
 struct StoreState {
   std::uint64_t commit = 0;  ///< Counts transactions.
+  bool is_open = false;      ///< Not closed in order since: a log must be beside the file.
   Revision last_revision = 0;
   Revision history_floor = 0;   ///< The map is known as it was at this revision and after.
   StoreTime history_floor_at;   ///< When that was accepted.

@@ -70,7 +70,7 @@ StoreResult<WriteAheadLog> read_log(const std::string& file) {
   sum.add(header.substr(0, 24));
   log.has_right_header = (word(header, 0) & ~std::uint32_t{1}) == kMagic && word(header, 8) == kPageBytes &&
                          sum.is(word(header, 24), word(header, 28));
-  const auto salts = header.substr(16, 8);
+  std::string salts(header.substr(16, 8));
 
   std::string bytes(kFrameHeaderBytes + kPageBytes, '\0');
   const std::string_view frame(bytes);
@@ -78,13 +78,15 @@ StoreResult<WriteAheadLog> read_log(const std::string& file) {
   bool is_right = log.has_right_header;
   for (std::uint64_t offset = kHeaderBytes; stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
        offset += bytes.size()) {
+    // Frames of an earlier round of the log may follow; the first is of the newest.
+    if (!log.has_right_header && offset == kHeaderBytes) salts = frame.substr(8, 8);
     const bool is_of_this_log = frame.substr(8, 8) == salts;
     if (is_right) {
       sum.add(frame.substr(0, 8));
       sum.add(frame.substr(kFrameHeaderBytes));
       is_right = is_of_this_log && word(frame, 0) != 0 && sum.is(word(frame, 16), word(frame, 20));
     }
-    if (!is_of_this_log && log.has_right_header) continue;
+    if (!is_of_this_log) continue;
     log.beyond.push_back({word(frame, 0), offset + kFrameHeaderBytes});
     if (is_right && word(frame, 4) != 0) committed = log.beyond.size();
     if (!is_right)

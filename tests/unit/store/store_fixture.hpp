@@ -19,9 +19,10 @@ namespace spectra::store {
 /// calls, not about the speed of a disk.
 class StoreFixture {
  public:
-  StoreFixture() {
-    const auto parent =
-        ::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path();
+  StoreFixture()
+      : StoreFixture(::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm")
+                                                     : std::filesystem::temp_directory_path()) {}
+  explicit StoreFixture(const std::filesystem::path& parent) {
     std::string pattern = (parent / "spectra-store-XXXXXX").string();
     folder_ = ::mkdtemp(pattern.data());
   }
