@@ -136,7 +136,7 @@ void add_tradeoff(CLI::App& app, TradeoffCommandOptions& options, Run& run) {
 }
 
 void add_store(CLI::App& app, std::filesystem::path& checked, StoreSalvageOptions& salvage, Run& run) {
-  auto* command = app.add_subcommand("store", "Check or rescue the file of serve --store");
+  auto* command = app.add_subcommand("store", "Check or rescue the store of a map");
   command->require_subcommand(1);
   auto* check = command->add_subcommand("check", "Read the whole file and say whether everything is as it was put");
   check->add_option("file", checked, "The store")->required();
