@@ -1,16 +1,17 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vitest/config';
+import { leanThree } from './scripts/lean_three';
 import { precompressed } from './scripts/precompressed';
 import { programPreload } from './scripts/program_preload';
 
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [svelte(), programPreload(), precompressed()],
+  plugins: [leanThree(), svelte(), programPreload(), precompressed()],
   base: './',
   // One style sheet and plain imports: the page itself says what is to be loaded early.
   build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0, cssCodeSplit: false, modulePreload: false },
-  worker: { format: 'es' },
+  worker: { format: 'es', plugins: () => [leanThree()] },
   // By number: a machine without /etc/hosts does not know "localhost".
   server: {
     host: '127.0.0.1',

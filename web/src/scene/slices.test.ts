@@ -54,4 +54,11 @@ describe('SlicePace', () => {
   it('draws at once what a fast machine draws at once', () => {
     expect(longest(560_000, 100_000).parts).toBe(1);
   });
+
+  it('learns nothing from pictures of nothing, however long the machine takes for them', () => {
+    const pace = new SlicePace();
+    const { budget } = pace;
+    for (let i = 0; i < 5; i += 1) pace.took(0, 500);
+    expect(pace.budget).toBe(budget);
+  });
 });

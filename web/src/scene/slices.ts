@@ -51,6 +51,8 @@ export class SlicePace {
 
   /** So many took so long, until the GPU was through with them. */
   took(count: number, ms: number): void {
+    // A picture of nothing tells what clearing takes.
+    if (count === 0) return;
     const wanted = (count * SLICE_MS) / Math.max(1, ms);
     // A small rest of a picture tells that a larger part takes longer, not how much.
     if (count < this.#budget && wanted < this.#budget && ms < SLICE_MS) return;

@@ -337,7 +337,9 @@ export class Viewport {
     const elapsed_s = Math.min(0.1, (now - this.#lastFrameAt) / 1000);
     // A picture at rest is given up for the first one of a movement: only those while moving hold each other up.
     const undrawn = [...this.#notches.values()].filter((notch) => !this.#isMoving || notch !== null).length;
-    if (undrawn >= MOST_UNDRAWN && (this.#isMoving || !this.#controls.active)) {
+    // The first one is not given up for what comes next: on a slow machine there would be none for as long as tiles come.
+    const isFirst = this.#firstPicture !== null && this.#sent >= this.#firstPicture && !this.#isMoving;
+    if ((isFirst || undrawn >= MOST_UNDRAWN) && (this.#isMoving || !this.#controls.active)) {
       this.#isHeldUp = true;
       return;
     }
