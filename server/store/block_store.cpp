@@ -6,6 +6,7 @@
 #include <future>
 #include <map>
 #include <mutex>
+#include <new>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -197,8 +198,12 @@ void BlockStore::State::write(std::vector<Order> batch) {
   const bool is_empty = changes.empty() && transaction.constants.empty();
   StoreResult<void> written = success();
   if (!is_empty) {
-    transaction.plan = catalogue.plan(std::move(changes), options.history_bytes);
-    written = file->write(transaction);
+    try {
+      transaction.plan = catalogue.plan(std::move(changes), options.history_bytes);
+      written = file->write(transaction);
+    } catch (const std::bad_alloc&) {
+      written = store::failure(StoreErrorCode::IoError, "the store has no memory left for what was to be written");
+    }
   }
   if (!written && batch.size() > 1 && written.error().code == StoreErrorCode::DiskFull) {
     // What is too much together may go in part.
@@ -249,7 +254,12 @@ void BlockStore::State::serve(const Reading& reading) {
         "there is no block of revision " + std::to_string(reading.revision) + ", or it is no longer kept"));
     return;
   }
-  auto bytes = file->read(*facts);
+  StoreResult<SharedBytes> bytes = store::failure(StoreErrorCode::IoError, "there is no memory for the block");
+  try {
+    bytes = file->read(*facts);
+  } catch (const std::bad_alloc&) {
+    // As said.
+  }
   if (bytes) {
     reading.on_done(StoredBlock{*facts, std::move(bytes).value()});
   } else {

@@ -325,6 +325,10 @@ StoreResult<void> StoreFile::write(const Transaction& transaction) {
     return checksum;
   };
   const auto write_all = [&]() -> StoreResult<void> {
+    // One that an exception left open.
+    if (connection_->is_in_transaction()) {
+      BOOST_OUTCOME_TRYV(connection_->run("ROLLBACK"));
+    }
     BOOST_OUTCOME_TRYV(connection_->run("BEGIN IMMEDIATE"));
     // Rows go first, so that new ones take their pages.
     for (const Revision revision : plan.dropped) {

@@ -158,6 +158,8 @@ TEST(StoreDamage, IsRefusedOrHarmlessAndSalvagedWithoutAWrongBlock) {
     if (!opening) {
       ++refused;
       EXPECT_FALSE(opening.error().message.empty());
+      EXPECT_TRUE(content_of(here.file()) == file && content_of(here.file() + "-wal") == log)
+          << "a refusal changes nothing";
       EXPECT_NE(opening.error().code, StoreErrorCode::IoError) << opening.error().message;
       if (report && report.value().lost.empty()) {
         EXPECT_EQ(found, killed.blocks) << opening.error().message;
