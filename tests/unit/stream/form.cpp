@@ -121,9 +121,8 @@ Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place
   std::array<double, 3> sorted = side;
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double float_spacing = std::ldexp(1, std::ilogb(far[axis]) - 23);
-    if (side[axis] == 0 ? rounded_side[axis] == 0
-                        : side[axis] < sorted[1] / 4096 || (far[axis] > 0 && side[axis] <= 8 * float_spacing))
+    const double float_spacing = far[axis] > 0 ? std::ldexp(1, std::ilogb(far[axis]) - 23) : 0;
+    if (side[axis] == 0 ? rounded_side[axis] == 0 : side[axis] < sorted[1] / 4096 || side[axis] <= 8 * float_spacing)
       continue;
     loss.side_change = std::max(loss.side_change, std::abs(rounded_side[axis] - side[axis]) / side[axis]);
   }
