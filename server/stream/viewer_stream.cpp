@@ -126,7 +126,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     std::uint32_t generation = 0;
     change([&] {
       generation = ++generation_;
-      demand_.plan_identity = cache_->plan_identity(*shared_plan, scene_);
+      demand_.plan_identity = cache_->plan_identity(*shared_plan, scene_->reference_temperature());
       demand_.plan = std::move(shared_plan);
       ++demand_.colour_epoch;
       is_complete_due_ = true;
@@ -364,8 +364,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const bool is_slow = rate > 0 && !is_quick;
     demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
     order_.choose(tiles_, chosen, is_quick ? 0 : kPreviewShare * vertices);
-    remove_outdated();
     remove_surplus();
+    remove_outdated();
   }
 
   // Beneath tiles that have become fine enough when they had their colours already.

@@ -187,9 +187,19 @@ void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {
 void ViewerTiles::remove_outdated_beneath(const TileSlot& slot, const Demand& demand) {
   for (const std::size_t child : tree_.nodes()[slot.node].children) {
     TileSlot& outdated = *slots_[child];
-    if (outdated.held_name != 0 && outdated.held_colour_epoch != demand.colour_epoch) remove_from_viewer(outdated);
+    const bool is_outdated = outdated.held_name != 0 && outdated.held_colour_epoch != demand.colour_epoch;
+    if (is_outdated && !is_covered(outdated, demand)) remove_from_viewer(outdated);
     remove_outdated_beneath(outdated, demand);
   }
+}
+
+bool ViewerTiles::is_covered(const TileSlot& slot, const Demand& demand) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
+    const TileSlot& child = *slots_[index];
+    const bool is_current = child.is_drawable() && child.held_colour_epoch == demand.colour_epoch;
+    return is_current || is_covered(child, demand);
+  });
 }
 
 TileFrameHeader ViewerTiles::take_removal() {

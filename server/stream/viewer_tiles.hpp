@@ -98,7 +98,8 @@ class ViewerTiles {
   /// takes at most so many bytes, decoded.
   void remove_surplus(std::uint64_t most_bytes);
   /// A viewer draws the children of a tile in its place when it has them all, whatever colours they have. Beneath a tile
-  /// that now shows newer colours than they do, and that is fine enough, they would stay in front of it for good.
+  /// that now shows newer colours than they do, and that is fine enough, they would stay in front of it for good. Those of which
+  /// nothing is drawn, because tiles beneath them have the newest colours, stay: without them the viewer would not draw these.
   void remove_outdated_beneath(const TileSlot& slot, const Demand& demand);
 
   bool has_removals() const { return !removals_.empty(); }
@@ -108,6 +109,8 @@ class ViewerTiles {
  private:
   static std::size_t prepared_size(const TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;
+  /// All of it is drawn by tiles beneath that have the newest colours.
+  bool is_covered(const TileSlot& slot, const Demand& demand) const;
   bool hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand, const FrameCache::State& cache);
   void abandon(TileSlot& slot);
   void push_removal(protocol::TileId tile, std::uint32_t revision);

@@ -103,6 +103,21 @@ TEST_F(ViewerStreamView, OutdatedTilesDoNotStayInFrontOfNewerOnes) {
   expect_view(viewer, near, 0.6);
 }
 
+TEST_F(ViewerStreamView, OutdatedTilesStayBetweenTilesThatAreNot) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  show(viewer, 0.6);
+  viewer.complete();
+  ASSERT_EQ(viewer.tiles.at({1, 0, 0, 0}).generation, 1U) << "its children take its place";
+  viewer.stream().set_camera(camera_over(2, 2, 5000));
+  wait_until_idle(pool_);
+  viewer.take();
+  EXPECT_TRUE(viewer.tiles.contains({1, 0, 0, 0}));
+  EXPECT_EQ(drawn(viewer).size(), 16U) << "the finest, in the newest colours";
+}
+
 TEST_F(ViewerStreamView, OutdatedTilesGoWhenACoarserOneThatIsNewerBecomesFineEnough) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe({});
