@@ -32,8 +32,9 @@ constexpr std::size_t kMaxWaiting = 512;
 /// The statuses that are notes on the scene: this and the note's id.
 const std::string kNotePrefix = "scene.";
 
+/// What settings are prepared with.
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
-  return scene ? scene->temperature() : fusion::SceneTemperature{};
+  return scene ? *scene->reference_temperature() : fusion::SceneTemperature{};
 }
 
 /// The error side of an answer.
@@ -55,7 +56,8 @@ std::optional<double> if_positive(double value) {
 struct ViewerSession::Preparation {
   std::shared_ptr<const SceneSnapshot> scene;
   bool is_new_scene = false;
-  bool is_first_view = false;  ///< The viewer has changed nothing yet.
+  bool has_new_temperatures = false;  ///< The new scene asks for another plan.
+  bool is_first_view = false;         ///< The viewer has changed nothing yet.
   fusion::FusionSettings settings;
   std::vector<FusionRequest> requests;
 
@@ -66,7 +68,7 @@ struct ViewerSession::Preparation {
 
   void run() {
     const auto temperature = temperature_of(scene);
-    if (is_new_scene) {
+    if (has_new_temperatures) {
       if (is_first_view) settings = fusion::first_view_settings(temperature.summary);
       auto prepared = fusion::FusionPlan::prepare(settings, temperature);
       if (!prepared) {
@@ -380,6 +382,9 @@ void ViewerSession::start_preparation() {
   const auto preparation = std::make_shared<Preparation>();
   preparation->is_new_scene = coming_scene_ != nullptr;
   preparation->scene = coming_scene_ ? std::exchange(coming_scene_, nullptr) : scene_;
+  preparation->has_new_temperatures =
+      preparation->is_new_scene &&
+      (!scene_ || scene_->reference_temperature() != preparation->scene->reference_temperature());
   preparation->is_first_view = is_first_view_;
   preparation->settings = plan_->settings();
   preparation->requests = std::exchange(waiting_, {});
@@ -405,15 +410,16 @@ void ViewerSession::start_preparation() {
 void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
   is_preparing_ = false;
   is_first_view_ = preparation->is_first_view;
-  if (preparation->is_new_scene && preparation->plan) {
+  const bool is_taken = preparation->is_new_scene && (preparation->plan || !preparation->has_new_temperatures);
+  if (is_taken) {
     scene_ = preparation->scene;
-    plan_ = preparation->plan;
+    if (preparation->plan) plan_ = preparation->plan;
     begin_stream();
     notify("scene.changed", protocol::to_json(protocol::SceneChanged{to_message(*scene_)}));
     tell_notes();
   }
   if (preparation->plan) set_plan(*preparation->plan);
-  if (preparation->is_new_scene && preparation->plan) {
+  if (is_taken && preparation->has_new_temperatures) {
     notify("fusion.changed", protocol::to_json(fusion_reply()));
     set_status("settings_reset", protocol::StatusLevel::Warning,
                preparation->reset_reason

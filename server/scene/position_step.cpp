@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "server/scene/octree_cut.hpp"
+#include "server/scene/box.hpp"
 #include "server/scene/surface.hpp"
 
 namespace spectra::server {
@@ -393,12 +393,15 @@ struct PositionSteps::Branch {
   }
 };
 
-PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool) {
-  largest_step_m_ = usual_step_m(leaves, pool);
+PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool,
+                             std::optional<float> largest_step_m) {
+  largest_step_m_ = largest_step_m.value_or(usual_step_m(leaves, pool));
   gather(leaves);
   if (points_.empty()) return;
-  const std::size_t spare = kNegligibleBits / (3 * points_.size());
-  largest_step_m_ = std::ldexp(largest_step_m_, -static_cast<int>(std::min<std::size_t>(spare, kMostSpareHalvings)));
+  if (!largest_step_m) {
+    const std::size_t spare = kNegligibleBits / (3 * points_.size());
+    largest_step_m_ = std::ldexp(largest_step_m_, -static_cast<int>(std::min<std::size_t>(spare, kMostSpareHalvings)));
+  }
   cut(pool);
   ask_cells(pool);
   ask_pieces(leaves);

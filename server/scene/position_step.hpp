@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,8 +27,10 @@ namespace spectra::server {
 /// Vertices of no triangle in a scene with triangles are not drawn and have no say.
 class PositionSteps {
  public:
-  /// Of the full mesh; the same for any number of threads. Must not be called from a job of the pool.
-  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool);
+  /// Of the full mesh; the same for any number of threads. `largest_step_m`: that of the map it becomes part of, a power of two.
+  /// Must not be called from a job of the pool.
+  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool,
+                std::optional<float> largest_step_m = std::nullopt);
 
   /// The coarsest step that any vertex may have; a power of two.
   float largest_step_m() const { return largest_step_m_; }

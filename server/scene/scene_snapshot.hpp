@@ -46,10 +46,12 @@ struct Tile {
   std::vector<fusion::Vec3f> positions;
   std::vector<fusion::Rgb8> visible;
   std::vector<float> temperature_celsius;
-  std::vector<std::uint32_t> source_vertex;    ///< Index in the input, per vertex.
+  std::uint32_t block = 0;                     ///< The block of the map that it is of, or its first vertex.
+  std::vector<std::uint32_t> vertex_block;     ///< Per vertex; empty: all are of `block`.
+  std::vector<std::uint32_t> source_vertex;    ///< Index in its block, per vertex.
   std::vector<StepHalvings> step_halvings;     ///< Per vertex; empty: none are halved.
   std::vector<fusion::Triangle> triangles;     ///< Indices into this tile; empty for a point cloud.
-  std::vector<std::uint32_t> source_triangle;  ///< Index in the input, per triangle (leaves).
+  std::vector<std::uint32_t> source_triangle;  ///< Index in its block, per triangle (leaves).
 };
 
 /// The vertex nearest to a place, at full accuracy.
@@ -113,11 +115,18 @@ class SceneSnapshot {
   virtual bool is_metric() const = 0;
   /// What was noticed while the scene was read.
   virtual std::span<const fusion::Note> notes() const = 0;
+  /// A version of a map that began empty and is expected to grow.
+  virtual bool is_live() const { return false; }
+  /// When the oldest and the newest part was seen, Unix seconds; of the parts of which that is known.
+  virtual std::optional<std::pair<double, double>> observed() const { return std::nullopt; }
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;
-  /// Summary and histogram, for FusionPlan::prepare. A copy stays valid without the snapshot.
+  /// Summary and histogram. A copy stays valid without the snapshot.
   virtual const fusion::SceneTemperature& temperature() const = 0;
+  /// The same, for FusionPlan::prepare, of this or an earlier version of a map that grows: automatic values do not follow every
+  /// block, so that what has not changed keeps its colours. Another object means other values.
+  virtual std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const = 0;
   /// Of several equally near vertices the first of the input; nothing in an empty scene or at a position that is not
   /// finite.
   virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;

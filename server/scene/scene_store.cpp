@@ -3,6 +3,16 @@
 #include <utility>
 
 namespace spectra::server {
+namespace {
+
+/// A map may double the extent of its first block so often.
+constexpr int kFirstLevel = 12;
+
+LivingMap::Options live_options() {
+  return {.levels = LevelsOfDetail::All, .first_level = kFirstLevel, .is_live = true};
+}
+
+}  // namespace
 
 std::shared_ptr<const SceneSnapshot> SceneStore::current() const {
   const std::lock_guard lock(mutex_);
@@ -14,8 +24,44 @@ std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene sce
                                                          const fusion::Progress& progress) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
-  const std::uint32_t revision = previous ? previous->revision() + 1 : 1;
-  const auto snapshot = SceneSnapshot::build(std::move(scene), revision, pool, kLeafVertexCount, levels, progress);
+  map_ = std::make_unique<LivingMap>(LivingMap::Options{.levels = levels, .first_level = kFirstLevel});
+  MapChange change;
+  change.put.push_back({.id = std::string(kFileBlock), .scene = std::move(scene), .observed_at = {}});
+  return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool, progress), before);
+}
+
+fusion::Result<std::shared_ptr<const SceneSnapshot>> SceneStore::change(MapChange change, WorkerPool& pool) {
+  const std::lock_guard replacing(replace_mutex_);
+  const auto previous = current();
+  if (!map_) {
+    map_ = std::make_unique<LivingMap>(live_options());
+  }
+  if (auto refused = map_->refusal_of(change)) return std::move(*refused);
+  return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool), {});
+}
+
+void SceneStore::begin(const MapConstants& constants) {
+  const std::lock_guard replacing(replace_mutex_);
+  map_ = std::make_unique<LivingMap>(live_options(), constants);
+}
+
+std::optional<MapConstants> SceneStore::constants() const {
+  const std::lock_guard replacing(replace_mutex_);
+  return map_ ? map_->constants() : std::nullopt;
+}
+
+std::optional<fusion::Error> SceneStore::refusal_of(const MapChange& change) const {
+  const std::lock_guard replacing(replace_mutex_);
+  return map_ ? map_->refusal_of(change) : std::nullopt;
+}
+
+std::optional<fusion::MultispectralMesh> SceneStore::mesh_of(std::string_view block) const {
+  const std::lock_guard replacing(replace_mutex_);
+  return map_ ? map_->mesh_of(block) : std::nullopt;
+}
+
+std::shared_ptr<const SceneSnapshot> SceneStore::publish(std::shared_ptr<const SceneSnapshot> snapshot,
+                                                         const Listener& before) {
   if (before) before(snapshot);
   std::vector<std::shared_ptr<Listener>> listeners;
   {

@@ -7,11 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/scene/living_map.hpp"
 #include "server/scene/scene_snapshot.hpp"
 
 namespace spectra::server {
 
-/// Holds the scene that is served now. Thread-safe; readers take the pointer and never wait for a build.
+/// Holds the map that is served, and its version of now. Thread-safe; readers take the pointer and never wait for a build.
 class SceneStore {
  public:
   using Listener = std::function<void(const std::shared_ptr<const SceneSnapshot>&)>;
@@ -31,7 +32,7 @@ class SceneStore {
   /// The newest scene; null while there is none.
   std::shared_ptr<const SceneSnapshot> current() const;
 
-  /// Builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
+  /// Begins another map, of one block named kFileBlock: builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
   /// from several threads are served one after the other, so that revisions only rise. Must not be called from a job of
   /// the pool or from a listener. `before` is called with the snapshot before it becomes current, `progress` as by build().
   std::shared_ptr<const SceneSnapshot> replace(fusion::LoadedScene scene, WorkerPool& pool,
@@ -44,11 +45,30 @@ class SceneStore {
     return replace(fusion::LoadedScene{std::move(mesh), {}, {}}, pool, levels, before);
   }
 
+  /// Changes the map (an empty one begins with this), in the same way. Of a change that the map refuses nothing happens: see
+  /// LivingMap::refusal_of().
+  fusion::Result<std::shared_ptr<const SceneSnapshot>> change(MapChange change, WorkerPool& pool);
+
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);
 
+  /// Begins an empty map with these constants; what is served stays until the first change().
+  void begin(const MapConstants& constants);
+  /// Of the map, once it had a block.
+  std::optional<MapConstants> constants() const;
+  /// See LivingMap::refusal_of().
+  std::optional<fusion::Error> refusal_of(const MapChange& change) const;
+  /// See LivingMap::mesh_of(). Waits for a change that is being made.
+  std::optional<fusion::MultispectralMesh> mesh_of(std::string_view block) const;
+
+  /// The block that a file becomes.
+  static constexpr std::string_view kFileBlock = "scene";
+
  private:
-  std::mutex replace_mutex_;  // held while a scene is built and told of; taken before mutex_
+  std::shared_ptr<const SceneSnapshot> publish(std::shared_ptr<const SceneSnapshot> snapshot, const Listener& before);
+
+  mutable std::mutex replace_mutex_;  // held while a scene is built and told of; taken before mutex_
+  std::unique_ptr<LivingMap> map_;
   mutable std::mutex mutex_;
   std::shared_ptr<const SceneSnapshot> current_;
   std::vector<std::weak_ptr<Listener>> listeners_;

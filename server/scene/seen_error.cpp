@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "server/scene/box.hpp"
 #include "server/scene/heat_spots.hpp"
-#include "server/scene/octree_cut.hpp"
 
 namespace spectra::server {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "server/scene/octree_cut.hpp"
+#include "server/scene/box.hpp"
 
 namespace spectra::server {
 namespace {

@@ -15,8 +15,9 @@ struct MergedTiles {
   std::vector<fusion::Rgb8> visible;
   std::vector<float> temperature_celsius;
   std::vector<std::uint32_t> source_vertex;
-  std::vector<std::uint32_t> weight;  ///< How many vertices of the full scene each stands for.
-  std::vector<std::uint8_t> sharing_level;
+  std::vector<std::uint32_t> weight;        ///< How many vertices of the full scene each stands for.
+  std::vector<std::uint8_t> sharing_level;  ///< See BorderIndex.
+  std::vector<StepHalvings> step_halvings;
   std::vector<fusion::Triangle> triangles;
   fusion::Triangle any_triangle{};  ///< For a tile of degenerate triangles alone.
 };

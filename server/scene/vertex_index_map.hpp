@@ -7,7 +7,7 @@
 
 namespace spectra::server {
 
-/// From vertex indices of the scene to indices of a tile: an open-addressing hash table that only grows.
+/// From a vertex (block and number) to its index in a tile: an open-addressing hash table that only grows.
 class VertexIndexMap {
  public:
   static constexpr std::uint32_t kAbsent = 0xffffffffu;
@@ -16,7 +16,7 @@ class VertexIndexMap {
       : slots_(std::bit_ceil(std::size_t{16} + 2 * expected_count)), mask_(slots_.size() - 1) {}
 
   /// The value of `key`, after storing `value` if it had none. `value` must not be kAbsent.
-  std::uint32_t find_or_insert(std::uint32_t key, std::uint32_t value) {
+  std::uint32_t find_or_insert(std::uint64_t key, std::uint32_t value) {
     Slot& slot = slot_of(key);
     if (slot.value != kAbsent) return slot.value;
     slot = {key, value};
@@ -25,16 +25,16 @@ class VertexIndexMap {
   }
 
   /// The value of `key`, or kAbsent.
-  std::uint32_t find(std::uint32_t key) { return slot_of(key).value; }
+  std::uint32_t find(std::uint64_t key) { return slot_of(key).value; }
 
  private:
   struct Slot {
-    std::uint32_t key = 0;
+    std::uint64_t key = 0;
     std::uint32_t value = kAbsent;
   };
 
-  Slot& slot_of(std::uint32_t key) {
-    std::size_t i = (key * std::uint64_t{0x9e3779b97f4a7c15}) >> 32;
+  Slot& slot_of(std::uint64_t key) {
+    std::size_t i = (key * 0x9e3779b97f4a7c15u) >> 32;
     for (i &= mask_;; i = (i + 1) & mask_) {
       if (slots_[i].value == kAbsent || slots_[i].key == key) return slots_[i];
     }

@@ -144,8 +144,8 @@ void FrameCache::State::abandon_colours(const ColourKey& key) {
 }
 
 std::shared_ptr<const PlanIdentity> FrameCache::State::plan_identity(
-    const fusion::FusionPlan& plan, const std::shared_ptr<const SceneSnapshot>& scene) {
-  std::pair key(Identity(scene), picture_text(plan));
+    const fusion::FusionPlan& plan, const std::shared_ptr<const fusion::SceneTemperature>& prepared_with) {
+  std::pair key(Identity(prepared_with), picture_text(plan));
   const std::lock_guard lock(mutex_);
   if (plans_.size() >= kMostPlansBeforePruning) {
     std::erase_if(plans_, [](const auto& item) { return item.second.expired(); });

@@ -167,9 +167,9 @@ struct FrameCache::State {
   void store_colours(const ColourKey& key, Payload payload);
   void abandon_colours(const ColourKey& key);
 
-  /// The same object for plans that show the same picture of `scene`, as long as anybody holds it.
-  std::shared_ptr<const PlanIdentity> plan_identity(const fusion::FusionPlan& plan,
-                                                    const std::shared_ptr<const SceneSnapshot>& scene);
+  /// The same object for plans of the same settings that were prepared with the same temperatures, as long as anybody holds it.
+  std::shared_ptr<const PlanIdentity> plan_identity(
+      const fusion::FusionPlan& plan, const std::shared_ptr<const fusion::SceneTemperature>& prepared_with);
 
   /// The revision of the newest encoding under that key, whether it is still kept or not; nothing when there was none,
   /// or when it is too long ago.

@@ -133,7 +133,7 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// input: a false claim spoils only the picture of the viewer who makes it.
   virtual std::uint32_t resume(std::span<const ResumedTile> tiles) = 0;
 
-  /// A plan made (on a worker) for the current scene; returns the generation its colours will carry, from 1.
+  /// A plan made (on a worker) with the reference_temperature() of the current scene; returns the generation its colours will carry, from 1.
   virtual std::uint32_t set_plan(fusion::FusionPlan plan) = 0;
   virtual std::uint32_t generation() const = 0;
   virtual void set_quality(const StreamQuality& quality) = 0;

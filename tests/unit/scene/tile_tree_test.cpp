@@ -1,4 +1,4 @@
-#include "server/scene/tile_tree.hpp"
+#include "server/scene/living_map.hpp"
 
 #include <gtest/gtest.h>
 
@@ -440,16 +440,18 @@ TEST(TileTree, RootIsRoundedNoFinerThanItIsOff) {
   }
 }
 
-TEST(TileTree, StatedErrorsOfColourAndTemperatureAreNotBelowThoseSampled) {
+/// Looks at all coarse tiles of a terrain of which one corner is harder to show than the rest; `corner_contrast` of 40: none is. Returns
+/// by how much the colours of a part are worse than those of its tile, at most.
+double expect_stated_errors(float corner_contrast) {
   MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80, .has_missing_temperature = false});
   std::mt19937 random(17);
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
     const Vec3f& p = mesh.positions()[v];
     mesh.temperature_celsius()[v] = 20 + 8 * std::sin(0.3f * p.x) * std::cos(0.2f * p.y);
-    // One corner is harder to show than the rest.
-    const float contrast = p.x > 60 && p.y < 30 ? 120 : 40;
+    const float contrast = p.x > 50 && p.y < 35 ? corner_contrast : 40;
     mesh.visible()[v] = {static_cast<std::uint8_t>(128 + contrast * std::sin(0.8f * p.x)),
-                         static_cast<std::uint8_t>(p.y > 40 ? 200 : 60), static_cast<std::uint8_t>(random() % 30)};
+                         static_cast<std::uint8_t>(128 + 40 * std::sin(0.6f * p.y)),
+                         static_cast<std::uint8_t>(random() % 30)};
   }
   const auto scene = tree_of(mesh);
   const auto tiles = by_id(*scene);
@@ -489,12 +491,18 @@ TEST(TileTree, StatedErrorsOfColourAndTemperatureAreNotBelowThoseSampled) {
       EXPECT_GE(double{tile->temperature_error_celsius}, percentile(temperature_of_part[part])) << "part " << part;
       largest_surplus = std::max(largest_surplus, percentile(errors) - percentile(colour));
     }
-    if (tile->id.level == 0) {
+    if (tile->id.level == 0 && corner_contrast == 40) {
       EXPECT_LE(double{tile->colour_error_levels}, 2 * percentile(colour) + 1) << "so large that it says nothing";
       EXPECT_LE(double{tile->temperature_error_celsius}, 2 * percentile(temperature) + 0.1);
     }
   }
-  EXPECT_GT(largest_surplus, 5) << "no part of a tile is worse than the whole: the test says nothing of parts";
+  return largest_surplus;
+}
+
+TEST(TileTree, StatedErrorsOfColourAndTemperatureAreNotBelowThoseSampled) {
+  expect_stated_errors(40);
+  EXPECT_GT(expect_stated_errors(120), 5)
+      << "no part of a tile is worse than the whole: the test says nothing of parts";
 }
 
 TEST(TileTree, ManySpotsAreSeenFromTheRootAndWarmNothingElse) {
@@ -582,7 +590,7 @@ TEST(TileTree, HotAndColdSpotsAreSeenFromTheRoot) {
 }
 
 TEST(TileTree, MissingTemperatureGivesWayToAnyOther) {
-  MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 100, .has_missing_temperature = false});
+  MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
   std::mt19937 random(1);
   for (float& t : mesh.temperature_celsius()) {
     if (random() % 10 != 0) t = kNan;
@@ -590,7 +598,7 @@ TEST(TileTree, MissingTemperatureGivesWayToAnyOther) {
   const auto scene = tree_of(mesh);
   const Tile& root = *scene->tiles()[0];
   const auto missing = std::ranges::count_if(root.temperature_celsius, [](float t) { return std::isnan(t); });
-  EXPECT_LT(static_cast<std::size_t>(missing), root.temperature_celsius.size() / 3);
+  EXPECT_LT(static_cast<std::size_t>(missing), root.temperature_celsius.size() / 5);
   std::ranges::fill(mesh.temperature_celsius(), kNan);
   const auto without = tree_of(mesh);
   for (const auto& tile : without->tiles()) {

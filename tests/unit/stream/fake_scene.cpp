@@ -51,8 +51,10 @@ FakeScene::FakeScene(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32
       bounds_.max.*axis = std::max(bounds_.max.*axis, tile->bounds.max.*axis);
     }
   }
-  temperature_.summary = accumulator.summary();
-  temperature_.histogram = [](std::uint32_t bins) { return fusion::Histogram{0, 0, std::vector<std::uint64_t>(bins)}; };
+  auto temperature = std::make_shared<fusion::SceneTemperature>();
+  temperature->summary = accumulator.summary();
+  temperature->histogram = [](std::uint32_t bins) { return fusion::Histogram{0, 0, std::vector<std::uint64_t>(bins)}; };
+  temperature_ = std::move(temperature);
 }
 
 std::uint64_t FakeScene::vertex_count() const {

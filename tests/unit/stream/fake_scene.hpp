@@ -31,7 +31,8 @@ class FakeScene : public SceneSnapshot {
   std::span<const fusion::Note> notes() const override { return {}; }
   int level_count() const override { return 3; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
-  const fusion::SceneTemperature& temperature() const override { return temperature_; }
+  const fusion::SceneTemperature& temperature() const override { return *temperature_; }
+  std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const override { return temperature_; }
   std::optional<Probe> probe(fusion::Vec3f) const override { return std::nullopt; }
   std::optional<Extreme> hottest() const override { return std::nullopt; }
   std::optional<Extreme> over_range() const override { return std::nullopt; }
@@ -46,7 +47,7 @@ class FakeScene : public SceneSnapshot {
   std::uint32_t revision_;
   std::vector<std::shared_ptr<const Tile>> tiles_;
   Bounds bounds_;
-  fusion::SceneTemperature temperature_;
+  std::shared_ptr<const fusion::SceneTemperature> temperature_;
 };
 
 /// A root and `leaf_count` leaves beneath it (at most 64), every tile of `side` x `side` vertices.

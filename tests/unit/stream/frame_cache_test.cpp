@@ -143,10 +143,10 @@ TEST(FrameCache, PlansAreOneWhereTheyShowTheSame) {
   auto& state = *cache.state();
   const auto scene = scene_of(tiles_of_tree(2));
   const auto other = scene_of(tiles_of_tree(2));
-  const auto half = state.plan_identity(plan_with_alpha(*scene, 0.5), scene);
-  EXPECT_EQ(state.plan_identity(plan_with_alpha(*scene, 0.5), scene), half);
-  EXPECT_NE(state.plan_identity(plan_with_alpha(*scene, 0.25), scene), half);
-  EXPECT_NE(state.plan_identity(plan_with_alpha(*other, 0.5), other), half);
+  const auto half = state.plan_identity(plan_with_alpha(*scene, 0.5), scene->reference_temperature());
+  EXPECT_EQ(state.plan_identity(plan_with_alpha(*scene, 0.5), scene->reference_temperature()), half);
+  EXPECT_NE(state.plan_identity(plan_with_alpha(*scene, 0.25), scene->reference_temperature()), half);
+  EXPECT_NE(state.plan_identity(plan_with_alpha(*other, 0.5), other->reference_temperature()), half);
 }
 
 }  // namespace

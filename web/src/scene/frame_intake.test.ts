@@ -82,6 +82,11 @@ describe('FrameIntake', () => {
     intake.receive(tileFrame({ level: 1, x: 0, y: 0, z: 0 }, { kind: FrameKind.colours, sequence: 2 }));
     await decodings[1]?.finish();
     expect(wholes).toHaveLength(1);
+    // Of a scene that has shrunk another tile is the first.
+    intake.receive(tileFrame({ level: 0, x: 0, y: 0, z: 0 }, { kind: FrameKind.remove, sequence: 3 }));
+    intake.receive(tileFrame({ level: 7, x: 9, y: 9, z: 9 }, { kind: FrameKind.colours, sequence: 4 }));
+    await decodings[2]?.finish();
+    expect(wholes).toHaveLength(2);
   });
 
   it('is complete once everything before is in the picture, and once only', async () => {

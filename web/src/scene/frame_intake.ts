@@ -27,6 +27,8 @@ export class FrameIntake {
   /** Sequence of the frame that removed a tile: what was sent of it before may be decoded later. */
   #removedAt = new Map<string, number>();
   #connectionNumber = 0;
+  /** Of the tile that stands for all there is: the coarsest that has come. */
+  #topLevel = Infinity;
   #lastSequence = 0;
   #completeAfter: { sequence: number; message: StreamComplete } | null = null;
 
@@ -42,6 +44,7 @@ export class FrameIntake {
   /** Frames count from 1 again, and what is still on its way from the connection before is not wanted any more. */
   beginConnection(): void {
     this.#connectionNumber += 1;
+    this.#topLevel = Infinity;
     this.#acknowledger.reset();
     this.pool.clear();
     this.#arrivals.clear();
@@ -58,6 +61,11 @@ export class FrameIntake {
   receive(frame: TileFrame): void {
     this.#lastSequence = frame.sequence;
     const key = tileKey(frame.tile);
+    if (frame.kind === FrameKind.remove) {
+      if (frame.tile.level === this.#topLevel) this.#topLevel = Infinity;
+    } else {
+      this.#topLevel = Math.min(this.#topLevel, frame.tile.level);
+    }
     if (frame.kind === FrameKind.geometry) {
       this.#decode(`geometry ${key}`, frame, { kind: 'geometry', payload: frame.payload, origin_m: frame.origin_m });
     } else if (frame.kind === FrameKind.colours || frame.kind === FrameKind.colours_subtract_green) {
@@ -100,7 +108,7 @@ export class FrameIntake {
       .then((result) => {
         if (connectionNumber !== this.#connectionNumber) return;
         const removed = this.#removedAt.get(tileKey(frame.tile)) ?? 0;
-        if (result.kind === 'colours' && frame.tile.level === 0) this.events.onWholeColours(result.rgba);
+        if (result.kind === 'colours' && frame.tile.level === this.#topLevel) this.events.onWholeColours(result.rgba);
         if (frame.sequence > removed) this.#arrivals.add(frame, result, performance.now());
         this.events.onArrival();
       })

@@ -1,32 +1,29 @@
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <span>
+#include <cstdint>
 #include <vector>
 
-#include "server/scene/position_step.hpp"
+#include "server/scene/border_index.hpp"
+#include "server/scene/map_tree.hpp"
 #include "server/scene/scene_snapshot.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::server {
 
-/// How coarse the tiles above the leaves are.
-struct TreeOptions {
+/// How coarse the tiles above the leaves are, and what they are measured by.
+struct CoarseOptions {
   std::uint32_t tile_vertex_count = 32'000;  ///< Most vertices of a coarse tile, unless locked borders need more.
-  std::uint32_t root_vertex_count = 20'000;  ///< Most vertices of the root: the first picture must be small.
+  std::uint32_t top_vertex_count = 20'000;   ///< Most vertices of the top: the first picture must be small.
   float median_celsius = 0;                  ///< What temperatures are measured from; NaN = the scene has none.
   /// A difference of temperature that counts as much as one between black and white; a sixteenth of it catches the eye.
   double span_celsius = 16;
   double seen_levels = 24;  ///< A difference of colour that catches the eye.
-  const PositionSteps* position_steps =
-      nullptr;  ///< How finely the vertices of coarse tiles are rounded; null: as one.
+  bool is_point_cloud = false;
+  float position_step_m = 0;  ///< The largest of the scene.
 };
 
-/// Makes the tiles above the leaves, up to the root, and returns all tiles: coarse before fine, along a Morton curve within
-/// a level.
+/// Makes the tile of a node above the leaves from those of its branches, which are made.
 ///
-/// A parent is its children joined where their vertices coincide and simplified to a third of their vertices or less. Its
+/// It is its children joined where their vertices coincide and simplified to a third of their vertices or less. Its
 /// vertices are vertices of its children. Those on edges that it shares with tiles beyond it stay as they are in the full
 /// mesh, with colour and temperature, until a tile holds both sides: tiles of any levels meet without cracks. Every other
 /// vertex stands for a region: it takes the mean visible colour, and the temperature that is furthest from the median.
@@ -34,10 +31,10 @@ struct TreeOptions {
 /// parent are chosen so that no point of its children is far from one.
 ///
 /// geometric_error_m bounds the distance between tile and full mesh, both ways: the largest one measured against the
-/// children, with a margin, on top of the children's own. The same tiles for any number of threads. `made_share` is told from
-/// any thread what share of the tiles above the leaves is made.
-std::vector<std::shared_ptr<const Tile>> tile_tree(std::vector<std::shared_ptr<Tile>> leaves, bool is_point_cloud,
-                                                   const TreeOptions& options, WorkerPool& pool,
-                                                   const std::function<void(double)>& made_share = {});
+/// children, with a margin, on top of the children's own. Thread-safe for different nodes while `borders` does not change.
+void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options);
+
+/// The positions on open edges of a leaf, as its welded surface has them.
+std::vector<fusion::Vec3f> open_positions(const Tile& leaf);
 
 }  // namespace spectra::server

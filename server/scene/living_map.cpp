@@ -1,0 +1,501 @@
+#include "server/scene/living_map.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "server/scene/box.hpp"
+#include "server/scene/leaf_facts.hpp"
+#include "server/scene/map_version.hpp"
+#include "server/scene/position_step.hpp"
+#include "server/scene/tile_place.hpp"
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace spectra::server {
+namespace {
+
+using fusion::Vec3f;
+using protocol::TileId;
+
+/// About what share of the making is done with the leaves; and of that, when they are cut and when the steps are known.
+constexpr double kLeavesShare = 0.25;
+constexpr double kCutShare = 0.6;
+constexpr double kStepsShare = 0.9;
+
+/// Automatic values follow when a fact of the temperatures has moved by this part of their span, or so large a part of the map
+/// has changed.
+constexpr double kReferenceMove = 1.0 / 32;
+constexpr double kReferenceChange = 1.0 / 4;
+
+/// Building needs for moments several times what stays. Left alone, glibc raises the size from which it gives freed memory
+/// back to the system as blocks of that size are freed, and keeps 64 MB a thread for good.
+class FreedMemoryGoesBack {
+ public:
+  FreedMemoryGoesBack() {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+    mallopt(M_TRIM_THRESHOLD, 8 << 20);
+#endif
+  }
+  ~FreedMemoryGoesBack() {
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+  }
+};
+
+/// The whole of a mesh as one tile, for PositionSteps.
+std::shared_ptr<Tile> tile_of(const fusion::MultispectralMesh& mesh) {
+  auto tile = std::make_shared<Tile>();
+  tile->owned_count = static_cast<std::uint32_t>(mesh.vertex_count());
+  tile->positions.assign(mesh.positions().begin(), mesh.positions().end());
+  tile->triangles = mesh.triangles();
+  tile->source_vertex.resize(mesh.vertex_count());
+  std::iota(tile->source_vertex.begin(), tile->source_vertex.end(), 0u);
+  return tile;
+}
+
+Vec3f moved(const Vec3f& p, const fusion::Vec3d& by) {
+  return {static_cast<float>(double{p.x} + by.x), static_cast<float>(double{p.y} + by.y),
+          static_cast<float>(double{p.z} + by.z)};
+}
+
+/// The median of all finite temperatures, the lower one of an even number, NaN without any; and between which nearly all
+/// lie, at least a degree apart: noise of a scene of one temperature is no contrast.
+std::pair<float, double> temperature_spread(std::span<const std::shared_ptr<const MapNode>> leaves) {
+  std::vector<float> finite;
+  for (const auto& leaf : leaves) {
+    for (const float t : owned_temperature(*leaf->tile)) {
+      if (std::isfinite(t)) finite.push_back(t);
+    }
+  }
+  if (finite.empty()) return {std::numeric_limits<float>::quiet_NaN(), 1};
+  const auto at = [&](double share) {
+    const auto place = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
+    std::nth_element(finite.begin(), place, finite.end());
+    return *place;
+  };
+  const double low = double{at(0.005)}, high = double{at(0.995)};
+  return {at(0.5), std::max(high - low, 1.0)};
+}
+
+void collect_shown(const std::shared_ptr<const MapNode>& node, bool is_point_cloud, bool with_coarse,
+                   std::vector<std::shared_ptr<const Tile>>& tiles) {
+  const bool is_shown = node->tile && (is_point_cloud || !node->tile->triangles.empty());
+  // Leaves alone are the whole scene, whatever is drawn of it.
+  if (node->is_leaf() ? (is_shown || !with_coarse) : (is_shown && with_coarse)) tiles.push_back(node->tile);
+  for (const auto& branch : node->branches) collect_shown(branch.node, is_point_cloud, with_coarse, tiles);
+}
+
+void collect_inner(const std::shared_ptr<const MapNode>& node, std::set<TileId>& ids) {
+  if (node->is_leaf()) return;
+  ids.insert(node->id);
+  for (const auto& branch : node->branches) collect_inner(branch.node, ids);
+}
+
+bool has_moved(double from, double to, double span) {
+  return std::abs(from - to) > kReferenceMove * span;
+}
+
+/// Whether what is automatic should be found anew.
+bool differs_much(const fusion::TemperatureSummary& from, const fusion::TemperatureSummary& to) {
+  if (from.has_temperature() != to.has_temperature()) return true;
+  if ((from.over_range_count > 0) != (to.over_range_count > 0)) return true;
+  if ((from.under_range_count > 0) != (to.under_range_count > 0)) return true;
+  const double span =
+      std::max({double{from.maximum} - double{from.minimum}, double{to.maximum} - double{to.minimum}, 1.0});
+  return has_moved(double{from.minimum}, double{to.minimum}, span) ||
+         has_moved(double{from.maximum}, double{to.maximum}, span) || has_moved(from.mean, to.mean, span) ||
+         has_moved(from.sigma, to.sigma, span);
+}
+
+}  // namespace
+
+/// A block that is part of the map; its mesh is in the leaves.
+struct LivingMap::Block {
+  BlockNumber number = 0;
+  std::uint64_t vertex_count = 0, triangle_count = 0;
+  std::optional<Bounds> core_bounds;
+  std::optional<double> observed_at;
+  bool has_visible = false, has_temperature = false, double_positions = false, is_metric = false;
+  fusion::UpAxis up = fusion::UpAxis::Z;
+  std::vector<fusion::LeftOutVertex> left_out;
+  std::string name;
+  std::vector<fusion::Note> notes;
+};
+
+LivingMap::LivingMap(const Options& options, const std::optional<MapConstants>& constants)
+    : options_(options), constants_(constants) {}
+
+TileSizes LivingMap::sizes() const {
+  TileSizes sizes{.leaf_vertex_count = std::max(1u, options_.leaf_vertex_count)};
+  // 20,000 of 32,000: with 32,000 vertices geometry and colours of a noisy scene would be more than a first picture should
+  // cost.
+  if (options_.levels == LevelsOfDetail::All) sizes.root_vertex_count = std::max(1u, sizes.leaf_vertex_count / 8 * 5);
+  return sizes;
+}
+
+std::optional<fusion::Error> LivingMap::refusal_of(const MapChange& change) const {
+  std::set<std::string_view> gone(change.removed.begin(), change.removed.end());
+  for (const BlockPut& put : change.put) gone.insert(put.id);
+  std::uint64_t vertex_count = 0;
+  std::optional<bool> has_triangles;
+  for (const auto& [id, block] : blocks_) {
+    if (gone.contains(id)) continue;
+    vertex_count += block->vertex_count;
+    has_triangles = block->triangle_count > 0;
+  }
+  for (const BlockPut& put : change.put) {
+    const fusion::MultispectralMesh& mesh = put.scene.mesh;
+    const bool is_mesh = !mesh.is_point_cloud();
+    vertex_count += mesh.vertex_count();
+    if (mesh.vertex_count() == 0) {
+      return fusion::Error{fusion::ErrorCode::Unsupported, "the block has no vertex", put.id};
+    }
+    if (vertex_count > std::numeric_limits<std::uint32_t>::max()) {
+      return fusion::Error{fusion::ErrorCode::TooLarge, "the map would have more than 4294967295 vertices", put.id};
+    }
+    if (has_triangles.value_or(is_mesh) != is_mesh) {
+      return fusion::Error{fusion::ErrorCode::Unsupported,
+                           is_mesh ? "the map is made of points, and this block has triangles"
+                                   : "the map is made of triangles, and this block has points alone",
+                           put.id};
+    }
+    has_triangles = is_mesh;
+  }
+  return std::nullopt;
+}
+
+std::optional<fusion::MultispectralMesh> LivingMap::mesh_of(std::string_view block) const {
+  const auto found = blocks_.find(block);
+  if (found == blocks_.end()) return std::nullopt;
+  const Block& info = *found->second;
+  fusion::MultispectralMesh mesh;
+  mesh.origin = constants_->origin;
+  mesh.has_visible = info.has_visible;
+  mesh.has_temperature = info.has_temperature;
+  mesh.double_positions = info.double_positions;
+  mesh.name = info.name;
+  mesh.up = info.up;
+  mesh.is_metric = info.is_metric;
+  mesh.resize_vertices(static_cast<std::size_t>(info.vertex_count));
+  mesh.triangles().resize(static_cast<std::size_t>(info.triangle_count));
+  for (const auto& leaf : leaves_of(root_)) {
+    if (!std::binary_search(leaf->blocks.begin(), leaf->blocks.end(), info.number)) continue;
+    const Tile& tile = *leaf->tile;
+    const auto is_its = [&](std::size_t v) {
+      return (tile.vertex_block.empty() ? tile.block : tile.vertex_block[v]) == info.number;
+    };
+    for (std::size_t v = 0; v < tile.owned_count; ++v) {
+      if (!is_its(v)) continue;
+      const std::uint32_t source = tile.source_vertex[v];
+      mesh.positions()[source] = tile.positions[v];
+      mesh.visible()[source] = tile.visible[v];
+      mesh.temperature_celsius()[source] = tile.temperature_celsius[v];
+    }
+    for (std::size_t t = 0; t < tile.triangles.size(); ++t) {
+      const fusion::Triangle& triangle = tile.triangles[t];
+      if (!is_its(triangle[0])) continue;
+      fusion::Triangle& its = mesh.triangles()[tile.source_triangle[t]];
+      for (unsigned corner = 0; corner < 3; ++corner) its[corner] = tile.source_vertex[triangle[corner]];
+    }
+  }
+  return mesh;
+}
+
+std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, std::uint32_t revision, WorkerPool& pool,
+                                                      const fusion::Progress& progress) {
+  fusion::report(progress, kTilingPhase, 0);
+  std::vector<BlockPut>& put = change_wanted.put;
+  std::sort(put.begin(), put.end(), [](const BlockPut& a, const BlockPut& b) { return a.id < b.id; });
+  if (!constants_ && !put.empty()) {
+    BlockPut first = std::move(put.front());
+    put.erase(put.begin());
+    put_first(std::move(first), pool, progress);
+  }
+  if (!put.empty() || !change_wanted.removed.empty()) change(std::move(put), change_wanted.removed, pool, progress);
+
+  MapVersion version;
+  version.revision = revision;
+  version.is_live = options_.is_live;
+  version.position_step_m = 0x1p-10F;
+  if (constants_) {
+    version.origin = constants_->origin;
+    version.position_step_m = constants_->position_step_m;
+  }
+  bool is_first = true;
+  bool has_core = false;
+  std::vector<Vec3f> core;
+  for (const auto& [id, block] : blocks_) {
+    version.blocks.emplace(block->number, BlockPlace{version.vertex_count, version.triangle_count});
+    version.vertex_count += block->vertex_count;
+    version.triangle_count += block->triangle_count;
+    version.has_visible = version.has_visible || block->has_visible;
+    version.has_temperature = version.has_temperature || block->has_temperature;
+    version.double_positions = version.double_positions || block->double_positions;
+    version.notes.insert(version.notes.end(), block->notes.begin(), block->notes.end());
+    if (block->observed_at) {
+      version.oldest_observed_at =
+          std::min(version.oldest_observed_at.value_or(*block->observed_at), *block->observed_at);
+      version.newest_observed_at =
+          std::max(version.newest_observed_at.value_or(*block->observed_at), *block->observed_at);
+    }
+    if (block->core_bounds) {
+      has_core = true;
+      core.push_back(block->core_bounds->min);
+      core.push_back(block->core_bounds->max);
+    }
+    if (std::exchange(is_first, false)) {
+      version.name = block->name;
+      version.up = block->up;
+      version.is_metric = block->is_metric;
+    }
+  }
+  if (blocks_.size() == 1) version.left_out = blocks_.begin()->second->left_out;
+  if (has_core) version.core_bounds = bounds_of(core);
+  version.leaves = leaves_of(root_);
+  if (root_) {
+    version.top_level = top_of(root_)->id.level;
+    collect_shown(root_, version.triangle_count == 0, options_.levels == LevelsOfDetail::All, version.tiles);
+    std::sort(version.tiles.begin(), version.tiles.end(),
+              [](const auto& a, const auto& b) { return is_before(a->id, b->id); });
+  }
+  fusion::TemperatureAccumulator accumulator;
+  for (const auto& leaf : version.leaves) accumulator.merge(leaf->facts->temperature);
+  version.summary = accumulator.summary();
+  if (!percentiles_ || percentiles_->minimum != version.summary.minimum ||
+      percentiles_->maximum != version.summary.maximum) {
+    percentiles_ = fusion::Histogram{version.summary.minimum, version.summary.maximum,
+                                     std::vector<std::uint64_t>(fusion::kPercentileBins)};
+    for (const auto& leaf : version.leaves) fusion::add_to_histogram(owned_temperature(*leaf->tile), *percentiles_);
+  }
+  version.percentiles = *percentiles_;
+  const bool is_reference_good =
+      reference_ && !differs_much(reference_summary_, version.summary) &&
+      static_cast<double>(changed_vertex_count_) < kReferenceChange * static_cast<double>(version.vertex_count);
+  if (is_reference_good) version.reference = reference_;
+  auto snapshot = snapshot_of(std::move(version));
+  if (!is_reference_good) {
+    reference_ = snapshot->reference_temperature();
+    reference_summary_ = reference_->summary;
+    changed_vertex_count_ = 0;
+  }
+  fusion::report(progress, kTilingPhase, 1);
+  return snapshot;
+}
+
+void LivingMap::put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress) {
+  const FreedMemoryGoesBack scope;
+  constants_ = {.origin = put.scene.mesh.origin,
+                .grid = MapGrid::around(put.scene.mesh.positions(), options_.first_level)};
+  std::vector<BlockPut> only;
+  only.push_back(std::move(put));
+  change(std::move(only), {}, pool, progress);
+}
+
+std::shared_ptr<LivingMap::Block> LivingMap::taken_in(BlockPut& put) {
+  fusion::MultispectralMesh& mesh = put.scene.mesh;
+  std::optional<Bounds>& core = put.scene.core_bounds;
+  const fusion::Vec3d& origin = constants_->origin;
+  if (mesh.origin != origin) {
+    const fusion::Vec3d by{mesh.origin.x - origin.x, mesh.origin.y - origin.y, mesh.origin.z - origin.z};
+    for (Vec3f& p : mesh.positions()) p = moved(p, by);
+    if (core) core = Bounds{moved(core->min, by), moved(core->max, by)};
+    mesh.origin = origin;
+  }
+  auto info = std::make_shared<Block>();
+  info->number = ++last_number_;
+  info->vertex_count = mesh.vertex_count();
+  info->triangle_count = mesh.triangle_count();
+  info->core_bounds = core;
+  info->observed_at = put.observed_at;
+  info->has_visible = mesh.has_visible;
+  info->has_temperature = mesh.has_temperature;
+  info->double_positions = mesh.double_positions;
+  info->is_metric = mesh.is_metric;
+  info->up = mesh.up;
+  info->left_out = std::move(mesh.left_out);
+  info->name = mesh.name;
+  info->notes = std::move(put.scene.notes);
+  return info;
+}
+
+void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
+                       const fusion::Progress& progress) {
+  std::vector<BlockNumber> gone;
+  const auto remove = [&](const std::string& id) {
+    const auto found = blocks_.find(id);
+    if (found == blocks_.end()) return;
+    gone.push_back(found->second->number);
+    blocks_.erase(found);
+  };
+  for (const std::string& id : removed) remove(id);
+  std::vector<BlockMesh> added;
+  const bool is_first = constants_->position_step_m == 0;
+  for (BlockPut& block : put) {
+    remove(block.id);
+    auto info = taken_in(block);
+    BlockMesh& one = added.emplace_back();
+    one.number = info->number;
+    one.mesh = &block.scene.mesh;
+    if (!is_first) {
+      const std::vector<std::shared_ptr<Tile>> whole{tile_of(block.scene.mesh)};
+      PositionSteps(whole, pool, constants_->position_step_m).apply(*whole[0]);
+      one.step_halvings = std::move(whole[0]->step_halvings);
+    }
+    names_.emplace(info->number, block.id);
+    blocks_.emplace(block.id, std::move(info));
+  }
+  const double leaves_share = options_.levels == LevelsOfDetail::All ? kLeavesShare : 1;
+  const auto made_share = [&](double share) {
+    fusion::report(progress, kTilingPhase, leaves_share * kCutShare * share);
+  };
+  ChangedTree changed = changed_tree(root_, constants_->grid, sizes(), gone, added, names_, pool, made_share);
+  for (const BlockNumber number : gone) names_.erase(number);
+  // Memory of a large mesh is needed for the rest.
+  added.clear();
+  put.clear();
+  if (is_first) {
+    // Nobody else has these tiles yet.
+    std::vector<std::shared_ptr<Tile>> leaves;
+    for (const auto& node : changed.made) {
+      if (node->is_leaf()) leaves.push_back(std::const_pointer_cast<Tile>(node->tile));
+    }
+    const PositionSteps steps(leaves, pool);
+    constants_->position_step_m = steps.largest_step_m();
+    pool.for_each(leaves.size(), [&](std::size_t i) { steps.apply(*leaves[i]); });
+  }
+  fusion::report(progress, kTilingPhase, leaves_share * kStepsShare);
+  take(std::move(changed), pool, progress);
+}
+
+void LivingMap::take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress) {
+  if (percentiles_) {
+    // Good as long as the extremes stay; apply() looks at that.
+    fusion::Histogram gone = *percentiles_;
+    std::fill(gone.counts.begin(), gone.counts.end(), 0);
+    for (const auto& leaf : changed.dropped_leaves) {
+      fusion::add_to_histogram(owned_temperature(*leaf->tile), gone);
+    }
+    for (std::size_t bin = 0; bin < gone.counts.size(); ++bin) percentiles_->counts[bin] -= gone.counts[bin];
+    for (const auto& node : changed.made) {
+      if (node->is_leaf()) fusion::add_to_histogram(owned_temperature(*node->tile), *percentiles_);
+    }
+  }
+  for (const auto& leaf : changed.dropped_leaves) changed_vertex_count_ += leaf->tile->owned_count;
+  if (options_.levels == LevelsOfDetail::All) {
+    make_coarse_tiles(changed, pool, progress);
+  }
+  root_ = std::move(changed.root);
+}
+
+std::set<TileId> LivingMap::update_borders(const ChangedTree& changed, WorkerPool& pool) {
+  std::vector<MapNode*> leaves;
+  for (const auto& node : changed.made) {
+    if (node->is_leaf()) leaves.push_back(node.get());
+  }
+  pool.for_each(leaves.size(), [&](std::size_t i) { leaves[i]->open_positions = open_positions(*leaves[i]->tile); });
+  std::vector<std::vector<std::uint8_t>> before(leaves.size());
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    for (const Vec3f& position : leaves[i]->open_positions) before[i].push_back(borders_.sharing_level(position));
+  }
+  for (const auto& leaf : changed.dropped_leaves) borders_.remove(leaf->id, leaf->open_positions);
+  for (const MapNode* leaf : leaves) borders_.add(leaf->id, leaf->open_positions);
+  // Vertices of others that may not move any more, because something has come to their other side.
+  std::set<TileId> locked_anew;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    for (std::size_t p = 0; p < before[i].size(); ++p) {
+      const Vec3f& position = leaves[i]->open_positions[p];
+      const std::uint8_t level = borders_.sharing_level(position);
+      if (level >= before[i][p]) continue;
+      borders_.for_each_holder(position, [&](TileId holder) {
+        while (holder.level > level) locked_anew.insert(holder = parent_of(holder));
+      });
+    }
+  }
+  return locked_anew;
+}
+
+bool LivingMap::has_new_spread() {
+  const std::uint64_t count = root_ ? root_->content.owned_count : 0;
+  if (count < 2 * spread_vertex_count_ && !std::isnan(median_celsius_)) return false;
+  const auto [median, span] = temperature_spread(leaves_of(root_));
+  spread_vertex_count_ = count;
+  const bool is_new = std::isnan(median) != std::isnan(median_celsius_) ||
+                      std::abs(double{median} - double{median_celsius_}) > span / 16 ||
+                      std::abs(span - span_celsius_) > span / 4;
+  if (is_new) {
+    median_celsius_ = median;
+    span_celsius_ = span;
+  }
+  return is_new;
+}
+
+void LivingMap::make_coarse_tiles(const ChangedTree& changed, WorkerPool& pool, const fusion::Progress& progress) {
+  const std::shared_ptr<const MapNode> old_top = top_of(root_);
+  std::set<TileId> wanted = update_borders(changed, pool);
+  root_ = changed.root;
+  if (!root_) return;
+  if (has_new_spread()) collect_inner(root_, wanted);
+  const std::shared_ptr<const MapNode> top = top_of(root_);
+  if (!top->is_top) wanted.insert(top->id);
+  // Above the top there are no tiles.
+  for (const MapNode* node = root_.get(); node != top.get(); node = node->branches.front().node.get()) {
+    if (node->tile) wanted.insert(node->id);
+  }
+  if (old_top && old_top->id != top->id) wanted.insert(old_top->id);
+
+  std::map<TileId, std::shared_ptr<MapNode>> open;  // Those that may be changed.
+  for (const auto& node : changed.made) open.emplace(node->id, node);
+  std::set<TileId> path;
+  for (TileId id : wanted) {
+    while (path.insert(id).second && id.level > 0) id = parent_of(id);
+  }
+  for (const TileId& id : path) {  // Coarse before fine.
+    if (open.contains(id) || id.level == 0) continue;
+    const auto parent = open.find(parent_of(id));
+    if (parent == open.end()) continue;
+    for (MapNode::Branch& branch : parent->second->branches) {
+      if (branch.node->id != id) continue;
+      const auto copy = std::make_shared<MapNode>(*branch.node);
+      branch.node = copy;
+      open.emplace(id, copy);
+    }
+  }
+  std::vector<std::vector<MapNode*>> by_level(kDeepestLevel + 1);
+  std::size_t count = 0;
+  for (const auto& [id, node] : open) {
+    if (node->is_leaf()) continue;
+    if (id.level < top->id.level) {
+      node->tile = nullptr;
+      node->weight = {};
+      node->samples = {};
+      continue;
+    }
+    by_level[id.level].push_back(node.get());
+    ++count;
+  }
+  const CoarseOptions options{.tile_vertex_count = sizes().leaf_vertex_count,
+                              .top_vertex_count = sizes().root_vertex_count,
+                              .median_celsius = median_celsius_,
+                              .span_celsius = span_celsius_,
+                              .is_point_cloud = root_->content.triangle_count == 0,
+                              .position_step_m = constants_->position_step_m};
+  std::atomic<std::size_t> made_count{0};
+  for (auto level = by_level.rbegin(); level != by_level.rend(); ++level) {
+    pool.for_each(level->size(), [&](std::size_t i) {
+      MapNode& node = *(*level)[i];
+      make_coarse_tile(node, node.id == top->id, borders_, options);
+      const double share = static_cast<double>(++made_count) / static_cast<double>(count);
+      fusion::report(progress, kTilingPhase, kLeavesShare + (1 - kLeavesShare) * share);
+    });
+  }
+}
+
+}  // namespace spectra::server

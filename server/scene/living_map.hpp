@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "fusion/error.hpp"
+#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/progress.hpp"
+#include "server/scene/border_index.hpp"
+#include "server/scene/coarse_tile.hpp"
+#include "server/scene/map_grid.hpp"
+#include "server/scene/map_tree.hpp"
+#include "server/scene/scene_snapshot.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::server {
+
+/// A part of the map under a name of its own; one of the same name takes its place.
+struct BlockPut {
+  std::string id;
+  fusion::LoadedScene scene;
+  std::optional<double> observed_at;  ///< Unix seconds.
+};
+
+/// What becomes of a map in one step.
+struct MapChange {
+  std::vector<BlockPut> put;
+  std::vector<std::string> removed;  ///< Names that are not there are nothing.
+};
+
+/// What stays the same for the life of a map.
+struct MapConstants {
+  fusion::Vec3d origin;  ///< What positions are relative to.
+  MapGrid grid;
+  float position_step_m = 0;  ///< The largest one.
+};
+
+/// A map that is made of blocks, and its versions: each is a scene of its own that does not change any more and shares with the
+/// one before what is the same. At full accuracy a version depends on its blocks alone, not on the order in which they came.
+/// The constants are given, or what the first block asks for. One thread at a time.
+class LivingMap {
+ public:
+  struct Options {
+    LevelsOfDetail levels = LevelsOfDetail::All;
+    std::uint32_t leaf_vertex_count = kLeafVertexCount;
+    /// The level of the tile that the first block just fills: how often the map may double its extent.
+    int first_level = 0;
+    bool is_live = false;  ///< Begins empty, and is expected to grow.
+  };
+
+  explicit LivingMap(const Options& options, const std::optional<MapConstants>& constants = std::nullopt);
+
+  /// Once there was a block.
+  const std::optional<MapConstants>& constants() const { return constants_; }
+
+  /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; blocks without a vertex; more vertices in all than
+  /// fit 32 bits. Error: Unsupported; `field` is the block's name.
+  std::optional<fusion::Error> refusal_of(const MapChange& change) const;
+
+  /// A block as it was put, its positions relative to the origin of the map; nothing when there is none of that name.
+  std::optional<fusion::MultispectralMesh> mesh_of(std::string_view block) const;
+
+  /// The next version. Positions of blocks are taken relative to the origin of the map. The blocks that are put have different
+  /// names; refusal_of() the change there is none. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
+  std::shared_ptr<const SceneSnapshot> apply(MapChange change, std::uint32_t revision, WorkerPool& pool,
+                                             const fusion::Progress& progress = {});
+
+ private:
+  struct Block;
+
+  void put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress);
+  void change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
+              const fusion::Progress& progress);
+  /// Of a block that comes in, its positions relative to the origin of the map from then on.
+  std::shared_ptr<Block> taken_in(BlockPut& put);
+  /// The tree with what has changed, its coarse tiles made.
+  void take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress);
+  void make_coarse_tiles(const ChangedTree& changed, WorkerPool& pool, const fusion::Progress& progress);
+  std::set<protocol::TileId> update_borders(const ChangedTree& changed, WorkerPool& pool);
+  bool has_new_spread();
+  TileSizes sizes() const;
+
+  const Options options_;
+  std::optional<MapConstants> constants_;
+  std::map<std::string, std::shared_ptr<const Block>, std::less<>> blocks_;
+  BlockNames names_;
+  BlockNumber last_number_ = 0;
+  std::shared_ptr<const MapNode> root_;
+  BorderIndex borders_;
+  float median_celsius_ = std::numeric_limits<float>::quiet_NaN();
+  double span_celsius_ = 1;
+  std::uint64_t spread_vertex_count_ = 0;  ///< So many vertices the map had when the last two were found.
+
+  // Of the last version.
+  std::optional<fusion::Histogram> percentiles_;
+  std::shared_ptr<const fusion::SceneTemperature> reference_;
+  fusion::TemperatureSummary reference_summary_;
+  std::uint64_t changed_vertex_count_ = 0;  ///< Since the reference was taken.
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,211 @@
+// Whatever is put into a map and taken out of it, in any order and batch: it is the map that is built at once of the blocks that are in
+// it in the end.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "server/scene/coarse_tile.hpp"
+#include "server/scene/living_map.hpp"
+#include "server/scene/tile_place.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::Vec3f;
+using protocol::TileId;
+
+constexpr std::uint32_t kLeafSize = 200;
+
+/// A patch of a raster of a metre: blocks beside each other share the vertices of their border.
+struct Patch {
+  int column = 0, row = 0;  ///< In patches of 16 x 16.
+  int side = 17;
+  float height = 0;
+  float celsius = 20;
+  int lone_count = 0;
+};
+
+fusion::LoadedScene scene_of(const Patch& patch) {
+  fusion::LoadedScene scene;
+  fusion::MultispectralMesh& mesh = scene.mesh;
+  const auto side = static_cast<std::size_t>(patch.side);
+  const auto lone = static_cast<std::size_t>(patch.lone_count);
+  mesh.resize_vertices(side * side + lone);
+  mesh.has_visible = mesh.has_temperature = true;
+  for (std::size_t v = 0; v < side * side; ++v) {
+    const float x = static_cast<float>(16 * patch.column) + static_cast<float>(v % side);
+    const float y = static_cast<float>(16 * patch.row) + static_cast<float>(v / side);
+    mesh.positions()[v] = {x, y, patch.height + std::sin(x / 5) * std::cos(y / 4)};
+    mesh.visible()[v] = {static_cast<std::uint8_t>(v % 251), static_cast<std::uint8_t>(patch.column * 7), 90};
+    mesh.temperature_celsius()[v] =
+        v % 29 == 3 ? std::numeric_limits<float>::quiet_NaN() : patch.celsius + std::sin(static_cast<float>(v));
+  }
+  for (std::size_t v = 0; v < lone; ++v) {
+    mesh.positions()[side * side + v] = {static_cast<float>(16 * patch.column) + 0.5f * static_cast<float>(v), 3, 1};
+  }
+  for (std::size_t row = 0; row + 1 < side; ++row) {
+    for (std::size_t column = 0; column + 1 < side; ++column) {
+      const auto a = static_cast<std::uint32_t>(row * side + column), b = a + static_cast<std::uint32_t>(side);
+      mesh.triangles().push_back({a, a + 1, b});
+      mesh.triangles().push_back({a + 1, b + 1, b});
+    }
+  }
+  return scene;
+}
+
+rc::Gen<Patch> patches() {
+  return rc::gen::map(
+      rc::gen::tuple(rc::gen::inRange(-3, 6), rc::gen::inRange(-3, 6), rc::gen::inRange(2, 24), rc::gen::inRange(0, 3),
+                     rc::gen::inRange(-20, 60), rc::gen::inRange(0, 30), rc::gen::inRange(0, 40)),
+      [](const auto& t) {
+        const auto& [column, row, side, height, celsius, lone, far] = t;
+        Patch patch{column,
+                    row,
+                    side > 17 ? 17 : side,
+                    static_cast<float>(height),
+                    static_cast<float>(celsius),
+                    lone > 20 ? lone - 20 : 0};
+        // Far outside of where the map began.
+        if (far == 0) patch.column += 5000;
+        return patch;
+      });
+}
+
+std::string name_of(int number) {
+  return std::string(1, static_cast<char>('a' + number));
+}
+
+using Place = std::tuple<float, float, float>;
+Place place(const Vec3f& p) {
+  return {p.x, p.y, p.z};
+}
+
+bool same(std::span<const float> a, std::span<const float> b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](float x, float y) { return x == y || (std::isnan(x) && std::isnan(y)); });
+}
+
+void expect_same_full_accuracy(const SceneSnapshot& a, const SceneSnapshot& b) {
+  RC_ASSERT(a.vertex_count() == b.vertex_count());
+  RC_ASSERT(a.triangle_count() == b.triangle_count());
+  const fusion::MultispectralMesh one = a.whole_mesh(), other = b.whole_mesh();
+  RC_ASSERT(std::ranges::equal(one.positions(), other.positions()));
+  RC_ASSERT(std::ranges::equal(one.visible(), other.visible()));
+  RC_ASSERT(same(one.temperature_celsius(), other.temperature_celsius()));
+  RC_ASSERT(one.triangles() == other.triangles());
+  const auto &x = a.temperature().summary, &y = b.temperature().summary;
+  RC_ASSERT(x.finite_count == y.finite_count);
+  RC_ASSERT(x.missing_count == y.missing_count);
+  RC_ASSERT(x.minimum == y.minimum);
+  RC_ASSERT(x.maximum == y.maximum);
+  RC_ASSERT(x.mean == y.mean);
+  RC_ASSERT(x.sigma == y.sigma);
+  RC_ASSERT(a.temperature().histogram(fusion::kPercentileBins).counts ==
+            b.temperature().histogram(fusion::kPercentileBins).counts);
+  RC_ASSERT(a.bounds() == b.bounds());
+  RC_ASSERT(a.tiles().size() == b.tiles().size());
+  for (std::size_t i = 0; i < a.tiles().size(); ++i) {
+    const Tile &tile = *a.tiles()[i], &its = *b.tiles()[i];
+    RC_ASSERT(tile.id == its.id);
+    RC_ASSERT(tile.child_mask == its.child_mask);
+    if (tile.child_mask != 0) continue;
+    RC_ASSERT(tile.owned_count == its.owned_count);
+    RC_ASSERT(tile.positions == its.positions);
+    RC_ASSERT(tile.visible == its.visible);
+    RC_ASSERT(same(tile.temperature_celsius, its.temperature_celsius));
+    RC_ASSERT(tile.triangles == its.triangles);
+    RC_ASSERT(tile.source_vertex == its.source_vertex);
+    RC_ASSERT(tile.source_triangle == its.source_triangle);
+  }
+}
+
+/// Errors rise, extremes are there, and what two tiles share both have as it is in the full mesh.
+void expect_promises(const SceneSnapshot& scene) {
+  std::map<TileId, const Tile*> tiles;
+  for (const auto& tile : scene.tiles()) tiles[tile->id] = tile.get();
+  std::map<TileId, std::set<Place>> places;
+  std::map<Place, std::vector<TileId>> holders;
+  for (const auto& [id, tile] : tiles) {
+    for (const Vec3f& p : tile->positions) places[id].insert(place(p));
+    if (tile->child_mask == 0) {
+      for (const Vec3f& p : open_positions(*tile)) holders[place(p)].push_back(id);
+      continue;
+    }
+    float lowest = std::numeric_limits<float>::quiet_NaN(), highest = lowest;
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      const auto child = tiles.find(child_of(id, octant));
+      RC_ASSERT((child != tiles.end()) == ((tile->child_mask >> octant & 1) != 0));
+      if (child == tiles.end()) continue;
+      RC_ASSERT(tile->geometric_error_m >= child->second->geometric_error_m);
+      lowest = std::fmin(lowest, child->second->lowest_celsius);
+      highest = std::fmax(highest, child->second->highest_celsius);
+    }
+    RC_ASSERT(same({&tile->lowest_celsius, 1}, {&lowest, 1}));
+    RC_ASSERT(same({&tile->highest_celsius, 1}, {&highest, 1}));
+    if (std::isnan(lowest)) continue;
+    const auto& shown = tile->temperature_celsius;
+    RC_ASSERT(std::find(shown.begin(), shown.end(), lowest) != shown.end());
+    RC_ASSERT(std::find(shown.begin(), shown.end(), highest) != shown.end());
+  }
+  for (const auto& [position, leaves] : holders) {
+    TileId common = leaves.front();
+    for (const TileId& leaf : leaves) common = common_ancestor(common, leaf);
+    for (TileId id : leaves) {
+      while (id.level > common.level + 1) {
+        id = parent_of(id);
+        if (tiles.contains(id)) RC_ASSERT(places[id].contains(position));
+      }
+    }
+  }
+}
+
+RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
+  WorkerPool pool(2);
+  const LivingMap::Options options{.leaf_vertex_count = kLeafSize, .first_level = 6};
+  LivingMap map(options);
+  std::map<std::string, Patch> in_it;
+  const int steps = *rc::gen::inRange(1, 9);
+  std::shared_ptr<const SceneSnapshot> scene;
+  for (int step = 0; step < steps; ++step) {
+    MapChange change;
+    std::set<std::string> named;
+    const int count = *rc::gen::inRange(1, 5);
+    for (int i = 0; i < count; ++i) {
+      const std::string id = name_of(*rc::gen::inRange(0, 12));
+      if (!named.insert(id).second) continue;
+      if (!in_it.empty() && *rc::gen::inRange(0, 3) == 0) {
+        change.removed.push_back(id);
+        in_it.erase(id);
+      } else {
+        const Patch patch = *patches();
+        change.put.push_back({.id = id, .scene = scene_of(patch), .observed_at = {}});
+        in_it[id] = patch;
+      }
+    }
+    const std::uint64_t expected = [&] {
+      std::uint64_t sum = 0;
+      for (const auto& [id, patch] : in_it)
+        sum += static_cast<std::uint64_t>(patch.side * patch.side + patch.lone_count);
+      return sum;
+    }();
+    scene = map.apply(std::move(change), static_cast<std::uint32_t>(step + 1), pool);
+    RC_ASSERT(scene->vertex_count() == expected);
+    expect_promises(*scene);
+  }
+  if (!map.constants()) return;
+  LivingMap at_once(options, map.constants());
+  MapChange all;
+  for (const auto& [id, patch] : in_it) all.put.push_back({.id = id, .scene = scene_of(patch), .observed_at = {}});
+  const auto whole = at_once.apply(std::move(all), 1, pool);
+  expect_same_full_accuracy(*scene, *whole);
+}
+
+}  // namespace
+}  // namespace spectra::server
