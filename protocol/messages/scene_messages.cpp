@@ -38,6 +38,11 @@ static void describe(auto& fields, Is<SceneNote> auto& message) {
   fields.field("message", message.message);
 }
 
+static void describe(auto& fields, Is<SceneObserved> auto& message) {
+  fields.nullable("oldest", message.oldest);
+  fields.nullable("newest", message.newest);
+}
+
 static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("name", message.name);
   fields.field("revision", message.revision);
@@ -54,6 +59,8 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.require("position_step_m", message.position_step_m > 0, "a number above 0");
   fields.field("up", message.up);
   fields.optional("metric", message.metric);
+  fields.optional("live", message.live);
+  fields.optional("observed", message.observed);
   fields.field("notes", message.notes);
 }
 
@@ -99,6 +106,7 @@ static void describe(auto& fields, Is<Hello> auto& message) {
 template struct Wire<Bounds>;
 template struct Wire<SceneTemperature>;
 template struct Wire<SceneNote>;
+template struct Wire<SceneObserved>;
 template struct Wire<SceneDescription>;
 template struct Wire<SceneChanged>;
 template struct Wire<ServerInfo>;

@@ -42,6 +42,12 @@ struct SceneNote {
 /// The direction that is up in the scene's coordinates.
 enum class UpAxis { X, Y, Z, MinusX, MinusY, MinusZ };
 
+/// When parts of the scene were seen, Unix seconds; nullopt = null: of no part that is known.
+struct SceneObserved {
+  std::optional<double> oldest;
+  std::optional<double> newest;
+};
+
 /// SCENE: what is served.
 struct SceneDescription {
   std::string name;
@@ -57,7 +63,9 @@ struct SceneDescription {
   std::uint32_t levels = 0;
   double position_step_m = 0;  ///< Default step of the positions, the largest where tiles differ; above 0.
   UpAxis up = UpAxis::Z;
-  std::optional<bool> metric;    ///< Positions are known to be in metres; else they are taken for it.
+  std::optional<bool> metric;  ///< Positions are known to be in metres; else they are taken for it.
+  std::optional<bool> live;    ///< A map that began empty and is expected to grow.
+  std::optional<SceneObserved> observed;
   std::vector<SceneNote> notes;  ///< What loading noticed.
 };
 

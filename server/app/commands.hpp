@@ -20,6 +20,8 @@ inline constexpr int kWrongUsage = 2;
 struct ServeOptions {
   std::optional<std::filesystem::path> scene;  ///< Absent: the demo scene.
   std::optional<std::filesystem::path> thermal;
+  bool is_live = false;                        ///< Begins with an empty map.
+  std::optional<std::filesystem::path> store;  ///< Keeps the blocks of a live map.
   std::string listen = "127.0.0.1:8080";
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> web;

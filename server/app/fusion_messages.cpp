@@ -263,6 +263,12 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   message.position_step_m = double{scene.suggested_position_step_m()};
   message.up = to_message(scene.up());
   message.metric = scene.is_metric();
+  message.live = scene.is_live();
+  message.observed.emplace();
+  if (const auto observed = scene.observed()) {
+    message.observed->oldest = observed->first;
+    message.observed->newest = observed->second;
+  }
   for (const auto& note : scene.notes()) message.notes.push_back({note.id, note.count, note.message});
   return message;
 }

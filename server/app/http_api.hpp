@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 
+#include "server/app/map_keeper.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
@@ -17,13 +18,20 @@ class HttpApi {
 
   void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
 
+  /// Who writes the map; to be set before the first request.
+  void set_map(MapKeeper& map) { map_ = &map; }
+
   /// Where the network side counts; to be set before the first request.
   void set_metrics(const NetMetrics& metrics) { net_metrics_ = &metrics; }
 
  private:
+  void handle_blocks(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void put_block(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void get_block(const std::string& id, const std::function<void(HttpReply)>& reply);
   void handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply);
 
   ServedScene& served_;
+  MapKeeper* map_ = nullptr;
   const NetMetrics* net_metrics_ = nullptr;
   std::shared_ptr<std::atomic<int>> exports_under_way_ = std::make_shared<std::atomic<int>>(0);
 };

@@ -55,6 +55,13 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--listen", options.listen, "Where to listen, ADDRESS:PORT; port 0 picks a free one")
       ->capture_default_str();
   command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
+  command->add_flag("--live", options.is_live, "Begin with an empty map, made of the blocks that are put into it")
+      ->excludes(scene)
+      ->excludes("--demo");
+  command
+      ->add_option("--store", options.store, "The file that keeps the blocks of a live map; made when it is not there")
+      ->excludes(scene)
+      ->excludes("--demo");
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
   add_reading(*command, options.read);

@@ -16,6 +16,7 @@
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/http_api.hpp"
+#include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/app/viewer_session.hpp"
@@ -60,10 +61,20 @@ void raise_descriptor_limit() {
 /// Reads and tiles the scene in a thread of its own, while the server already answers.
 class SceneLoader {
  public:
-  SceneLoader(const ServeOptions& options, ServedScene& served, HttpServer& server)
-      : thread_([this, &options, &served, &server] {
+  SceneLoader(const ServeOptions& options, ServedScene& served, MapKeeper& map, HttpServer& server)
+      : thread_([this, &options, &served, &map, &server] {
           try {
-            load(options, served);
+            if (options.is_live || options.store) {
+              served.progress.set("Reading the map");
+              if (const auto problem = map.restore()) throw std::runtime_error(*problem);
+              served.progress.set(std::nullopt);
+              const auto scene = served.scenes.current();
+              spdlog::info("serving a live map: {} vertices, {} triangles", scene->vertex_count(),
+                           scene->triangle_count());
+            } else {
+              load(options, served);
+              map.add_file_block(*served.scenes.current());
+            }
           } catch (const std::exception& error) {
             failure_ = error.what();
           }
@@ -138,7 +149,15 @@ int run_serve(const ServeOptions& options) {
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto served =
       std::make_unique<ServedScene>(options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
+  std::unique_ptr<store::BlockStore> store;
+  if (options.store) {
+    auto opened = store::BlockStore::open(options.store->string(), {});
+    if (!opened) return fail(kJobFailed, opened.error().message);
+    store = std::move(opened).value();
+  }
+  MapKeeper map(*served, std::move(store));
   HttpApi api(*served);
+  api.set_map(map);
   std::unique_ptr<HttpServer> server;
   try {
     server = std::make_unique<HttpServer>(
@@ -154,7 +173,7 @@ int run_serve(const ServeOptions& options) {
   for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
   std::fflush(stdout);
 
-  SceneLoader loader(options, *served, *server);
+  SceneLoader loader(options, *served, map, *server);
   server->run();
   if (!loader.is_done()) {
     // Reading cannot be interrupted, and nothing of it needs to be put in order.

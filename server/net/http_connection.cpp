@@ -2,8 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/error.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -66,6 +69,12 @@ std::optional<HelloForm> hello_form_of(const RequestTarget& target) {
   return form;
 }
 
+/// PUT or DELETE of a block of the map.
+bool is_block_change(const http::request<http::string_body>& request) {
+  return (request.method() == http::verb::put || request.method() == http::verb::delete_) &&
+         view(request.target()).starts_with(std::string(kBlocksPath) + '/');
+}
+
 /// Where a handler leaves its answer; outlives both the connection and the handler.
 struct PendingReply {
   explicit PendingReply(const asio::any_io_executor& executor)
@@ -106,6 +115,10 @@ asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();
   error_code error;
   local_address_ = stream_.socket().local_endpoint(error).address().to_string();
+  const auto peer = stream_.socket().remote_endpoint(error).address();
+  is_from_here_ =
+      !error && (peer.is_loopback() || (peer.is_v6() && peer.to_v6().is_v4_mapped() &&
+                                        asio::ip::make_address_v4(asio::ip::v4_mapped, peer.to_v6()).is_loopback()));
   context_.metrics.connections_open += 1;
   if (context_.add(self)) {
     try {
@@ -124,7 +137,7 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   const NetLimits& limits = context_.options.limits;
   http::request_parser<http::string_body> parser;
   parser.header_limit(static_cast<std::uint32_t>(limits.header_size_bytes));
-  parser.body_limit(limits.body_size_bytes);
+  parser.body_limit(std::max(limits.body_size_bytes, limits.block_size_bytes));
 
   stream_.expires_after(limits.header_timeout);
   is_waiting_for_request_ = true;
@@ -132,6 +145,14 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   is_waiting_for_request_ = false;
   if (is_stopping_) co_return false;
   const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
+  const bool is_change = is_block_change(parser.get());
+  if (!error && !is_change) {
+    if (parser.content_length().value_or(0) > limits.body_size_bytes) error = http::error::body_limit;
+    parser.body_limit(limits.body_size_bytes);
+  }
+  if (!error && is_change && !refusal_of(parser.get())) {
+    std::tie(error, size) = co_await read_block_body(parser);
+  }
   if (!error && is_read_method && !parser.is_done()) {
     std::tie(error, size) = co_await http::async_read(stream_, buffer_, parser, kAwait);
   }
@@ -147,11 +168,19 @@ asio::awaitable<bool> HttpConnection::serve_one() {
     co_return co_await write(text_reply(status, error.message() + "\n"), 11, false, false);
   }
 
-  const Request request = parser.release();
+  Request request = parser.release();
   const bool is_head = request.method() == http::verb::head;
   if (auto refused = refusal_of(request)) {
     context_.metrics.requests_refused += 1;
     co_return co_await write(*refused, request.version(), is_head, request.keep_alive() && is_read_method);
+  }
+  if (is_change) {
+    auto body = std::make_shared<const std::string>(std::move(request.body()));
+    const HttpRequest change{.target = *parsed_target(view(request.target())),
+                             .method = request.method() == http::verb::put ? HttpMethod::Put : HttpMethod::Delete,
+                             .body = std::move(body)};
+    const HttpReply reply = co_await answer(change);
+    co_return co_await write(reply, request.version(), false, request.keep_alive() && !is_stopping_);
   }
   auto target = *parsed_target(view(request.target()));
 
@@ -172,14 +201,39 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   co_return co_await write(reply, request.version(), is_head, request.keep_alive() && !is_stopping_);
 }
 
+asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_block_body(
+    http::request_parser<http::string_body>& parser) {
+  const auto expect = parser.get()[http::field::expect];
+  if (!parser.is_done() && beast::iequals(expect, "100-continue")) {
+    static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+    stream_.expires_after(context_.options.limits.write_timeout);
+    const auto [error, size] = co_await asio::async_write(stream_, asio::buffer(kContinue), kAwait);
+    if (error) co_return std::tuple(error, size);
+  }
+  while (!parser.is_done()) {
+    stream_.expires_after(context_.options.limits.body_timeout);
+    const auto [error, size] = co_await http::async_read_some(stream_, buffer_, parser, kAwait);
+    if (error) co_return std::tuple(error, size);
+  }
+  co_return std::tuple(error_code{}, std::size_t{0});
+}
+
 std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) const {
   if (count_of(request, http::field::host) != 1) return text_reply(400, "exactly one Host header is required\n");
   const auto host = view(request[http::field::host]);
   if (!context_.hosts.allows_host(host, local_address_)) {
     return text_reply(403, "this server does not answer to that host name; see --allow-host\n");
   }
-  if (request.method() != http::verb::get && request.method() != http::verb::head) {
-    auto reply = text_reply(405, "only GET and HEAD\n");
+  if (is_block_change(request)) {
+    // Pages of other origins may not write, and nobody from another machine, as long as there are no roles.
+    const auto origins = count_of(request, http::field::origin);
+    if (origins > 1 ||
+        (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
+      return text_reply(403, "pages of that origin may not change the map; see --allow-host\n");
+    }
+    if (!is_from_here_) return text_reply(403, "the map is changed from the robot's own machine alone\n");
+  } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    auto reply = text_reply(405, "only GET and HEAD; blocks of the map also PUT and DELETE\n");
     reply.headers.emplace_back("Allow", "GET, HEAD");
     return reply;
   }

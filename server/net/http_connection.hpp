@@ -1,11 +1,14 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/beast/core/error.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <memory>
 #include <string>
+#include <tuple>
 
 #include "server/net/connection_stream.hpp"
 #include "server/net/server_context.hpp"
@@ -30,6 +33,9 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<bool> serve_one();
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
+  /// The rest of a request whose header was read and is good.
+  boost::asio::awaitable<std::tuple<boost::beast::error_code, std::size_t>> read_block_body(
+      boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
   HttpReply static_reply(const HttpRequest& request) const;
   /// Why the request is refused before anything looks at what it asks for.
   std::optional<HttpReply> refusal_of(const Request& request) const;
@@ -39,6 +45,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   ServerContext& context_;
   boost::beast::flat_buffer buffer_;
   std::string local_address_;
+  bool is_from_here_ = false;  ///< The peer is on this machine.
   bool is_stopping_ = false;
   bool is_waiting_for_request_ = false;
 };

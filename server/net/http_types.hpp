@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -10,11 +11,19 @@
 
 namespace spectra::server {
 
-/// A GET or HEAD request that has passed every check of the network side.
+/// The blocks of the map, below which they can be put and deleted.
+inline constexpr std::string_view kBlocksPath = "/api/v1/blocks";
+
+/// What a request asks for; HEAD is a Get whose body is left away.
+enum class HttpMethod { Get, Put, Delete };
+
+/// A request that has passed every check of the network side: Put and Delete come under kBlocksPath alone, from this machine.
 struct HttpRequest {
   RequestTarget target;
   std::string if_none_match = {};    ///< Empty when absent.
   std::string accept_encoding = {};  ///< All of them, joined by commas; empty when absent.
+  HttpMethod method = HttpMethod::Get;
+  std::shared_ptr<const std::string> body = {};  ///< Of a Put.
 };
 
 /// An answer; the network side adds length, date and the security headers, and leaves the body away for HEAD.

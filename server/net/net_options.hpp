@@ -12,7 +12,8 @@ namespace spectra::server {
 struct NetLimits {
   std::size_t header_size_bytes = 8 * 1024;
   std::size_t body_size_bytes = 1024 * 1024;
-  std::size_t message_size_bytes = 64 * 1024;     ///< One WebSocket message of a client.
+  std::size_t block_size_bytes = std::size_t{256} * 1024 * 1024;  ///< One block that is put into the map.
+  std::size_t message_size_bytes = 64 * 1024;                     ///< One WebSocket message of a client.
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
   std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.
   double messages_per_s = 10'000;                 ///< Beyond it a session's reading pauses (back-pressure).
@@ -20,6 +21,7 @@ struct NetLimits {
   double message_burst_s = 2;                     ///< How many seconds' worth of either may come at once.
   /// A request must be complete within this; the peer sees the end well within 10 s.
   std::chrono::milliseconds header_timeout{9'500};
+  std::chrono::milliseconds body_timeout{10'000};  ///< The body of a block may stand still for this long.
   /// A write may stand still for this long; with two ticks more, within which it is noticed, that is 15 s.
   std::chrono::milliseconds write_timeout{13'000};
   std::chrono::milliseconds ping_interval{4'000};

@@ -106,6 +106,7 @@ export interface ProtocolDefinitions {
   SceneChanged: SceneChanged;
   SceneDescription: SceneDescription;
   SceneNote: SceneNote;
+  SceneObserved: SceneObserved;
   SceneTemperature: SceneTemperature;
   ServerInfo: ServerInfo;
   Status: Status;
@@ -403,6 +404,11 @@ export interface SceneDescription {
    */
   metric?: boolean;
   /**
+   * A map that began empty and is expected to grow.
+   */
+  live?: boolean;
+  observed?: SceneObserved;
+  /**
    * What loading noticed.
    */
   notes: SceneNote[];
@@ -430,6 +436,13 @@ export interface SceneTemperature {
    * Vertices colder than the sensor could tell.
    */
   under_range_count: number;
+}
+/**
+ * When parts of the scene were seen, Unix seconds; of the parts of which that is known.
+ */
+export interface SceneObserved {
+  oldest: number | null;
+  newest: number | null;
 }
 /**
  * Something that was repaired, left out or interpreted while the scene was read.

@@ -34,6 +34,8 @@ const optionalFields = new Set([
   'resumed_tiles',
   'core_bounds',
   'metric',
+  'live',
+  'observed',
   'highlighted_share',
   'temperature_range',
   'over_range',

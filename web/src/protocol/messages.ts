@@ -77,6 +77,8 @@ export const scene: Decoder<Scene> = object({
   position_step_m: number,
   up: oneOf('x', 'y', 'z', '-x', '-y', '-z'),
   metric: optional(boolean),
+  live: optional(boolean),
+  observed: optional(object({ oldest: nullable(number), newest: nullable(number) })),
   notes: array(object({ id: string, count, message: string })),
 });
 

@@ -1,0 +1,196 @@
+// A mapper puts blocks into the map with plain HTTP while a viewer watches: what has changed is sent, nothing else; what cannot be
+// taken is refused with a reason and changes nothing; and with a store the map is there again after the server was killed.
+import assert from "node:assert/strict";
+import { once } from "node:events";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { after, test } from "node:test";
+import { readPly } from "./ply.mjs";
+import { KIND, SpectraClient } from "./spectra_client.mjs";
+import { serve } from "./spectra_server.mjs";
+
+const scratch = mkdtempSync(path.join(tmpdir(), "spectra-blocks-"));
+after(() => rmSync(scratch, { recursive: true, force: true }));
+
+/** A bumpy patch of side x side vertices, a metre apart: beside each other they share the vertices of their borders. */
+function patch(column, row, { side = 101, celsius = 20, height = 0 } = {}) {
+  const count = side * side;
+  const faces = (side - 1) * (side - 1) * 2;
+  const header =
+    `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\n` +
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float temperature\n" +
+    `element face ${faces}\nproperty list uchar int vertex_indices\nend_header\n`;
+  const body = Buffer.alloc(count * 19 + faces * 13);
+  let at = 0;
+  for (let v = 0; v < count; v += 1) {
+    const x = column * (side - 1) + (v % side);
+    const y = row * (side - 1) + Math.floor(v / side);
+    for (const value of [x, y, height + Math.sin(x / 7) * Math.cos(y / 9)]) at = body.writeFloatLE(value, at);
+    for (const value of [v % 256, 90, 120]) at = body.writeUInt8(value, at);
+    at = body.writeFloatLE(celsius + Math.sin(v), at);
+  }
+  for (let r = 0; r + 1 < side; r += 1) {
+    for (let c = 0; c + 1 < side; c += 1) {
+      const a = r * side + c;
+      for (const corners of [
+        [a, a + 1, a + side],
+        [a + 1, a + side + 1, a + side],
+      ]) {
+        at = body.writeUInt8(3, at);
+        for (const corner of corners) at = body.writeInt32LE(corner, at);
+      }
+    }
+  }
+  return Buffer.concat([Buffer.from(header), body]);
+}
+
+async function ask(server, method, id, { body, query = "" } = {}) {
+  const reply = await fetch(`${server.url}/api/v1/blocks/${id}${query}`, { method, body });
+  const text = await reply.text();
+  return { status: reply.status, answer: reply.headers.get("content-type")?.includes("json") ? JSON.parse(text) : text };
+}
+
+async function put(server, id, body, query) {
+  const { status, answer } = await ask(server, "PUT", id, { body, query });
+  assert.equal(status, 200, JSON.stringify(answer));
+  return answer;
+}
+
+async function list(server, query = "") {
+  return (await fetch(`${server.url}/api/v1/blocks${query}`)).json();
+}
+
+const sceneOf = async (server) => (await fetch(`${server.url}/api/v1/scene`)).json();
+
+/** The picture of a revision of the scene is complete. */
+async function shows(client, revision) {
+  await client.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision >= revision);
+  assert.deepEqual(client.failures, []);
+}
+
+test("a viewer is sent what has changed, and nothing else", async (t) => {
+  const server = await serve(["--live"]);
+  for (let i = 0; i < 16; i += 1) await put(server, `b${i}`, patch(i % 4, Math.floor(i / 4), { celsius: i === 5 ? 30 : 20 }));
+  const before = await sceneOf(server);
+  assert.equal(before.vertex_count, 16 * 101 * 101);
+  const client = await SpectraClient.connect(server.url);
+  await client.request("scene.subscribe", { channels: ["fused"] });
+  await shows(client, before.revision);
+  const held = new Map(client.tiles);
+  const first = client.frames.length;
+
+  await put(server, "b3", patch(3, 0, { height: 0.5 }));
+  const changed = await sceneOf(server);
+  assert.equal(changed.vertex_count, before.vertex_count);
+  await shows(client, changed.revision);
+  const frames = client.frames.slice(first);
+  const geometry = frames.filter(({ kind }) => kind === KIND.geometry);
+  t.diagnostic(`${held.size} tiles, ${frames.length} frames after the change, ${geometry.length} of them geometry`);
+  assert.ok(geometry.length > 0 && geometry.length <= held.size / 2, `${geometry.length} of ${held.size} tiles`);
+  const sent = new Set(geometry.map(({ tile }) => tile));
+  assert.ok(
+    frames.filter(({ kind }) => kind !== KIND.remove).every(({ tile }) => sent.has(tile)),
+    "colours of tiles that have not changed were sent",
+  );
+
+  // The same as a viewer who comes now.
+  const fresh = await SpectraClient.connect(server.url);
+  await fresh.request("scene.subscribe", { channels: ["fused"] });
+  await shows(fresh, changed.revision);
+  const keys = (viewer) => viewer.drawnTiles().map(({ frame }) => frame.tile).sort();
+  assert.deepEqual(keys(client), keys(fresh));
+
+  assert.equal((await ask(server, "DELETE", "b3")).status, 200);
+  const less = await sceneOf(server);
+  assert.equal(less.vertex_count, before.vertex_count - 101 * 101);
+  await shows(client, less.revision);
+  await client.close();
+  await fresh.close();
+  await server.stop();
+});
+
+test("blocks are listed in pages and given back as they came", async () => {
+  const server = await serve(["--live"]);
+  assert.deepEqual(await list(server), { blocks: [], next: null });
+  const ids = ["a", "b.1", "c-2", "d_3"];
+  for (const [i, id] of ids.entries()) await put(server, id, patch(i, 0, { side: 11 }), `?observed_at=${1000 + i}.5`);
+  const { blocks, next } = await list(server, "?limit=3");
+  assert.deepEqual(
+    blocks.map(({ id, observed_at, vertex_count, triangle_count }) => [id, observed_at, vertex_count, triangle_count]),
+    ids.slice(0, 3).map((id, i) => [id, 1000.5 + i, 121, 200]),
+  );
+  assert.equal(next, "c-2");
+  assert.match(blocks[0].sha256, /^[0-9a-f]{64}$/);
+  assert.deepEqual([blocks[1].bounds.min.slice(0, 2), blocks[1].bounds.max.slice(0, 2)], [[10, 0], [20, 10]]);
+  const rest = await list(server, `?after=${next}`);
+  assert.deepEqual([rest.blocks.map(({ id }) => id), rest.next], [["d_3"], null]);
+
+  const reply = await fetch(`${server.url}/api/v1/blocks/b.1`);
+  const file = path.join(scratch, "back.ply");
+  writeFileSync(file, Buffer.from(await reply.arrayBuffer()));
+  const sent = path.join(scratch, "sent.ply");
+  writeFileSync(sent, patch(1, 0, { side: 11 }));
+  assert.deepEqual(readPly(file), readPly(sent));
+  await server.stop();
+});
+
+test("what cannot be taken is refused with a reason, and the map stays as it was", async () => {
+  const server = await serve(["--live"]);
+  await put(server, "good", patch(0, 0, { side: 11 }));
+  const before = await sceneOf(server);
+  const points = patch(5, 0, { side: 5 });
+  const cloud = Buffer.concat([
+    Buffer.from(points.toString("latin1", 0, 400).split("element face")[0] + "end_header\n", "latin1"),
+    points.subarray(points.indexOf("end_header\n") + 11, points.indexOf("end_header\n") + 11 + 25 * 19),
+  ]);
+  const cases = [
+    [422, "body", await ask(server, "PUT", "x", { body: "no PLY" })],
+    [422, "body", await ask(server, "PUT", "x", { body: patch(0, 0).subarray(0, 5000) })],
+    [422, "body", await ask(server, "PUT", "x", { body: "" })],
+    [409, "body", await ask(server, "PUT", "x", { body: cloud })],
+    [400, "id", await ask(server, "PUT", "a%20b", { body: patch(0, 0, { side: 3 }) })],
+    [400, "id", await ask(server, "PUT", "x".repeat(65), { body: patch(0, 0, { side: 3 }) })],
+    [400, "observed_at", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?observed_at=now" })],
+    [400, "sensor", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?sensor=1,2" })],
+    [400, "colour", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?colour=red" })],
+    [400, "temperature_unit", await ask(server, "PUT", "x", { body: "", query: "?temperature_unit=reaumur" })],
+    [404, "id", await ask(server, "DELETE", "x")],
+    [404, "id", await ask(server, "GET", "x")],
+  ];
+  for (const [status, field, got] of cases) {
+    assert.equal(got.status, status, JSON.stringify(got));
+    assert.equal(got.answer.error.field, field, JSON.stringify(got));
+    assert.ok(got.answer.error.code.length > 0 && got.answer.error.reason.length > 10, JSON.stringify(got));
+    assert.doesNotMatch(got.answer.error.reason, /\/proc\//);
+  }
+  assert.equal((await ask(server, "POST", "x", { body: "x" })).status, 405);
+  const foreign = await fetch(`${server.url}/api/v1/blocks/x`, {
+    method: "PUT",
+    body: patch(0, 0, { side: 3 }),
+    headers: { Origin: "http://elsewhere.example" },
+  });
+  assert.equal(foreign.status, 403);
+  assert.deepEqual(await sceneOf(server), before);
+  await server.stop();
+});
+
+test("with a store the map is there again after the server was killed", async () => {
+  const store = path.join(scratch, "map.sqlite");
+  let server = await serve(["--live", "--store", store]);
+  for (let i = 0; i < 6; i += 1) await put(server, `b${i}`, patch(i, 0, { side: 21 }), `?observed_at=${i}`);
+  await put(server, "b2", patch(2, 0, { side: 21, height: 2 }), "?temperature_unit=kelvin");
+  await ask(server, "DELETE", "b4");
+  const before = { scene: await sceneOf(server), blocks: await list(server) };
+  server.process.kill("SIGKILL");
+  await once(server.process, "exit");
+  server = await serve(["--live", "--store", store]);
+  const scene = await sceneOf(server);
+  for (const name of ["vertex_count", "triangle_count", "bounds", "origin", "position_step_m", "temperature", "tile_count"]) {
+    assert.deepEqual(scene[name], before.scene[name], name);
+  }
+  assert.deepEqual(await list(server), before.blocks);
+  const { revision } = await put(server, "b9", patch(9, 0, { side: 21 }));
+  assert.ok(revision > Math.max(...before.blocks.blocks.map((block) => block.revision)), "revisions rise");
+  await server.stop();
+});
