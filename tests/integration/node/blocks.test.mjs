@@ -6,44 +6,13 @@ import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
+import { patch } from "./patch.mjs";
 import { readPly } from "./ply.mjs";
 import { KIND, SpectraClient } from "./spectra_client.mjs";
 import { serve } from "./spectra_server.mjs";
 
 const scratch = mkdtempSync(path.join(tmpdir(), "spectra-blocks-"));
 after(() => rmSync(scratch, { recursive: true, force: true }));
-
-/** A bumpy patch of side x side vertices, a metre apart: beside each other they share the vertices of their borders. */
-function patch(column, row, { side = 101, celsius = 20, height = 0 } = {}) {
-  const count = side * side;
-  const faces = (side - 1) * (side - 1) * 2;
-  const header =
-    `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\n` +
-    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float temperature\n" +
-    `element face ${faces}\nproperty list uchar int vertex_indices\nend_header\n`;
-  const body = Buffer.alloc(count * 19 + faces * 13);
-  let at = 0;
-  for (let v = 0; v < count; v += 1) {
-    const x = column * (side - 1) + (v % side);
-    const y = row * (side - 1) + Math.floor(v / side);
-    for (const value of [x, y, height + Math.sin(x / 7) * Math.cos(y / 9)]) at = body.writeFloatLE(value, at);
-    for (const value of [v % 256, 90, 120]) at = body.writeUInt8(value, at);
-    at = body.writeFloatLE(celsius + Math.sin(v), at);
-  }
-  for (let r = 0; r + 1 < side; r += 1) {
-    for (let c = 0; c + 1 < side; c += 1) {
-      const a = r * side + c;
-      for (const corners of [
-        [a, a + 1, a + side],
-        [a + 1, a + side + 1, a + side],
-      ]) {
-        at = body.writeUInt8(3, at);
-        for (const corner of corners) at = body.writeInt32LE(corner, at);
-      }
-    }
-  }
-  return Buffer.concat([Buffer.from(header), body]);
-}
 
 async function ask(server, method, id, { body, query = "" } = {}) {
   const reply = await fetch(`${server.url}/api/v1/blocks/${id}${query}`, { method, body });

@@ -1,0 +1,74 @@
+// A block of 10,000 vertices that is put again and again into a scene, while a Node viewer who sees all of it at full detail decodes:
+// how long until the changed leaves are decoded and until everything is, what is sent, and what it costs the server.
+//   node tests/bench/stream/block_update.mjs [SCENE.ply ...]     (without one: demo scenes of 100,000 and 1,000,000 vertices)
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { patch } from "../../integration/node/patch.mjs";
+import { isColours, SpectraClient } from "../../integration/node/spectra_client.mjs";
+import { binary, serve } from "../../integration/node/spectra_server.mjs";
+
+const ROUNDS = 20;
+const scratch = mkdtempSync(path.join(tmpdir(), "spectra-update-"));
+const scenes = process.argv.slice(2);
+if (scenes.length === 0) {
+  for (const count of [100_000, 1_000_000]) {
+    const file = path.join(scratch, `${count}.ply`);
+    execFileSync(binary, ["demo-scene", file, "--vertices", `${count}`]);
+    scenes.push(file);
+  }
+}
+
+const median = (values) => values.sort((a, b) => a - b)[values.length >> 1];
+/** Seconds of processor time of a process, its children apart. */
+function cpuSeconds(pid) {
+  const fields = readFileSync(`/proc/${pid}/stat`, "latin1").split(") ")[1].split(" ");
+  return (Number(fields[11]) + Number(fields[12])) / 100;
+}
+
+for (const scene of scenes) {
+  const server = await serve([scene]);
+  const client = await SpectraClient.connect(server.url);
+  await client.request("scene.subscribe", { channels: ["fused"] });
+  await client.notification("stream.complete", 120_000, ({ vertices }) => vertices > 0);
+  const { bounds, origin } = client.hello.scene;
+  const middle = bounds.min.map((low, axis) => (low + bounds.max[axis]) / 2);
+  const extent = Math.max(...bounds.min.map((low, axis) => bounds.max[axis] - low));
+  const times = { leaf_ms: [], all_ms: [], cpu_ms: [], bytes: [], tiles: [] };
+  for (let round = 0; round < ROUNDS; round += 1) {
+    const body = patch(0, 0, {
+      side: 101,
+      height: round / 10,
+      scale: extent / 2000,
+      at: middle.map((value, axis) => value + origin[axis]),
+    });
+    const first = client.frames.length;
+    const before_s = cpuSeconds(server.process.pid);
+    const begin = performance.now();
+    const { revision } = client.notifications.findLast(({ method }) => method === "scene.changed")?.params.scene ?? client.hello.scene;
+    const complete = client.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision > revision);
+    const put = fetch(`${server.url}/api/v1/blocks/patch`, { method: "PUT", body });
+    let leaf_ms = null;
+    while (leaf_ms === null) {
+      await new Promise((resolve) => setTimeout(resolve, 1));
+      if (client.frames.slice(first).some(isColours)) leaf_ms = performance.now() - begin;
+    }
+    await Promise.all([put, complete]);
+    times.all_ms.push(performance.now() - begin);
+    times.leaf_ms.push(leaf_ms);
+    times.cpu_ms.push((cpuSeconds(server.process.pid) - before_s) * 1000);
+    const frames = client.frames.slice(first);
+    times.bytes.push(frames.reduce((sum, { bytes }) => sum + bytes, 0));
+    times.tiles.push(new Set(frames.map(({ tile }) => tile)).size);
+  }
+  console.log(
+    `${path.basename(scene)}: ${client.hello.scene.vertex_count} vertices, ${client.hello.scene.tile_count} tiles; medians of ${ROUNDS}: ` +
+      Object.entries(times)
+        .map(([name, values]) => `${name} ${median(values).toFixed(0)}`)
+        .join(", "),
+  );
+  await client.close();
+  await server.stop();
+}
+rmSync(scratch, { recursive: true, force: true });
