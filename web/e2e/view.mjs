@@ -351,10 +351,16 @@ export function addViewTests(browser, scratch) {
     assert.equal(await page.locator('[data-outline]').count(), 0, 'there is nothing to outline in the visible view');
 
     // It is remembered; off, a new page gets fewer bytes.
+    // On a link that seems quick a coarse tile is left uncoloured until it is needed, now and then: the most of some loads is with it.
     const received = async () => {
-      await page.reload();
-      await settled(page);
-      return (await state()).received_bytes;
+      const loads = [];
+      for (let i = 0; i < 4; i += 1) {
+        await page.reload();
+        await settled(page);
+        loads.push((await state()).received_bytes);
+      }
+      console.log(`        ${loads.join(', ')} bytes`);
+      return Math.max(...loads);
     };
     await page.keyboard.press('3');
     const on = await received();
