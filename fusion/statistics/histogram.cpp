@@ -64,8 +64,8 @@ double histogram_quantile(const Histogram& histogram, double part) {
   for (std::size_t bin = 0; bin < histogram.counts.size(); ++bin) {
     const auto count = static_cast<double>(histogram.counts[bin]);
     if (count > 0 && before + count >= wanted) {
-      const double low = histogram_edge(histogram, bin);
-      return low + (histogram_edge(histogram, bin + 1) - low) * ((wanted - before) / count);
+      // Exact at both edges, however far apart they are.
+      return std::lerp(histogram_edge(histogram, bin), histogram_edge(histogram, bin + 1), (wanted - before) / count);
     }
     before += count;
   }

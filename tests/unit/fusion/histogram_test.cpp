@@ -108,6 +108,13 @@ TEST(Histogram, QuantilesAreWithinOneBinOfTheSortedValues) {
   EXPECT_EQ(histogram_quantile(empty_histogram(1, 2, 4), 0.5), 0);
 }
 
+TEST(Histogram, QuantilesEndAtTheExtremesHoweverFarApart) {
+  Histogram histogram = empty_histogram(-7.871614e22F, 50.25F, 4);
+  histogram.counts = {1, 0, 0, 1};
+  EXPECT_EQ(histogram_quantile(histogram, 0), double{-7.871614e22F});
+  EXPECT_EQ(histogram_quantile(histogram, 1), 50.25);
+}
+
 TEST(Histogram, MergingPartsEqualsTheWhole) {
   std::vector<float> values;
   for (int i = 0; i < 1000; ++i) values.push_back(static_cast<float>((i * 37) % 101));
