@@ -145,7 +145,7 @@ Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& elemen
 void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   sample_.conclude();
   facts_.bulk = sample_.bulk();
-  facts_.origin = scene_origin(facts_.min, facts_.max, facts_.bulk);
+  facts_.origin = interpretation_.origin.value_or(scene_origin(facts_.min, facts_.max, facts_.bulk));
   const auto& hole = sample_.hole();
   if (!hole || interpretation_.hole) return;
   const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),

@@ -29,6 +29,7 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
                             const ReadOptions& options) {
   ReadOptions scene_options;  // those about temperature belong to the thermal file
   scene_options.metres_per_unit = options.metres_per_unit;
+  scene_options.origin = options.origin;
   scene_options.progress = options.progress;
   ReadOptions thermal_options = options;
   if (options.progress) {

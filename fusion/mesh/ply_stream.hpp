@@ -60,14 +60,16 @@ struct PlyBodyFacts {
 
 /// How the values of a file are taken.
 struct PlyInterpretation {
-  explicit PlyInterpretation(const ReadOptions& options) : temperature(options), metres_per_unit(options.scale()) {}
+  explicit PlyInterpretation(const ReadOptions& options)
+      : temperature(options), metres_per_unit(options.scale()), origin(options.origin) {}
 
   PlySchema schema;
   PlySurvey survey;
   ColourConversion colours;  ///< Of the vertices.
   TemperatureConversion temperature;
   double metres_per_unit;
-  std::optional<Vec3d> hole;  ///< Vertices there are no part of the scene; in metres.
+  std::optional<Vec3d> origin;  ///< Absent: chosen.
+  std::optional<Vec3d> hole;    ///< Vertices there are no part of the scene; in metres.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the

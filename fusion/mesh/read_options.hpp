@@ -8,6 +8,7 @@
 #include "fusion/error.hpp"
 #include "fusion/mesh/up_axis.hpp"
 #include "fusion/progress.hpp"
+#include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
 
@@ -35,6 +36,8 @@ struct ReadOptions {
   std::vector<double> no_data;
   /// Metres in one unit of the file's positions; absent: nobody has said, and they are taken for metres.
   std::optional<double> metres_per_unit;
+  /// What positions are to be relative to, in metres; absent: chosen as scene_origin.hpp says.
+  std::optional<Vec3d> origin;
   /// Which way is up; absent: found out. Reading does not need it, survey() does.
   std::optional<UpAxis> up;
   /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.

@@ -289,6 +289,25 @@ TEST(SceneOrigin, StaysZeroForASceneAroundZero) {
   EXPECT_EQ(scene.mesh.origin, Vec3d{});
 }
 
+TEST(SceneOrigin, IsTheOneThatIsGiven) {
+  // Two parts of one map: what they share is the same, though each by itself would have an origin of its own.
+  const auto part = [](const std::string& other, const Vec3d& origin) {
+    const std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
+        "500010.1230000001 4000000.7 1.1\n" +
+        other + "\n";
+    fusion::ReadOptions options;
+    options.origin = origin;
+    return loaded(text, options);
+  };
+  const Vec3d origin{500000, 4000000, 0};
+  const auto one = part("500000 4000000 0", origin), two = part("500030 4000900 2", origin);
+  EXPECT_EQ(one.mesh.origin, origin);
+  EXPECT_EQ(two.mesh.origin, origin);
+  EXPECT_EQ(one.mesh.positions()[0], two.mesh.positions()[0]);
+  EXPECT_EQ(one.mesh.positions()[0].x, static_cast<float>(500010.1230000001 - 500000));
+}
+
 TEST(SceneOrigin, LosesNothingOfFloatCoordinatesFarAway) {
   const float xs[] = {448'000.03125F, 448'123.0F, 448'127.96875F};
   const float ys[] = {-0.1F, 1e-20F, 3.0F};
