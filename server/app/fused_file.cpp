@@ -169,7 +169,7 @@ fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::Multispe
         return static_cast<float>(static_cast<double>(origin[axis]) +
                                   static_cast<double>(step) * static_cast<double>(lattice_points[v][axis]));
       };
-      positions[tile->source_vertex[v]] = {at(0), at(1), at(2)};
+      positions[scene.vertex_index(*tile, v)] = {at(0), at(1), at(2)};
     };
     if (tile->triangles.empty()) {
       for (std::uint32_t v = 0; v < tile->positions.size(); ++v) round(v);

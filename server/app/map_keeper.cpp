@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <future>
@@ -47,12 +49,14 @@ class MemoryFile {
   int descriptor_;
 };
 
-fusion::Result<fusion::LoadedScene> loaded(const IncomingBlock& block) {
+fusion::Result<fusion::LoadedScene> loaded(const IncomingBlock& block, const std::optional<fusion::Vec3d>& origin) {
   const MemoryFile file(*block.ply);
   if (!file.is_open()) {
     return fusion::failure(fusion::ErrorCode::FileUnreadable, "there is no memory for the block", "body");
   }
-  auto scene = fusion::read_ply(file.path(), block.read);
+  fusion::ReadOptions options = block.read;
+  options.origin = origin;
+  auto scene = fusion::read_ply(file.path(), options);
   if (scene) {
     fusion::survey(scene.value(), block.read);
     scene.value().mesh.name = block.id;
@@ -80,10 +84,8 @@ store::BlockBounds bounds_of_mesh(const fusion::MultispectralMesh& mesh) {
   return {absolute(low), absolute(high)};
 }
 
-BlockRefusal refusal_of(const fusion::Error& error) {
-  const bool is_conflict = error.code == fusion::ErrorCode::Unsupported && error.field == "map";
-  return {is_conflict ? 409u : 422u, is_conflict ? "conflict" : "unreadable_block", is_conflict ? "body" : error.field,
-          error.message, ""};
+BlockRefusal busy(std::string reason, std::string limits = "") {
+  return {503, "busy", "", std::move(reason), std::move(limits)};
 }
 
 BlockRefusal refusal_of(const store::StoreError& error) {
@@ -96,7 +98,7 @@ BlockRefusal refusal_of(const store::StoreError& error) {
     case StoreErrorCode::InvalidRecord:
       return {400, "bad_request", "", error.message, ""};
     case StoreErrorCode::Busy:
-      return {503, "busy", "", error.message, ""};
+      return busy(error.message);
     default:
       return {507, "not_stored", "", error.message, ""};
   }
@@ -117,6 +119,8 @@ std::optional<MapConstants> constants_of(const std::string& text) {
                   &v[7]) != 8) {
     return std::nullopt;
   }
+  const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
+  if (!is_finite || !(v[6] > 0) || !(static_cast<float>(v[7]) > 0)) return std::nullopt;
   return MapConstants{.origin = {v[0], v[1], v[2]},
                       .grid = MapGrid({v[3], v[4], v[5]}, v[6]),
                       .position_step_m = static_cast<float>(v[7])};
@@ -128,101 +132,133 @@ MapKeeper::MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> sto
     : served_(served), store_(std::move(store)), writer_([this] { run(); }) {}
 
 MapKeeper::~MapKeeper() {
+  end();
+}
+
+void MapKeeper::end() {
+  std::deque<Change> refused;
   {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     is_ending_ = true;
+    is_read_.wait(lock, [this] { return reading_count_ == 0; });
+    refused.swap(waiting_);
   }
   has_work_.notify_all();
-  writer_.join();
+  if (writer_.joinable()) writer_.join();
+  for (Change& change : refused) refuse(change, busy("the server ends"));
 }
 
 std::optional<std::string> MapKeeper::restore() {
   MapChange change;
   std::optional<std::string> problem;
+  std::map<std::string, BlockEntry, std::less<>> entries;
+  std::optional<fusion::Vec3d> origin;
   if (store_) {
     if (const auto text = store_->constant(kConstantsKey)) {
       const auto constants = constants_of(*text);
       if (!constants) return "the store's constants of the map cannot be read";
       served_.scenes.begin(*constants);
+      origin = constants->origin;
     }
-    const auto done = store_->visit(std::nullopt, [&](store::StoredBlock stored) {
+    const auto visited = store_->visit(std::nullopt, [&](store::StoredBlock stored) {
       const store::BlockDescription& told = stored.facts.description;
       auto block = incoming_block(told.id, told.read_options);
-      if (!block) {
-        problem = "block " + told.id + ": " + block.error().message;
-        return false;
-      }
-      block.value().ply = stored.ply;
-      auto scene = loaded(block.value());
+      if (block) block.value().ply = stored.ply;
+      auto scene = block ? loaded(block.value(), origin) : fusion::Result<fusion::LoadedScene>(block.error());
       if (!scene) {
         problem = "block " + told.id + ": " + scene.error().message;
         return false;
       }
-      entries_[told.id] = {told.id,
-                           stored.facts.revision,
-                           told.observed_at,
-                           told.vertex_count,
-                           told.triangle_count,
-                           told.bounds,
-                           store::to_hex(stored.facts.sha256)};
+      entries[told.id] = {told.id,
+                          stored.facts.revision,
+                          told.observed_at,
+                          told.vertex_count,
+                          told.triangle_count,
+                          told.bounds,
+                          store::to_hex(stored.facts.sha256)};
       change.put.push_back({told.id, std::move(scene).value(), told.observed_at});
       return true;
     });
-    if (!problem && !done) problem = done.error().message;
+    if (!problem && !visited) problem = visited.error().message;
     if (problem) return problem;
-    last_revision_ = store_->status().last_revision;
   }
-  const auto published = served_.scenes.change(std::move(change), served_.pool);
-  if (!published) return published.error().message;
+  served_.scenes.change(std::move(change), served_.pool);
+  if (const auto constants = served_.scenes.constants()) origin = constants->origin;
+  const std::lock_guard lock(mutex_);
+  entries_ = std::move(entries);
+  if (store_) last_revision_ = store_->status().last_revision;
+  origin_ = origin;
+  is_open_ = true;
   return std::nullopt;
 }
 
-void MapKeeper::add_file_block(const SceneSnapshot& scene) {
-  const auto& origin = scene.origin();
+void MapKeeper::open_with_file() {
+  const auto scene = served_.scenes.current();
+  const fusion::Vec3d origin = scene->origin();
   const auto absolute = [&](const fusion::Vec3f& p) {
     return fusion::Vec3d{origin.x + double{p.x}, origin.y + double{p.y}, origin.z + double{p.z}};
   };
-  const std::lock_guard lock(mutex_);
   const std::string id(SceneStore::kFileBlock);
+  const std::lock_guard lock(mutex_);
   entries_[id] = {id,
                   0,
                   std::nullopt,
-                  scene.vertex_count(),
-                  scene.triangle_count(),
-                  {absolute(scene.bounds().min), absolute(scene.bounds().max)},
+                  scene->vertex_count(),
+                  scene->triangle_count(),
+                  {absolute(scene->bounds().min), absolute(scene->bounds().max)},
                   ""};
+  origin_ = origin;
+  is_open_ = true;
 }
 
 void MapKeeper::put(IncomingBlock block, PutDone done) {
+  const std::size_t size = block.ply->size();
+  std::optional<BlockRefusal> refusal;
   {
     const std::lock_guard lock(mutex_);
-    if (is_ending_ || waiting_bytes_ + block.ply->size() > kWaitingBytes) {
-      return done(BlockRefusal{503, "busy", "", "too many bytes of blocks are waiting",
-                               std::to_string(kWaitingBytes) + " bytes"});
+    if (!is_open_ || is_ending_) {
+      refusal = busy("the map is not open yet, or not any more");
+    } else if (waiting_bytes_ + size > kWaitingBytes) {
+      refusal = busy("too many bytes of blocks are waiting", std::to_string(kWaitingBytes) + " bytes");
+    } else {
+      waiting_bytes_ += size;
+      ++reading_count_;
     }
-    waiting_bytes_ += block.ply->size();
   }
-  PutDone counted = [this, size = block.ply->size(),
-                     done = std::move(done)](std::variant<Taken, BlockRefusal> outcome) {
+  if (refusal) return done(std::move(*refusal));
+  const PutDone counted = [this, size, done = std::move(done)](std::variant<Taken, BlockRefusal> outcome) {
     {
       const std::lock_guard lock(mutex_);
       waiting_bytes_ -= size;
     }
     done(std::move(outcome));
   };
-  served_.pool.post([this, block = std::move(block), counted = std::move(counted)]() mutable {
-    read(std::move(block), std::move(counted));
+  served_.pool.post([this, block = std::move(block), counted]() mutable {
+    read(std::move(block), counted);
+    // Under the lock: after it nothing here is touched any more.
+    const std::lock_guard lock(mutex_);
+    --reading_count_;
+    is_read_.notify_all();
   });
 }
 
-void MapKeeper::read(IncomingBlock block, PutDone done) {
+void MapKeeper::read(IncomingBlock block, const PutDone& done) {
+  std::optional<fusion::Vec3d> origin;
+  bool is_ending = false;
+  {
+    const std::lock_guard lock(mutex_);
+    origin = origin_;
+    is_ending = is_ending_;
+  }
+  if (is_ending) return done(busy("the server ends"));
   try {
-    auto scene = loaded(block);
-    if (!scene) return done(refusal_of(scene.error()));
-    enqueue(Put{std::move(block), std::move(scene).value(), std::move(done)});
+    auto scene = loaded(block, origin);
+    if (scene) return enqueue(Put{std::move(block), std::move(scene).value(), done});
+    const fusion::Error& error = scene.error();
+    done(BlockRefusal{422, "unreadable_block", error.field, error.message, ""});
   } catch (const std::exception& error) {
     spdlog::error("a block could not be read: {}", error.what());
-    done(BlockRefusal{503, "busy", "", "the block could not be read now", ""});
+    done(busy("the block could not be read now"));
   }
 }
 
@@ -233,48 +269,61 @@ void MapKeeper::remove(std::string id, RemoveDone done) {
 void MapKeeper::enqueue(Change change) {
   {
     const std::lock_guard lock(mutex_);
-    waiting_.push_back(std::move(change));
+    if (is_open_ && !is_ending_ && waiting_.size() < kWaitingChanges) {
+      waiting_.push_back(std::move(change));
+      has_work_.notify_one();
+      return;
+    }
   }
-  has_work_.notify_one();
+  refuse(change, busy("too many changes are waiting, or the map is not open", std::to_string(kWaitingChanges)));
+}
+
+void MapKeeper::refuse(Change& change, const BlockRefusal& refusal) {
+  if (auto* put = std::get_if<Put>(&change)) put->done(refusal);
+  if (auto* gone = std::get_if<Remove>(&change)) gone->done(refusal);
 }
 
 void MapKeeper::run() {
   for (;;) {
-    std::vector<Change> batch;
-    {
-      std::unique_lock lock(mutex_);
-      has_work_.wait(lock, [this] { return is_ending_ || !waiting_.empty(); });
-      if (is_ending_) return;
-      // One change a block: the next waits for its own version.
-      std::set<std::string> named;
-      while (!waiting_.empty()) {
-        const auto id_of = [](const auto& one) -> const std::string& {
-          if constexpr (requires { one.block; }) {
-            return one.block.id;
-          } else {
-            return one.id;
-          }
-        };
-        if (!named.insert(std::visit(id_of, waiting_.front())).second) break;
-        batch.push_back(std::move(waiting_.front()));
-        waiting_.pop_front();
-      }
-    }
+    std::vector<Change> batch = next_batch();
+    if (batch.empty()) return;
     take(std::move(batch));
   }
 }
 
-void MapKeeper::take(std::vector<Change> batch) {
-  // What the map refuses must not be stored.
-  MapChange probe = map_change_of(batch);
-  const auto refused = served_.scenes.refusal_of(probe);
-  for (BlockPut& put : probe.put) {
-    for (Change& change : batch) {
-      if (auto* one = std::get_if<Put>(&change); one != nullptr && one->block.id == put.id)
-        one->scene = std::move(put.scene);
+std::vector<MapKeeper::Change> MapKeeper::next_batch() {
+  std::unique_lock lock(mutex_);
+  has_work_.wait(lock, [this] { return is_ending_ || !waiting_.empty(); });
+  std::vector<Change> batch;
+  // One change a block: the next waits for a version of its own.
+  std::set<std::string> named;
+  while (!is_ending_ && !waiting_.empty()) {
+    const auto* put = std::get_if<Put>(&waiting_.front());
+    if (!named.insert(put != nullptr ? put->block.id : std::get<Remove>(waiting_.front()).id).second) break;
+    batch.push_back(std::move(waiting_.front()));
+    waiting_.pop_front();
+  }
+  return batch;
+}
+
+MapKeeper::Shapes MapKeeper::shapes_of(const std::vector<Change>& batch) {
+  Shapes shapes;
+  for (const Change& change : batch) {
+    if (const auto* put = std::get_if<Put>(&change)) {
+      const auto& mesh = put->scene.mesh;
+      shapes.put.push_back({put->block.id, mesh.vertex_count(), !mesh.is_point_cloud()});
+    } else {
+      shapes.removed.push_back(std::get<Remove>(change).id);
     }
   }
-  if (refused && batch.size() > 1) {
+  return shapes;
+}
+
+void MapKeeper::take(std::vector<Change> batch) {
+  // What the map refuses must not be stored.
+  const Shapes shapes = shapes_of(batch);
+  if (const auto refused = served_.scenes.refusal_of(shapes.put, shapes.removed)) {
+    if (batch.size() == 1) return refuse(batch.front(), {409, "conflict", "body", refused->message, ""});
     for (Change& change : batch) {
       std::vector<Change> alone;
       alone.push_back(std::move(change));
@@ -282,104 +331,90 @@ void MapKeeper::take(std::vector<Change> batch) {
     }
     return;
   }
-  if (refused) {
-    if (auto* put = std::get_if<Put>(&batch.front())) {
-      put->done(refusal_of(fusion::Error{refused->code, refused->message, "map"}));
-    }
-    return;
-  }
-
-  // Durable first.
+  const auto outcomes = stored(batch);
   std::vector<Change> taken;
-  std::vector<std::pair<std::future<store::StoreResult<store::Revision>>, std::size_t>> stored;
-  std::vector<store::BlockBounds> bounds(batch.size());
+  std::vector<store::Revision> revisions;
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    const auto promise = std::make_shared<std::promise<store::StoreResult<store::Revision>>>();
-    stored.emplace_back(promise->get_future(), i);
-    const auto on_done = [promise](store::StoreResult<store::Revision> revision) {
-      promise->set_value(std::move(revision));
-    };
-    if (auto* put = std::get_if<Put>(&batch[i])) {
-      bounds[i] = bounds_of_mesh(put->scene.mesh);
-      if (!store_) {
-        on_done(++last_revision_);
-        continue;
-      }
-      store_->put({{put->block.id, put->block.observed_at, put->block.sensor, put->block.read_text,
-                    put->scene.mesh.vertex_count(), put->scene.mesh.triangle_count(), bounds[i]},
-                   put->block.ply},
-                  on_done);
-    } else {
-      const std::string& id = std::get<Remove>(batch[i]).id;
-      if (!has(id)) {
-        on_done(store::failure(store::StoreErrorCode::NotFound, "there is no block \"" + id + "\""));
-      } else if (!store_ || id == SceneStore::kFileBlock) {
-        on_done(++last_revision_);
-      } else {
-        store_->remove(id, on_done);
-      }
-    }
-  }
-  std::vector<std::uint64_t> revisions;
-  for (auto& [future, i] : stored) {
-    auto revision = future.get();
-    if (revision) {
-      revisions.push_back(revision.value());
-      taken.push_back(std::move(batch[i]));
-      std::swap(bounds[taken.size() - 1], bounds[i]);
+    if (!outcomes[i]) {
+      refuse(batch[i], refusal_of(outcomes[i].error()));
       continue;
     }
-    const BlockRefusal refusal = refusal_of(revision.error());
-    if (auto* put = std::get_if<Put>(&batch[i])) put->done(refusal);
-    if (auto* gone = std::get_if<Remove>(&batch[i])) gone->done(refusal);
+    taken.push_back(std::move(batch[i]));
+    revisions.push_back(outcomes[i].value());
   }
-  if (taken.empty()) return;
+  if (!taken.empty()) publish(std::move(taken), revisions);
+}
 
-  std::vector<Taken> answers(taken.size());
-  for (std::size_t i = 0; i < taken.size(); ++i) {
-    const auto* put = std::get_if<Put>(&taken[i]);
-    if (put == nullptr) continue;
-    const auto& mesh = put->scene.mesh;
-    answers[i] = {{put->block.id, revisions[i], put->block.observed_at, mesh.vertex_count(), mesh.triangle_count(),
-                   bounds[i], store::to_hex(store::sha256(*put->block.ply))},
-                  put->scene.notes};
-  }
-  const auto published = served_.scenes.change(map_change_of(taken), served_.pool);
-  if (!published) spdlog::error("a block was stored and is not shown: {}", published.error().message);
-  if (store_) {
-    if (const auto constants = served_.scenes.constants()) {
-      const std::string text = text_of(*constants);
-      if (store_->constant(kConstantsKey) != text) store_->set_constant(kConstantsKey, text, [](const auto&) {});
-    }
-  }
-  for (std::size_t i = 0; i < taken.size(); ++i) {
-    if (auto* put = std::get_if<Put>(&taken[i])) {
-      {
-        const std::lock_guard lock(mutex_);
-        entries_[put->block.id] = answers[i].entry;
-      }
-      put->done(std::move(answers[i]));
+std::vector<store::StoreResult<store::Revision>> MapKeeper::stored(const std::vector<Change>& batch) {
+  using Outcome = store::StoreResult<store::Revision>;
+  std::vector<std::future<Outcome>> coming;
+  for (const Change& change : batch) {
+    const auto promise = std::make_shared<std::promise<Outcome>>();
+    coming.push_back(promise->get_future());
+    const auto on_done = [promise](Outcome outcome) { promise->set_value(std::move(outcome)); };
+    const auto* put = std::get_if<Put>(&change);
+    if (put == nullptr && !has(std::get<Remove>(change).id)) {
+      on_done(
+          store::failure(store::StoreErrorCode::NotFound, "there is no block \"" + std::get<Remove>(change).id + "\""));
+    } else if (!store_) {
+      on_done(++last_revision_);
+    } else if (put == nullptr) {
+      store_->remove(std::get<Remove>(change).id, on_done);
     } else {
-      auto& gone = std::get<Remove>(taken[i]);
-      {
-        const std::lock_guard lock(mutex_);
-        entries_.erase(gone.id);
-      }
-      gone.done(std::nullopt);
+      const auto& mesh = put->scene.mesh;
+      store_->put({{put->block.id, put->block.observed_at, put->block.sensor, put->block.read_text, mesh.vertex_count(),
+                    mesh.triangle_count(), bounds_of_mesh(mesh)},
+                   put->block.ply},
+                  on_done);
     }
+  }
+  std::vector<Outcome> outcomes;
+  for (auto& outcome : coming) outcomes.push_back(outcome.get());
+  return outcomes;
+}
+
+void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions) {
+  std::vector<Taken> taken(batch.size());
+  MapChange wanted;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    auto* put = std::get_if<Put>(&batch[i]);
+    if (put == nullptr) {
+      wanted.removed.push_back(std::get<Remove>(batch[i]).id);
+      continue;
+    }
+    const auto& mesh = put->scene.mesh;
+    taken[i] = {{put->block.id, revisions[i], put->block.observed_at, mesh.vertex_count(), mesh.triangle_count(),
+                 bounds_of_mesh(mesh), store::to_hex(store::sha256(*put->block.ply))},
+                put->scene.notes};
+    wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at});
+  }
+  served_.scenes.change(std::move(wanted), served_.pool);
+  keep_constants();
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (std::holds_alternative<Put>(batch[i])) {
+        entries_[taken[i].entry.id] = taken[i].entry;
+      } else {
+        entries_.erase(std::get<Remove>(batch[i]).id);
+      }
+    }
+    if (auto* put = std::get_if<Put>(&batch[i])) put->done(std::move(taken[i]));
+    if (auto* gone = std::get_if<Remove>(&batch[i])) gone->done(std::nullopt);
   }
 }
 
-MapChange MapKeeper::map_change_of(std::vector<Change>& batch) {
-  MapChange change;
-  for (Change& one : batch) {
-    if (auto* put = std::get_if<Put>(&one)) {
-      change.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at});
-    } else {
-      change.removed.push_back(std::get<Remove>(one).id);
-    }
+void MapKeeper::keep_constants() {
+  const auto constants = served_.scenes.constants();
+  if (!constants) return;
+  {
+    const std::lock_guard lock(mutex_);
+    origin_ = constants->origin;
   }
-  return change;
+  if (!store_ || store_->constant(kConstantsKey) == text_of(*constants)) return;
+  store_->set_constant(kConstantsKey, text_of(*constants), [](const store::StoreResult<void>& outcome) {
+    if (!outcome) spdlog::error("the map's constants could not be stored: {}", outcome.error().message);
+  });
 }
 
 std::vector<BlockEntry> MapKeeper::page(std::string_view after, std::size_t limit) const {

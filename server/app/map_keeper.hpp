@@ -16,6 +16,7 @@
 
 #include "fusion/mesh/read_options.hpp"
 #include "server/app/served_scene.hpp"
+#include "server/net/block_refusal.hpp"
 #include "server/store/block_store.hpp"
 
 namespace spectra::server {
@@ -28,15 +29,6 @@ struct BlockEntry {
   std::uint64_t vertex_count = 0, triangle_count = 0;
   store::BlockBounds bounds;  ///< In the coordinates of the file, metres.
   std::string sha256;         ///< Of the bytes as they came; empty for the scene that was served from the start.
-};
-
-/// Why a block, or taking one out, was refused; nothing has changed then.
-struct BlockRefusal {
-  unsigned status = 400;  ///< Of HTTP.
-  std::string code;       ///< snake_case, stable.
-  std::string field;
-  std::string reason;  ///< One sentence for a person.
-  std::string limits;  ///< May be empty.
 };
 
 /// A block that comes in.
@@ -62,16 +54,20 @@ class MapKeeper {
 
   /// `store` may be null: then the map is gone with the program.
   MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store);
-  ~MapKeeper();  ///< Finishes what is being written, and drops what waits.
+  ~MapKeeper();  ///< As end().
   MapKeeper(const MapKeeper&) = delete;
   MapKeeper& operator=(const MapKeeper&) = delete;
 
-  /// Everything that the store holds, or an empty map. Before anything is put. Error: what is wrong, in a sentence.
+  /// Opens the map: everything that the store holds, or an empty one. Error: what is wrong, in a sentence.
   std::optional<std::string> restore();
-  /// The scene that was served from the start, as a block.
-  void add_file_block(const SceneSnapshot& scene);
+  /// Opens the map that the store of scenes has: the scene that is served from the start.
+  void open_with_file();
 
-  /// `done` is called once, from any thread, when the block is part of the map and durable where there is a store.
+  /// Finishes what is being read and written, refuses what waits and what comes. Answers nobody afterwards.
+  void end();
+
+  /// `done` is called once, from any thread, when the block is part of the map and durable where there is a store. Refused with
+  /// Busy (503) before the map is open.
   void put(IncomingBlock block, PutDone done);
   void remove(std::string id, RemoveDone done);
 
@@ -81,6 +77,8 @@ class MapKeeper {
 
   /// Bytes of blocks that may wait at a time.
   static constexpr std::size_t kWaitingBytes = 256u << 20;
+  /// Changes that may wait at a time.
+  static constexpr std::size_t kWaitingChanges = 4096;
 
  private:
   struct Put {
@@ -94,11 +92,22 @@ class MapKeeper {
   };
   using Change = std::variant<Put, Remove>;
 
-  void read(IncomingBlock block, PutDone done);
+  /// The shape of what a batch puts, and the names of what it takes out.
+  struct Shapes {
+    std::vector<BlockShape> put;
+    std::vector<std::string> removed;
+  };
+
+  void read(IncomingBlock block, const PutDone& done);
   void enqueue(Change change);
   void run();
+  std::vector<Change> next_batch();
   void take(std::vector<Change> batch);
-  static MapChange map_change_of(std::vector<Change>& batch);
+  std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
+  void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
+  void keep_constants();
+  static void refuse(Change& change, const BlockRefusal& refusal);
+  static Shapes shapes_of(const std::vector<Change>& batch);
 
   ServedScene& served_;
   const std::unique_ptr<store::BlockStore> store_;
@@ -106,8 +115,12 @@ class MapKeeper {
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
   std::deque<Change> waiting_;
-  std::size_t waiting_bytes_ = 0;  ///< Of all that is under way.
+  std::size_t waiting_bytes_ = 0;    ///< Of all that is under way.
+  std::size_t reading_count_ = 0;    ///< Jobs on the pool.
+  std::condition_variable is_read_;  ///< A job has ended.
+  bool is_open_ = false;
   bool is_ending_ = false;
+  std::optional<fusion::Vec3d> origin_;  ///< Of the map, once it has one.
   std::map<std::string, BlockEntry, std::less<>> entries_;
   std::uint64_t last_revision_ = 0;
 

@@ -73,7 +73,7 @@ class SceneLoader {
                            scene->triangle_count());
             } else {
               load(options, served);
-              map.add_file_block(*served.scenes.current());
+              map.open_with_file();
             }
           } catch (const std::exception& error) {
             failure_ = error.what();
@@ -156,8 +156,7 @@ int run_serve(const ServeOptions& options) {
     store = std::move(opened).value();
   }
   MapKeeper map(*served, std::move(store));
-  HttpApi api(*served);
-  api.set_map(map);
+  HttpApi api(*served, map);
   std::unique_ptr<HttpServer> server;
   try {
     server = std::make_unique<HttpServer>(
@@ -181,6 +180,9 @@ int run_serve(const ServeOptions& options) {
     spdlog::default_logger()->flush();
     std::_Exit(kDone);
   }
+  // Whoever still answers does so to a server that is there.
+  map.end();
+  served->pool.stop();
   return loader.failure().empty() ? kDone : fail(kJobFailed, loader.failure());
 }
 

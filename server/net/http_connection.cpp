@@ -16,8 +16,10 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <exception>
+#include <optional>
 #include <utility>
 
+#include "server/net/block_refusal.hpp"
 #include "server/net/websocket_session.hpp"
 
 namespace spectra::server {
@@ -69,6 +71,32 @@ std::optional<HelloForm> hello_form_of(const RequestTarget& target) {
   return form;
 }
 
+/// Room for the body of a block, as long as it is in memory here.
+class BlockRoom {
+ public:
+  BlockRoom(ServerContext& context, std::size_t size_bytes)
+      : context_(context),
+        size_bytes_(size_bytes),
+        is_there_(context.block_bytes.fetch_add(size_bytes) + size_bytes <=
+                  context.options.limits.block_bytes_at_once) {}
+  ~BlockRoom() { context_.block_bytes -= size_bytes_; }
+  BlockRoom(const BlockRoom&) = delete;
+  BlockRoom& operator=(const BlockRoom&) = delete;
+
+  bool is_there() const { return is_there_; }
+
+ private:
+  ServerContext& context_;
+  const std::size_t size_bytes_;
+  const bool is_there_;
+};
+
+bool is_loopback(const asio::ip::address& address) {
+  if (address.is_loopback()) return true;
+  return address.is_v6() && address.to_v6().is_v4_mapped() &&
+         asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6()).is_loopback();
+}
+
 /// PUT or DELETE of a block of the map.
 bool is_block_change(const http::request<http::string_body>& request) {
   return (request.method() == http::verb::put || request.method() == http::verb::delete_) &&
@@ -115,10 +143,7 @@ asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();
   error_code error;
   local_address_ = stream_.socket().local_endpoint(error).address().to_string();
-  const auto peer = stream_.socket().remote_endpoint(error).address();
-  is_from_here_ =
-      !error && (peer.is_loopback() || (peer.is_v6() && peer.to_v6().is_v4_mapped() &&
-                                        asio::ip::make_address_v4(asio::ip::v4_mapped, peer.to_v6()).is_loopback()));
+  is_from_here_ = is_loopback(stream_.socket().remote_endpoint(error).address());
   context_.metrics.connections_open += 1;
   if (context_.add(self)) {
     try {
@@ -146,11 +171,21 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   if (is_stopping_) co_return false;
   const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
   const bool is_change = is_block_change(parser.get());
-  if (!error && !is_change) {
-    if (parser.content_length().value_or(0) > limits.body_size_bytes) error = http::error::body_limit;
-    parser.body_limit(limits.body_size_bytes);
+  const std::size_t largest_body = is_change ? limits.block_size_bytes : limits.body_size_bytes;
+  if (!error) {
+    if (parser.content_length().value_or(0) > largest_body) error = http::error::body_limit;
+    parser.body_limit(largest_body);
   }
+  std::optional<BlockRoom> room;
   if (!error && is_change && !refusal_of(parser.get())) {
+    room.emplace(context_, static_cast<std::size_t>(
+                               parser.content_length().value_or(parser.chunked() ? limits.block_size_bytes : 0)));
+    if (!room->is_there()) {
+      context_.metrics.requests_refused += 1;
+      const auto busy = refused({503, "busy", "", "too many bytes of blocks are being received",
+                                 std::to_string(limits.block_bytes_at_once) + " bytes at once"});
+      co_return co_await write(busy, 11, false, false);
+    }
     std::tie(error, size) = co_await read_block_body(parser);
   }
   if (!error && is_read_method && !parser.is_done()) {
@@ -162,6 +197,11 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   context_.metrics.requests += 1;
   if (error) {
     context_.metrics.requests_refused += 1;
+    if (is_change && error == http::error::body_limit) {
+      const auto too_large = refused({413, "too_large", "body", "the block is larger than a block may be",
+                                      std::to_string(limits.block_size_bytes) + " bytes"});
+      co_return co_await write(too_large, 11, false, false);
+    }
     const unsigned status = error == http::error::header_limit || error == http::error::buffer_overflow ? 431U
                             : error == http::error::body_limit                                          ? 413U
                                                                                                         : 400U;
@@ -229,9 +269,11 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) cons
     const auto origins = count_of(request, http::field::origin);
     if (origins > 1 ||
         (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
-      return text_reply(403, "pages of that origin may not change the map; see --allow-host\n");
+      return refused({403, "forbidden", "", "pages of that origin may not change the map; see --allow-host", ""});
     }
-    if (!is_from_here_) return text_reply(403, "the map is changed from the robot's own machine alone\n");
+    if (!is_from_here_) {
+      return refused({403, "forbidden", "", "the map is changed from the robot's own machine alone", ""});
+    }
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
     auto reply = text_reply(405, "only GET and HEAD; blocks of the map also PUT and DELETE\n");
     reply.headers.emplace_back("Allow", "GET, HEAD");

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -44,6 +46,7 @@ class ServerContext {
   StaticFiles& files;
   NetMetrics& metrics;
   HostList hosts;
+  std::atomic<std::size_t> block_bytes{0};  ///< Of blocks that are being received or answered.
 
   /// Registers a connection for the staged stop; false when the server is stopping already.
   bool add(const std::shared_ptr<Stoppable>& connection) {

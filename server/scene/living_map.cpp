@@ -117,19 +117,6 @@ bool differs_much(const fusion::TemperatureSummary& from, const fusion::Temperat
 
 }  // namespace
 
-/// A block that is part of the map; its mesh is in the leaves.
-struct LivingMap::Block {
-  BlockNumber number = 0;
-  std::uint64_t vertex_count = 0, triangle_count = 0;
-  std::optional<Bounds> core_bounds;
-  std::optional<double> observed_at;
-  bool has_visible = false, has_temperature = false, double_positions = false, is_metric = false;
-  fusion::UpAxis up = fusion::UpAxis::Z;
-  std::vector<fusion::LeftOutVertex> left_out;
-  std::string name;
-  std::vector<fusion::Note> notes;
-};
-
 LivingMap::LivingMap(const Options& options, const std::optional<MapConstants>& constants)
     : options_(options), constants_(constants) {}
 
@@ -141,72 +128,35 @@ TileSizes LivingMap::sizes() const {
   return sizes;
 }
 
-std::optional<fusion::Error> LivingMap::refusal_of(const MapChange& change) const {
-  std::set<std::string_view> gone(change.removed.begin(), change.removed.end());
-  for (const BlockPut& put : change.put) gone.insert(put.id);
+std::optional<fusion::Error> LivingMap::refusal_of(std::span<const BlockShape> put,
+                                                   std::span<const std::string> removed) const {
+  std::set<std::string_view> gone(removed.begin(), removed.end());
+  for (const BlockShape& block : put) gone.insert(block.id);
   std::uint64_t vertex_count = 0;
   std::optional<bool> has_triangles;
   for (const auto& [id, block] : blocks_) {
     if (gone.contains(id)) continue;
-    vertex_count += block->vertex_count;
-    has_triangles = block->triangle_count > 0;
+    vertex_count += block->facts.vertex_count;
+    has_triangles = block->facts.triangle_count > 0;
   }
-  for (const BlockPut& put : change.put) {
-    const fusion::MultispectralMesh& mesh = put.scene.mesh;
-    const bool is_mesh = !mesh.is_point_cloud();
-    vertex_count += mesh.vertex_count();
-    if (mesh.vertex_count() == 0) {
-      return fusion::Error{fusion::ErrorCode::Unsupported, "the block has no vertex", put.id};
+  for (const BlockShape& block : put) {
+    const std::string id(block.id);
+    vertex_count += block.vertex_count;
+    if (block.vertex_count == 0) {
+      return fusion::Error{fusion::ErrorCode::Unsupported, "the block has no vertex", id};
     }
     if (vertex_count > std::numeric_limits<std::uint32_t>::max()) {
-      return fusion::Error{fusion::ErrorCode::TooLarge, "the map would have more than 4294967295 vertices", put.id};
+      return fusion::Error{fusion::ErrorCode::TooLarge, "the map would have more than 4294967295 vertices", id};
     }
-    if (has_triangles.value_or(is_mesh) != is_mesh) {
+    if (has_triangles.value_or(block.has_triangles) != block.has_triangles) {
       return fusion::Error{fusion::ErrorCode::Unsupported,
-                           is_mesh ? "the map is made of points, and this block has triangles"
-                                   : "the map is made of triangles, and this block has points alone",
-                           put.id};
+                           block.has_triangles ? "the map is made of points, and this block has triangles"
+                                               : "the map is made of triangles, and this block has points alone",
+                           id};
     }
-    has_triangles = is_mesh;
+    has_triangles = block.has_triangles;
   }
   return std::nullopt;
-}
-
-std::optional<fusion::MultispectralMesh> LivingMap::mesh_of(std::string_view block) const {
-  const auto found = blocks_.find(block);
-  if (found == blocks_.end()) return std::nullopt;
-  const Block& info = *found->second;
-  fusion::MultispectralMesh mesh;
-  mesh.origin = constants_->origin;
-  mesh.has_visible = info.has_visible;
-  mesh.has_temperature = info.has_temperature;
-  mesh.double_positions = info.double_positions;
-  mesh.name = info.name;
-  mesh.up = info.up;
-  mesh.is_metric = info.is_metric;
-  mesh.resize_vertices(static_cast<std::size_t>(info.vertex_count));
-  mesh.triangles().resize(static_cast<std::size_t>(info.triangle_count));
-  for (const auto& leaf : leaves_of(root_)) {
-    if (!std::binary_search(leaf->blocks.begin(), leaf->blocks.end(), info.number)) continue;
-    const Tile& tile = *leaf->tile;
-    const auto is_its = [&](std::size_t v) {
-      return (tile.vertex_block.empty() ? tile.block : tile.vertex_block[v]) == info.number;
-    };
-    for (std::size_t v = 0; v < tile.owned_count; ++v) {
-      if (!is_its(v)) continue;
-      const std::uint32_t source = tile.source_vertex[v];
-      mesh.positions()[source] = tile.positions[v];
-      mesh.visible()[source] = tile.visible[v];
-      mesh.temperature_celsius()[source] = tile.temperature_celsius[v];
-    }
-    for (std::size_t t = 0; t < tile.triangles.size(); ++t) {
-      const fusion::Triangle& triangle = tile.triangles[t];
-      if (!is_its(triangle[0])) continue;
-      fusion::Triangle& its = mesh.triangles()[tile.source_triangle[t]];
-      for (unsigned corner = 0; corner < 3; ++corner) its[corner] = tile.source_vertex[triangle[corner]];
-    }
-  }
-  return mesh;
 }
 
 std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, std::uint32_t revision, WorkerPool& pool,
@@ -221,48 +171,53 @@ std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, s
   }
   if (!put.empty() || !change_wanted.removed.empty()) change(std::move(put), change_wanted.removed, pool, progress);
 
+  auto snapshot = snapshot_of(version(revision));
+  if (snapshot->reference_temperature() != reference_) {
+    reference_ = snapshot->reference_temperature();
+    changed_vertex_count_ = 0;
+  }
+  fusion::report(progress, kTilingPhase, 1);
+  return snapshot;
+}
+
+MapVersion LivingMap::version(std::uint32_t revision) {
   MapVersion version;
   version.revision = revision;
   version.is_live = options_.is_live;
   version.position_step_m = 0x1p-10F;
+  MeshFacts& facts = version.facts;
   if (constants_) {
-    version.origin = constants_->origin;
+    facts.origin = constants_->origin;
     version.position_step_m = constants_->position_step_m;
   }
-  bool is_first = true;
-  bool has_core = false;
+  const auto first = blocks_.find(first_id_);
+  if (first != blocks_.end()) {
+    facts.name = first->second->facts.name;
+    facts.up = first->second->facts.up;
+    facts.is_metric = first->second->facts.is_metric;
+  }
+  if (options_.is_live) facts.name = "live map";
+  if (blocks_.size() == 1) facts.left_out = blocks_.begin()->second->facts.left_out;
   std::vector<Vec3f> core;
   for (const auto& [id, block] : blocks_) {
-    version.blocks.emplace(block->number, BlockPlace{version.vertex_count, version.triangle_count});
-    version.vertex_count += block->vertex_count;
-    version.triangle_count += block->triangle_count;
-    version.has_visible = version.has_visible || block->has_visible;
-    version.has_temperature = version.has_temperature || block->has_temperature;
-    version.double_positions = version.double_positions || block->double_positions;
-    version.notes.insert(version.notes.end(), block->notes.begin(), block->notes.end());
-    if (block->observed_at) {
-      version.oldest_observed_at =
-          std::min(version.oldest_observed_at.value_or(*block->observed_at), *block->observed_at);
-      version.newest_observed_at =
-          std::max(version.newest_observed_at.value_or(*block->observed_at), *block->observed_at);
+    facts.vertex_count += block->facts.vertex_count;
+    facts.triangle_count += block->facts.triangle_count;
+    facts.has_visible = facts.has_visible || block->facts.has_visible;
+    facts.has_temperature = facts.has_temperature || block->facts.has_temperature;
+    facts.double_positions = facts.double_positions || block->facts.double_positions;
+    if (const auto& seen = block->observed_at) {
+      version.oldest_observed_at = std::min(version.oldest_observed_at.value_or(*seen), *seen);
+      version.newest_observed_at = std::max(version.newest_observed_at.value_or(*seen), *seen);
     }
-    if (block->core_bounds) {
-      has_core = true;
-      core.push_back(block->core_bounds->min);
-      core.push_back(block->core_bounds->max);
-    }
-    if (std::exchange(is_first, false)) {
-      version.name = block->name;
-      version.up = block->up;
-      version.is_metric = block->is_metric;
-    }
+    if (block->core_bounds) core.insert(core.end(), {block->core_bounds->min, block->core_bounds->max});
   }
-  if (blocks_.size() == 1) version.left_out = blocks_.begin()->second->left_out;
-  if (has_core) version.core_bounds = bounds_of(core);
+  version.blocks = blocks_;
+  version.notes = notes();
+  if (!core.empty()) version.core_bounds = bounds_of(core);
   version.leaves = leaves_of(root_);
   if (root_) {
     version.top_level = top_of(root_)->id.level;
-    collect_shown(root_, version.triangle_count == 0, options_.levels == LevelsOfDetail::All, version.tiles);
+    collect_shown(root_, facts.triangle_count == 0, options_.levels == LevelsOfDetail::All, version.tiles);
     std::sort(version.tiles.begin(), version.tiles.end(),
               [](const auto& a, const auto& b) { return is_before(a->id, b->id); });
   }
@@ -277,17 +232,40 @@ std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, s
   }
   version.percentiles = *percentiles_;
   const bool is_reference_good =
-      reference_ && !differs_much(reference_summary_, version.summary) &&
-      static_cast<double>(changed_vertex_count_) < kReferenceChange * static_cast<double>(version.vertex_count);
+      reference_ && !differs_much(reference_->summary, version.summary) &&
+      static_cast<double>(changed_vertex_count_) < kReferenceChange * static_cast<double>(facts.vertex_count);
   if (is_reference_good) version.reference = reference_;
-  auto snapshot = snapshot_of(std::move(version));
-  if (!is_reference_good) {
-    reference_ = snapshot->reference_temperature();
-    reference_summary_ = reference_->summary;
-    changed_vertex_count_ = 0;
+  return version;
+}
+
+std::vector<fusion::Note> LivingMap::notes() const {
+  if (blocks_.size() == 1) return blocks_.begin()->second->notes;
+  // A note of a kind, however many blocks have it.
+  struct Told {
+    fusion::Note note;
+    std::size_t block_count = 0;
+  };
+  std::map<std::string, Told> by_id;
+  for (const auto& [id, block] : blocks_) {
+    for (const fusion::Note& note : block->notes) {
+      Told& told = by_id[note.id];
+      const std::uint64_t count = told.note.count + note.count;
+      const bool needs_attention = told.note.needs_attention || note.needs_attention;
+      told.note = note;
+      told.note.message = "block " + id + ": " + note.message;
+      told.note.count = count;
+      told.note.needs_attention = needs_attention;
+      ++told.block_count;
+    }
   }
-  fusion::report(progress, kTilingPhase, 1);
-  return snapshot;
+  std::vector<fusion::Note> notes;
+  for (auto& [id, told] : by_id) {
+    if (told.block_count > 1) {
+      told.note.message += " (and " + std::to_string(told.block_count - 1) + " more blocks)";
+    }
+    notes.push_back(std::move(told.note));
+  }
+  return notes;
 }
 
 void LivingMap::put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress) {
@@ -299,7 +277,7 @@ void LivingMap::put_first(BlockPut put, WorkerPool& pool, const fusion::Progress
   change(std::move(only), {}, pool, progress);
 }
 
-std::shared_ptr<LivingMap::Block> LivingMap::taken_in(BlockPut& put) {
+std::shared_ptr<const MapBlock> LivingMap::taken_in(BlockPut& put) {
   fusion::MultispectralMesh& mesh = put.scene.mesh;
   std::optional<Bounds>& core = put.scene.core_bounds;
   const fusion::Vec3d& origin = constants_->origin;
@@ -309,20 +287,13 @@ std::shared_ptr<LivingMap::Block> LivingMap::taken_in(BlockPut& put) {
     if (core) core = Bounds{moved(core->min, by), moved(core->max, by)};
     mesh.origin = origin;
   }
-  auto info = std::make_shared<Block>();
+  auto info = std::make_shared<MapBlock>();
   info->number = ++last_number_;
-  info->vertex_count = mesh.vertex_count();
-  info->triangle_count = mesh.triangle_count();
+  info->facts = facts_of(mesh);
   info->core_bounds = core;
   info->observed_at = put.observed_at;
-  info->has_visible = mesh.has_visible;
-  info->has_temperature = mesh.has_temperature;
-  info->double_positions = mesh.double_positions;
-  info->is_metric = mesh.is_metric;
-  info->up = mesh.up;
-  info->left_out = std::move(mesh.left_out);
-  info->name = mesh.name;
   info->notes = std::move(put.scene.notes);
+  if (!blocks_.contains(first_id_)) first_id_ = put.id;
   return info;
 }
 

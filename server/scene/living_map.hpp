@@ -8,6 +8,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "server/scene/coarse_tile.hpp"
 #include "server/scene/map_grid.hpp"
 #include "server/scene/map_tree.hpp"
+#include "server/scene/map_version.hpp"
 #include "server/scene/scene_snapshot.hpp"
 #include "server/scene/worker_pool.hpp"
 
@@ -28,6 +30,13 @@ struct BlockPut {
   std::string id;
   fusion::LoadedScene scene;
   std::optional<double> observed_at;  ///< Unix seconds.
+};
+
+/// What decides whether a block can be part of a map.
+struct BlockShape {
+  std::string_view id;
+  std::uint64_t vertex_count = 0;
+  bool has_triangles = false;
 };
 
 /// What becomes of a map in one step.
@@ -61,26 +70,23 @@ class LivingMap {
   /// Once there was a block.
   const std::optional<MapConstants>& constants() const { return constants_; }
 
-  /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; blocks without a vertex; more vertices in all than
-  /// fit 32 bits. Error: Unsupported; `field` is the block's name.
-  std::optional<fusion::Error> refusal_of(const MapChange& change) const;
-
-  /// A block as it was put, its positions relative to the origin of the map; nothing when there is none of that name.
-  std::optional<fusion::MultispectralMesh> mesh_of(std::string_view block) const;
+  /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; a block without a vertex;
+  /// more vertices in all than fit 32 bits. Error: Unsupported or TooLarge; `field` is the block's name.
+  std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
 
   /// The next version. Positions of blocks are taken relative to the origin of the map. The blocks that are put have different
-  /// names; refusal_of() the change there is none. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
+  /// names, and there is no refusal_of() them. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
   std::shared_ptr<const SceneSnapshot> apply(MapChange change, std::uint32_t revision, WorkerPool& pool,
                                              const fusion::Progress& progress = {});
 
  private:
-  struct Block;
-
+  MapVersion version(std::uint32_t revision);
+  std::vector<fusion::Note> notes() const;
   void put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress);
   void change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
               const fusion::Progress& progress);
   /// Of a block that comes in, its positions relative to the origin of the map from then on.
-  std::shared_ptr<Block> taken_in(BlockPut& put);
+  std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
   /// The tree with what has changed, its coarse tiles made.
   void take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress);
   void make_coarse_tiles(const ChangedTree& changed, WorkerPool& pool, const fusion::Progress& progress);
@@ -90,7 +96,8 @@ class LivingMap {
 
   const Options options_;
   std::optional<MapConstants> constants_;
-  std::map<std::string, std::shared_ptr<const Block>, std::less<>> blocks_;
+  std::string first_id_;  ///< Of the block that came first: its name and what is up in it are the scene's.
+  BlocksByName blocks_;
   BlockNames names_;
   BlockNumber last_number_ = 0;
   std::shared_ptr<const MapNode> root_;
@@ -102,7 +109,6 @@ class LivingMap {
   // Of the last version.
   std::optional<fusion::Histogram> percentiles_;
   std::shared_ptr<const fusion::SceneTemperature> reference_;
-  fusion::TemperatureSummary reference_summary_;
   std::uint64_t changed_vertex_count_ = 0;  ///< Since the reference was taken.
 };
 

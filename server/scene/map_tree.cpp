@@ -2,225 +2,24 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
-#include <cmath>
-#include <deque>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "server/scene/box.hpp"
+#include "server/scene/map_elements.hpp"
+#include "server/scene/octant_groups.hpp"
 #include "server/scene/tile_place.hpp"
-#include "server/scene/vertex_index_map.hpp"
 
 namespace spectra::server {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
 using protocol::TileId;
-using OctantContents = std::array<CellContent, 8>;
 
 /// About what part of the making of leaves is their cutting.
 constexpr double kCutShare = 0.4;
-
-/// Where elements come from: a block that is put in, or a leaf of the version before.
-struct Piece {
-  std::span<const Vec3f> positions;
-  std::span<const fusion::Rgb8> visible;
-  std::span<const float> temperature_celsius;
-  std::span<const StepHalvings> step_halvings;  ///< Empty: none are halved.
-  std::span<const Triangle> triangles;
-  std::span<const std::uint32_t> source_vertex;    ///< In the block; empty: the same number.
-  std::span<const std::uint32_t> source_triangle;  ///< The same.
-  std::span<const BlockNumber> vertex_block;       ///< Empty: all are of `block`.
-  BlockNumber block = 0;
-
-  std::uint32_t source_of_vertex(std::uint32_t v) const { return source_vertex.empty() ? v : source_vertex[v]; }
-  std::uint32_t source_of_triangle(std::uint32_t t) const { return source_triangle.empty() ? t : source_triangle[t]; }
-  BlockNumber block_of_vertex(std::uint32_t v) const { return vertex_block.empty() ? block : vertex_block[v]; }
-  BlockNumber block_of_triangle(std::uint32_t t) const { return block_of_vertex(triangles[t][0]); }
-};
-
-/// What lies in cells: a triangle (at its centroid), or a vertex of no triangle.
-struct Element {
-  Vec3f place;
-  std::uint32_t index = 0;  ///< In its piece, of the triangle or the vertex.
-  std::uint32_t piece : 28 = 0;
-  /// Bit k: corner k is the first in its block to use its vertex, which is therefore owned where this triangle is.
-  /// kLoneVertex: the element is a vertex.
-  std::uint32_t owned_corners : 4 = 0;
-
-  static constexpr std::uint32_t kLoneVertex = 8;
-
-  bool is_lone_vertex() const { return owned_corners == kLoneVertex; }
-  CellContent content() const {
-    // A lone vertex has one bit, too.
-    return {is_lone_vertex() ? 0u : 1u, static_cast<std::uint64_t>(std::popcount(std::uint32_t{owned_corners}))};
-  }
-};
-
-std::array<double, 3> coordinates(const Vec3f& v) {
-  return {double{v.x}, double{v.y}, double{v.z}};
-}
-
-BlockNumber block_of(const Piece& piece, const Element& element) {
-  return element.is_lone_vertex() ? piece.block_of_vertex(element.index) : piece.block_of_triangle(element.index);
-}
-
-CellContent content_of(std::span<const Element> elements) {
-  CellContent sum;
-  for (const Element& element : elements) sum += element.content();
-  return sum;
-}
-
-Bounds bounds_of(std::span<const Element> elements) {
-  Bounds bounds = empty_bounds();
-  for (const Element& element : elements) include(bounds, element.place);
-  return bounds;
-}
-
-Vec3f centroid(const Piece& piece, const Triangle& triangle) {
-  const auto mean = [&](float Vec3f::*axis) {
-    return static_cast<float>((double{piece.positions[triangle[0]].*axis} + double{piece.positions[triangle[1]].*axis} +
-                               double{piece.positions[triangle[2]].*axis}) /
-                              3);
-  };
-  return {mean(&Vec3f::x), mean(&Vec3f::y), mean(&Vec3f::z)};
-}
-
-/// The elements of a piece. `triangle_order`: its triangles in an order in which those of each block ascend; empty: as they are.
-/// Vertices from `owned_count` on are owned elsewhere.
-std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::size_t owned_count,
-                                 std::span<const std::uint32_t> triangle_order) {
-  std::vector<Element> elements(piece.triangles.size());
-  std::vector<bool> is_used(piece.positions.size());
-  for (std::size_t i = 0; i < elements.size(); ++i) {
-    const std::uint32_t t = triangle_order.empty() ? static_cast<std::uint32_t>(i) : triangle_order[i];
-    Element& element = elements[i];
-    element.place = centroid(piece, piece.triangles[t]);
-    element.index = t;
-    element.piece = number & 0xfffffffu;
-    for (unsigned corner = 0; corner < 3; ++corner) {
-      const std::uint32_t v = piece.triangles[t][corner];
-      auto used = is_used[v];
-      if (!used && v < owned_count) element.owned_corners |= 1u << corner;
-      used = true;
-    }
-  }
-  for (std::uint32_t v = 0; v < owned_count; ++v) {
-    if (is_used[v]) continue;
-    Element& element = elements.emplace_back();
-    element.place = piece.positions[v];
-    element.index = v;
-    element.piece = number & 0xfffffffu;
-    element.owned_corners = Element::kLoneVertex;
-  }
-  return elements;
-}
-
-/// Octants that become one child.
-struct OctantGroup {
-  unsigned octants = 0;  ///< Bit mask.
-  CellContent count;
-  unsigned heaviest = 0;  ///< Names the child.
-};
-
-int distance(const OctantGroup& a, const OctantGroup& b) {
-  int smallest = 3;
-  for (unsigned i = 0; i < 8; ++i) {
-    for (unsigned j = 0; j < 8; ++j) {
-      if ((a.octants >> i & 1) != 0 && (b.octants >> j & 1) != 0) smallest = std::min(smallest, std::popcount(i ^ j));
-    }
-  }
-  return smallest;
-}
-
-/// Joins octants until none is small beside the leaf size.
-std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64_t leaf_vertex_count,
-                                       bool has_triangles) {
-  std::vector<OctantGroup> groups;
-  for (unsigned i = 0; i < 8; ++i) {
-    if (!counts[i].is_empty()) groups.push_back({1u << i, counts[i], i});
-  }
-  const auto join = [&](std::size_t a, std::size_t b) {
-    OctantGroup& into = groups[std::min(a, b)];
-    const OctantGroup& from = groups[std::max(a, b)];
-    if (counts[from.heaviest].owned_count > counts[into.heaviest].owned_count) into.heaviest = from.heaviest;
-    into.octants |= from.octants;
-    into.count += from.count;
-    groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(std::max(a, b)));
-  };
-  while (groups.size() > 1) {
-    // Neighbours that fit into one leaf together, the lightest pair first.
-    std::optional<std::tuple<std::uint64_t, std::size_t, std::size_t>> best;
-    for (std::size_t a = 0; a < groups.size(); ++a) {
-      for (std::size_t b = a + 1; b < groups.size(); ++b) {
-        const std::uint64_t sum = groups[a].count.owned_count + groups[b].count.owned_count;
-        if (sum > leaf_vertex_count || distance(groups[a], groups[b]) > 1) continue;
-        if (!best || std::tuple(sum, a, b) < *best) best = {sum, a, b};
-      }
-    }
-    if (best) {
-      join(std::get<1>(*best), std::get<2>(*best));
-      continue;
-    }
-    // A small one, with the nearest other.
-    std::optional<std::pair<std::uint64_t, std::size_t>> smallest;
-    for (std::size_t a = 0; a < groups.size(); ++a) {
-      const bool is_bare = has_triangles && groups[a].count.triangle_count == 0;
-      const bool is_small = 4 * groups[a].count.owned_count < leaf_vertex_count;
-      if (!is_bare && !is_small) continue;
-      const std::pair candidate(groups[a].count.owned_count, a);
-      if (!smallest || candidate < *smallest) smallest = candidate;
-    }
-    if (!smallest) break;
-    const std::size_t a = smallest->second;
-    std::optional<std::tuple<int, std::uint64_t, std::size_t>> nearest;
-    for (std::size_t b = 0; b < groups.size(); ++b) {
-      if (b == a) continue;
-      const std::tuple candidate(distance(groups[a], groups[b]), groups[b].count.owned_count, b);
-      if (!nearest || candidate < *nearest) nearest = candidate;
-    }
-    join(a, std::get<2>(*nearest));
-  }
-  return groups;
-}
-
-/// Orders the elements of a leaf along a Morton curve through 16 x 16 x 16 cells of its box.
-void sort_along_curve(std::span<Element> elements) {
-  Bounds bounds = empty_bounds();
-  for (const Element& element : elements) include(bounds, element.place);
-  const auto low = coordinates(bounds.min), high = coordinates(bounds.max);
-  std::array<double, 3> scale{};
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    const double extent = high[axis] - low[axis];
-    scale[axis] = extent > 0 ? 16 / extent : 0;
-  }
-  const auto cell_of = [&](const Element& element) {
-    const auto p = coordinates(element.place);
-    std::array<std::uint32_t, 3> cell{};
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const double position = (p[axis] - low[axis]) * scale[axis];
-      cell[axis] = position > 0 ? static_cast<std::uint32_t>(std::min(position, 15.0)) : 0;
-    }
-    return static_cast<std::size_t>(morton_code(cell[0], cell[1], cell[2]));
-  };
-  std::vector<std::uint16_t> cells(elements.size());
-  std::vector<std::uint32_t> next(4097);
-  for (std::size_t i = 0; i < elements.size(); ++i) {
-    const std::size_t cell = cell_of(elements[i]);
-    cells[i] = static_cast<std::uint16_t>(cell);
-    ++next[cell + 1];
-  }
-  for (std::size_t cell = 0; cell < 4096; ++cell) next[cell + 1] += next[cell];
-  const std::vector<Element> unsorted(elements.begin(), elements.end());
-  for (std::size_t i = 0; i < unsorted.size(); ++i) elements[next[cells[i]]++] = unsorted[i];
-}
 
 /// A cell of which the node is being made.
 struct CellTask {
@@ -252,7 +51,7 @@ class TreeChange {
     if (root) total_ -= removed_content(root->id);
     std::vector<std::vector<Element>> parts(added.size());
     std::vector<std::uint32_t> numbers;
-    for (const BlockMesh& block : added) numbers.push_back(add_piece(piece_of(block)));
+    for (const BlockMesh& block : added) numbers.push_back(pieces_.add(piece_of(block)));
     pool.for_each(added.size(), [&](std::size_t i) {
       parts[i] = elements_of(pieces_[numbers[i]], numbers[i], added[i].mesh->vertex_count(), {});
     });
@@ -306,23 +105,12 @@ class TreeChange {
             .block = tile.block};
   }
 
-  std::uint32_t add_piece(const Piece& piece) {
-    const std::lock_guard lock(mutex_);
-    pieces_.push_back(piece);
-    return static_cast<std::uint32_t>(pieces_.size() - 1);
-  }
-
-  const Piece& piece(std::uint32_t number) const {
-    const std::lock_guard lock(mutex_);
-    return pieces_[number];
-  }
-
   bool is_removed(BlockNumber block) const { return removed_.contains(block); }
 
   std::vector<Element> elements_of_leaf(const MapNode& leaf) {
     const Tile& tile = *leaf.tile;
-    const std::uint32_t number = add_piece(piece_of(tile));
-    const Piece& its_piece = piece(number);
+    const std::uint32_t number = pieces_.add(piece_of(tile));
+    const Piece& its_piece = pieces_[number];
     std::vector<std::uint32_t> order(tile.triangles.size());
     for (std::uint32_t t = 0; t < order.size(); ++t) order[t] = t;
     std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -340,7 +128,7 @@ class TreeChange {
     std::vector<TouchedLeaf> parts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) {
       for (const Element& element : elements_of_leaf(*leaves[i])) {
-        const bool goes = is_removed(block_of(piece(element.piece), element));
+        const bool goes = is_removed(block_of(pieces_[element.piece], element));
         (goes ? parts[i].removed : parts[i].kept).push_back(element);
       }
     });
@@ -553,39 +341,10 @@ class TreeChange {
     }
   }
 
-  /// In the order of names, as their blocks have them, triangles before vertices of none.
-  void put_in_order(std::vector<Element>& elements) const {
-    struct Key {
-      const std::string* name;
-      bool is_lone;
-      std::uint32_t source;
-      Element element;
-    };
-    std::vector<Key> keys;
-    keys.reserve(elements.size());
-    for (const Element& element : elements) {
-      const Piece& its = piece(element.piece);
-      const std::uint32_t source =
-          element.is_lone_vertex() ? its.source_of_vertex(element.index) : its.source_of_triangle(element.index);
-      keys.push_back({&names_.at(block_of(its, element)), element.is_lone_vertex(), source, element});
-    }
-    std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-      if (a.name != b.name) return *a.name < *b.name;
-      return std::pair(a.is_lone, a.source) < std::pair(b.is_lone, b.source);
-    });
-    for (std::size_t i = 0; i < keys.size(); ++i) elements[i] = keys[i].element;
-  }
-
   void make_leaf(MapNode& node, std::vector<Element>& elements) const {
-    const bool is_of_one_new_piece =
-        std::all_of(elements.begin(), elements.end(),
-                    [&](const Element& element) { return element.piece == elements.front().piece; }) &&
-        (elements.empty() || piece(elements.front().piece).source_triangle.empty());
-    if (!is_of_one_new_piece) put_in_order(elements);
     node.content = content_of(elements);
     node.bounds = bounds_of(elements);
-    sort_along_curve(elements);
-    auto tile = leaf_tile(node.id, elements);
+    auto tile = leaf_tile(node.id, elements, pieces_, names_);
     node.blocks.assign(1, tile->block);
     if (!tile->vertex_block.empty()) {
       node.blocks = tile->vertex_block;
@@ -596,106 +355,6 @@ class TreeChange {
     node.tile = std::move(tile);
   }
 
-  /// Copies a leaf out of its pieces.
-  std::shared_ptr<Tile> leaf_tile(const TileId& id, std::span<const Element> elements) const {
-    auto tile = std::make_shared<Tile>();
-    tile->id = id;
-    const CellContent content = content_of(elements);
-    struct Vertex {
-      const Piece* piece;
-      std::uint32_t index;
-    };
-    std::vector<Vertex> vertices;
-    vertices.reserve(content.owned_count);
-    VertexIndexMap index_of(content.triangle_count == 0 ? 0 : content.owned_count + content.owned_count / 16);
-    const auto key_of = [](const Piece& its, std::uint32_t v) {
-      return std::uint64_t{its.block_of_vertex(v)} << 32 | its.source_of_vertex(v);
-    };
-    std::uint32_t last_number = 0xffffffffu;
-    const Piece* last = nullptr;
-    const auto piece_at = [&](const Element& element) -> const Piece& {
-      if (element.piece != last_number) {
-        last_number = element.piece;
-        last = &piece(element.piece);
-      }
-      return *last;
-    };
-    for (const Element& element : elements) {
-      if (element.is_lone_vertex()) continue;
-      const Piece& its = piece_at(element);
-      for (unsigned corner = 0; corner < 3; ++corner) {
-        if ((element.owned_corners >> corner & 1) == 0) continue;
-        const std::uint32_t v = its.triangles[element.index][corner];
-        index_of.find_or_insert(key_of(its, v), static_cast<std::uint32_t>(vertices.size()));
-        vertices.push_back({&its, v});
-      }
-    }
-    const std::size_t referenced_count = vertices.size();
-    for (const Element& element : elements) {
-      if (element.is_lone_vertex()) vertices.push_back({&piece_at(element), element.index});
-    }
-    tile->owned_count = static_cast<std::uint32_t>(vertices.size());
-    tile->triangles.reserve(content.triangle_count);
-    tile->source_triangle.reserve(content.triangle_count);
-    for (const Element& element : elements) {
-      if (element.is_lone_vertex()) continue;
-      const Piece& its = piece_at(element);
-      Triangle triangle{};
-      for (unsigned corner = 0; corner < 3; ++corner) {
-        const std::uint32_t v = its.triangles[element.index][corner];
-        const auto next = static_cast<std::uint32_t>(vertices.size());
-        triangle[corner] = index_of.find_or_insert(key_of(its, v), next);
-        if (triangle[corner] == next) vertices.push_back({&its, v});
-      }
-      tile->triangles.push_back(triangle);
-      tile->source_triangle.push_back(its.source_of_triangle(element.index));
-    }
-    copy_vertices(vertices, *tile);
-    tile->bounds = server::bounds_of(tile->positions);
-    // The vertices that are drawn: all but the lone ones of a scene with triangles.
-    const std::size_t lone_begin = content.triangle_count == 0 ? tile->owned_count : referenced_count;
-    const TemperatureRange range =
-        temperature_range(std::span(tile->temperature_celsius).first(lone_begin))
-            .joined(temperature_range(std::span(tile->temperature_celsius).subspan(tile->owned_count)));
-    tile->lowest_celsius = range.lowest_celsius;
-    if (std::isnan(range.lowest_celsius)) tile->temperature_error_celsius = range.lowest_celsius;
-    tile->highest_celsius = range.highest_celsius;
-    return tile;
-  }
-
-  template <class Vertices>
-  static void copy_vertices(const Vertices& vertices, Tile& tile) {
-    const std::size_t count = vertices.size();
-    tile.positions.resize(count);
-    tile.visible.resize(count);
-    tile.temperature_celsius.resize(count);
-    tile.source_vertex.resize(count);
-    bool is_any_halved = false, is_of_one_block = true;
-    if (count > 0) tile.block = vertices[0].piece->block_of_vertex(vertices[0].index);
-    for (std::size_t v = 0; v < count; ++v) {
-      const auto& [piece, index] = vertices[v];
-      tile.positions[v] = piece->positions[index];
-      tile.visible[v] = piece->visible[index];
-      tile.temperature_celsius[v] = piece->temperature_celsius[index];
-      tile.source_vertex[v] = piece->source_of_vertex(index);
-      is_any_halved = is_any_halved || (!piece->step_halvings.empty() && piece->step_halvings[index] != StepHalvings{});
-      is_of_one_block = is_of_one_block && piece->block_of_vertex(index) == tile.block;
-    }
-    if (is_any_halved) {
-      tile.step_halvings.resize(count);
-      for (std::size_t v = 0; v < count; ++v) {
-        const auto& [piece, index] = vertices[v];
-        if (!piece->step_halvings.empty()) tile.step_halvings[v] = piece->step_halvings[index];
-      }
-    }
-    if (!is_of_one_block) {
-      tile.vertex_block.resize(count);
-      for (std::size_t v = 0; v < count; ++v) {
-        tile.vertex_block[v] = vertices[v].piece->block_of_vertex(vertices[v].index);
-      }
-    }
-  }
-
   const MapGrid& grid_;
   const TileSizes& sizes_;
   const std::set<BlockNumber> removed_;
@@ -703,8 +362,8 @@ class TreeChange {
   const std::function<void(double)>& made_share_;
   CellContent total_;  ///< Of the whole map, in the end.
 
-  mutable std::mutex mutex_;  ///< Of the next two.
-  std::deque<Piece> pieces_;
+  Pieces pieces_;
+  std::mutex mutex_;  ///< Of the next.
   std::vector<std::shared_ptr<const MapNode>> dropped_;
 
   std::map<const MapNode*, TouchedLeaf> touched_;
@@ -718,18 +377,6 @@ void collect_leaves(const std::shared_ptr<const MapNode>& node, std::vector<std:
 }
 
 }  // namespace
-
-CellContent& CellContent::operator+=(const CellContent& other) {
-  triangle_count += other.triangle_count;
-  owned_count += other.owned_count;
-  return *this;
-}
-
-CellContent& CellContent::operator-=(const CellContent& other) {
-  triangle_count -= other.triangle_count;
-  owned_count -= other.owned_count;
-  return *this;
-}
 
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
                          std::span<const BlockNumber> removed, std::span<const BlockMesh> added,

@@ -6,11 +6,10 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "server/scene/cell_content.hpp"
 #include "server/scene/leaf_facts.hpp"
 #include "server/scene/map_grid.hpp"
 #include "server/scene/scene_snapshot.hpp"
@@ -18,21 +17,6 @@
 #include "server/scene/worker_pool.hpp"
 
 namespace spectra::server {
-
-/// Names a block as long as it is part of the map; one that replaces it gets another number.
-using BlockNumber = std::uint32_t;
-using BlockNames = std::unordered_map<BlockNumber, std::string>;
-
-/// How much lies in a cell. Triangles count where their centroid is; a vertex where the first triangle of its block is that
-/// has it, or, of no triangle, where it is itself.
-struct CellContent {
-  std::uint64_t triangle_count = 0;
-  std::uint64_t owned_count = 0;  ///< Vertices.
-  bool is_empty() const { return triangle_count == 0 && owned_count == 0; }
-  CellContent& operator+=(const CellContent& other);
-  CellContent& operator-=(const CellContent& other);
-  friend bool operator==(const CellContent&, const CellContent&) = default;
-};
 
 /// A cell of the map with all that lies in it. Shared by the versions of the map in which it is the same; not changed any more
 /// once it is part of one.

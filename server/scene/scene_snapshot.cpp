@@ -139,6 +139,12 @@ class SurfaceShare {
 class TiledSnapshot final : public SceneSnapshot {
  public:
   explicit TiledSnapshot(MapVersion version) : version_(std::move(version)) {
+    BlockPlace next;
+    for (const auto& [id, block] : version_.blocks) {
+      places_.emplace(block->number, next);
+      next.first_vertex += block->facts.vertex_count;
+      next.first_triangle += block->facts.triangle_count;
+    }
     std::vector<Vec3f> corners;
     for (const auto& leaf : version_.leaves) {
       corners.push_back(leaf->tile->bounds.min);
@@ -158,16 +164,16 @@ class TiledSnapshot final : public SceneSnapshot {
     share_ = std::make_unique<SurfaceShare>(version_.leaves, is_point_cloud());
   }
 
-  const std::string& name() const override { return version_.name; }
+  const std::string& name() const override { return version_.facts.name; }
   std::uint32_t revision() const override { return version_.revision; }
-  std::uint64_t vertex_count() const override { return version_.vertex_count; }
-  std::uint64_t triangle_count() const override { return version_.triangle_count; }
-  bool is_point_cloud() const override { return version_.triangle_count == 0; }
-  fusion::Vec3d origin() const override { return version_.origin; }
+  std::uint64_t vertex_count() const override { return version_.facts.vertex_count; }
+  std::uint64_t triangle_count() const override { return version_.facts.triangle_count; }
+  bool is_point_cloud() const override { return version_.facts.triangle_count == 0; }
+  fusion::Vec3d origin() const override { return version_.facts.origin; }
   const Bounds& bounds() const override { return bounds_; }
   const Bounds& core_bounds() const override { return core_bounds_; }
-  fusion::UpAxis up() const override { return version_.up; }
-  bool is_metric() const override { return version_.is_metric; }
+  fusion::UpAxis up() const override { return version_.facts.up; }
+  bool is_metric() const override { return version_.facts.is_metric; }
   std::span<const fusion::Note> notes() const override { return version_.notes; }
   bool is_live() const override { return version_.is_live; }
   std::optional<std::pair<double, double>> observed() const override {
@@ -185,6 +191,10 @@ class TiledSnapshot final : public SceneSnapshot {
   float suggested_position_step_m() const override { return version_.position_step_m; }
   double highlighted_share(const fusion::FusionPlan& plan) const override { return share_->highlighted(plan); }
 
+  std::uint32_t vertex_index(const Tile& leaf, std::size_t v) const override {
+    return static_cast<std::uint32_t>(places_.at(block_of(leaf, v)).first_vertex) + leaf.source_vertex[v];
+  }
+
   std::optional<Probe> probe(Vec3f position) const override {
     if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) return {};
     std::vector<std::pair<double, const Tile*>> by_distance;
@@ -201,7 +211,7 @@ class TiledSnapshot final : public SceneSnapshot {
       for (std::size_t v = 0; v < tile->owned_count; ++v) {
         const double squared = squared_distance(position, tile->positions[v]);
         if (best_tile == nullptr || squared < best_squared ||
-            (squared == best_squared && index_of(*tile, v) < index_of(*best_tile, best_vertex))) {
+            (squared == best_squared && vertex_index(*tile, v) < vertex_index(*best_tile, best_vertex))) {
           best_tile = tile;
           best_vertex = v;
           best_squared = squared;
@@ -210,7 +220,7 @@ class TiledSnapshot final : public SceneSnapshot {
     }
     if (best_tile == nullptr) return {};
     Probe result;
-    result.vertex_index = static_cast<std::uint32_t>(index_of(*best_tile, best_vertex));
+    result.vertex_index = vertex_index(*best_tile, best_vertex);
     result.position = best_tile->positions[best_vertex];
     result.visible = best_tile->visible[best_vertex];
     const float temperature = best_tile->temperature_celsius[best_vertex];
@@ -219,38 +229,14 @@ class TiledSnapshot final : public SceneSnapshot {
     return result;
   }
 
+  std::optional<fusion::MultispectralMesh> block_mesh(std::string_view id) const override {
+    const auto block = version_.blocks.find(id);
+    if (block == version_.blocks.end()) return std::nullopt;
+    return mesh_of_blocks(version_.leaves, {{block->second->number, BlockPlace{}}}, block->second->facts);
+  }
+
   fusion::MultispectralMesh whole_mesh() const override {
-    fusion::MultispectralMesh mesh;
-    mesh.origin = version_.origin;
-    mesh.has_visible = version_.has_visible;
-    mesh.has_temperature = version_.has_temperature;
-    mesh.double_positions = version_.double_positions;
-    mesh.left_out = version_.left_out;
-    mesh.name = version_.name;
-    mesh.up = version_.up;
-    mesh.is_metric = version_.is_metric;
-    mesh.resize_vertices(static_cast<std::size_t>(version_.vertex_count));
-    mesh.triangles().resize(static_cast<std::size_t>(version_.triangle_count));
-    const std::span<Vec3f> positions = mesh.positions();
-    const std::span<fusion::Rgb8> visible = mesh.visible();
-    const std::span<float> temperature = mesh.temperature_celsius();
-    for (const auto& node : version_.leaves) {
-      const Tile& leaf = *node->tile;
-      for (std::size_t v = 0; v < leaf.owned_count; ++v) {
-        const auto source = static_cast<std::size_t>(index_of(leaf, v));
-        positions[source] = leaf.positions[v];
-        visible[source] = leaf.visible[v];
-        temperature[source] = leaf.temperature_celsius[v];
-      }
-      for (std::size_t t = 0; t < leaf.triangles.size(); ++t) {
-        const BlockPlace& place = version_.blocks.at(block_of(leaf, leaf.triangles[t][0]));
-        fusion::Triangle& triangle = mesh.triangles()[place.first_triangle + leaf.source_triangle[t]];
-        for (unsigned corner = 0; corner < 3; ++corner) {
-          triangle[corner] = static_cast<std::uint32_t>(index_of(leaf, leaf.triangles[t][corner]));
-        }
-      }
-    }
-    return mesh;
+    return mesh_of_blocks(version_.leaves, places_, version_.facts);
   }
 
  private:
@@ -259,15 +245,6 @@ class TiledSnapshot final : public SceneSnapshot {
     const Tile* leaf = nullptr;
     std::uint32_t vertex = 0;
   };
-
-  static std::uint32_t block_of(const Tile& leaf, std::size_t v) {
-    return leaf.vertex_block.empty() ? leaf.block : leaf.vertex_block[v];
-  }
-
-  /// Of a vertex of a leaf, in the order of the input.
-  std::uint64_t index_of(const Tile& leaf, std::size_t v) const {
-    return version_.blocks.at(block_of(leaf, v)).first_vertex + leaf.source_vertex[v];
-  }
 
   static std::optional<Extreme> extreme(const Place& place) {
     if (place.leaf == nullptr) return std::nullopt;
@@ -280,7 +257,8 @@ class TiledSnapshot final : public SceneSnapshot {
       const Tile& leaf = *node.tile;
       if (best.leaf != nullptr) {
         const float t = leaf.temperature_celsius[*vertex], other = best.leaf->temperature_celsius[best.vertex];
-        if (sign * t < sign * other || (t == other && index_of(leaf, *vertex) > index_of(*best.leaf, best.vertex)))
+        if (sign * t < sign * other ||
+            (t == other && vertex_index(leaf, *vertex) > vertex_index(*best.leaf, best.vertex)))
           return;
       }
       best = {&leaf, *vertex};
@@ -292,6 +270,7 @@ class TiledSnapshot final : public SceneSnapshot {
   }
 
   MapVersion version_;
+  BlockPlaces places_;
   Bounds bounds_, core_bounds_;
   std::shared_ptr<const fusion::SceneTemperature> temperature_;
   std::unique_ptr<SurfaceShare> share_;

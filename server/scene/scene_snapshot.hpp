@@ -127,6 +127,8 @@ class SceneSnapshot {
   /// The same, for FusionPlan::prepare, of this or an earlier version of a map that grows: automatic values do not follow every
   /// block, so that what has not changed keeps its colours. Another object means other values.
   virtual std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const = 0;
+  /// Which vertex of whole_mesh() a vertex of a leaf is.
+  virtual std::uint32_t vertex_index(const Tile& leaf, std::size_t vertex) const = 0;
   /// Of several equally near vertices the first of the input; nothing in an empty scene or at a position that is not
   /// finite.
   virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
@@ -143,6 +145,8 @@ class SceneSnapshot {
   /// Which share of the surface, 0 to 1, a plan made for this scene highlights; of a point cloud, or of a mesh without any
   /// area, which share of the vertices. Thread-safe.
   virtual double highlighted_share(const fusion::FusionPlan& plan) const = 0;
+  /// A block as it was put, its positions relative to the origin; nothing when there is none of that name.
+  virtual std::optional<fusion::MultispectralMesh> block_mesh(std::string_view id) const = 0;
   /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
   virtual fusion::MultispectralMesh whole_mesh() const = 0;
 };

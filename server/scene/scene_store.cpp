@@ -30,13 +30,12 @@ std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene sce
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool, progress), before);
 }
 
-fusion::Result<std::shared_ptr<const SceneSnapshot>> SceneStore::change(MapChange change, WorkerPool& pool) {
+std::shared_ptr<const SceneSnapshot> SceneStore::change(MapChange change, WorkerPool& pool) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   if (!map_) {
     map_ = std::make_unique<LivingMap>(live_options());
   }
-  if (auto refused = map_->refusal_of(change)) return std::move(*refused);
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool), {});
 }
 
@@ -50,14 +49,10 @@ std::optional<MapConstants> SceneStore::constants() const {
   return map_ ? map_->constants() : std::nullopt;
 }
 
-std::optional<fusion::Error> SceneStore::refusal_of(const MapChange& change) const {
+std::optional<fusion::Error> SceneStore::refusal_of(std::span<const BlockShape> put,
+                                                    std::span<const std::string> removed) const {
   const std::lock_guard replacing(replace_mutex_);
-  return map_ ? map_->refusal_of(change) : std::nullopt;
-}
-
-std::optional<fusion::MultispectralMesh> SceneStore::mesh_of(std::string_view block) const {
-  const std::lock_guard replacing(replace_mutex_);
-  return map_ ? map_->mesh_of(block) : std::nullopt;
+  return map_ ? map_->refusal_of(put, removed) : std::nullopt;
 }
 
 std::shared_ptr<const SceneSnapshot> SceneStore::publish(std::shared_ptr<const SceneSnapshot> snapshot,

@@ -4,6 +4,10 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,9 +49,8 @@ class SceneStore {
     return replace(fusion::LoadedScene{std::move(mesh), {}, {}}, pool, levels, before);
   }
 
-  /// Changes the map (an empty one begins with this), in the same way. Of a change that the map refuses nothing happens: see
-  /// LivingMap::refusal_of().
-  fusion::Result<std::shared_ptr<const SceneSnapshot>> change(MapChange change, WorkerPool& pool);
+  /// Changes the map (an empty one begins with this), in the same way; there is no refusal_of() it.
+  std::shared_ptr<const SceneSnapshot> change(MapChange change, WorkerPool& pool);
 
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);
@@ -57,9 +60,7 @@ class SceneStore {
   /// Of the map, once it had a block.
   std::optional<MapConstants> constants() const;
   /// See LivingMap::refusal_of().
-  std::optional<fusion::Error> refusal_of(const MapChange& change) const;
-  /// See LivingMap::mesh_of(). Waits for a change that is being made.
-  std::optional<fusion::MultispectralMesh> mesh_of(std::string_view block) const;
+  std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
 
   /// The block that a file becomes.
   static constexpr std::string_view kFileBlock = "scene";

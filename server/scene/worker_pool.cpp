@@ -102,6 +102,10 @@ WorkerPool::WorkerPool(unsigned thread_count) : state_(std::make_unique<State>()
 }
 
 WorkerPool::~WorkerPool() {
+  stop();
+}
+
+void WorkerPool::stop() {
   std::map<int, std::deque<std::function<void()>>> dropped;
   {
     const std::lock_guard lock(state_->mutex);
@@ -110,7 +114,9 @@ WorkerPool::~WorkerPool() {
   }
   dropped.clear();
   state_->wake.notify_all();
-  for (std::thread& thread : state_->threads) thread.join();
+  for (std::thread& thread : state_->threads) {
+    if (thread.joinable()) thread.join();
+  }
 }
 
 void WorkerPool::post(std::function<void()> job, int priority) {

@@ -10,12 +10,15 @@ namespace spectra::server {
 class WorkerPool {
  public:
   explicit WorkerPool(unsigned thread_count);
-  ~WorkerPool();  ///< Lets running jobs end, drops waiting ones.
+  ~WorkerPool();  ///< As stop().
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   /// From any thread. An exception that leaves a job is logged and swallowed at the top of the worker.
   void post(std::function<void()> job, int priority = 0);
+
+  /// Lets running jobs end, drops waiting ones and those that are posted later. Not from a job.
+  void stop();
 
   /// Runs job(0) .. job(count - 1) on the pool and the calling thread; returns when all are done. Must not be called
   /// from inside a job. An exception of a job is rethrown here.

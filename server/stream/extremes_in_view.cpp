@@ -178,30 +178,30 @@ void draw_triangle(DepthMap& map, const Eye& eye, const std::array<Seen, 3>& cor
 /// The first of the input among those of the same temperature.
 class Choice {
  public:
-  void offer(const Tile& tile, std::size_t vertex, bool is_better) {
-    const std::uint32_t source = tile.source_vertex[vertex];
+  /// `index`: where the vertex stands in the input.
+  void offer(const Tile& tile, std::size_t vertex, std::uint32_t index, bool is_better) {
     const float celsius = tile.temperature_celsius[vertex];
-    if (best_ && !is_better && !(celsius == best_->temperature_celsius && source < source_)) return;
+    if (best_ && !is_better && !(celsius == best_->temperature_celsius && index < index_)) return;
     best_ = {tile.positions[vertex], celsius};
-    source_ = source;
+    index_ = index;
   }
   const std::optional<Extreme>& best() const { return best_; }
 
  private:
   std::optional<Extreme> best_;
-  std::uint32_t source_ = 0;
+  std::uint32_t index_ = 0;
 };
 
 class Choices {
  public:
-  void offer(const Tile& tile, std::size_t vertex) {
+  void offer(const Tile& tile, std::size_t vertex, std::uint32_t index) {
     const float celsius = tile.temperature_celsius[vertex];
     if (std::isinf(celsius)) {
-      (celsius > 0 ? over_ : under_).offer(tile, vertex, false);
+      (celsius > 0 ? over_ : under_).offer(tile, vertex, index, false);
       return;
     }
-    hottest_.offer(tile, vertex, celsius > hottest_.best().value_or(Extreme{}).temperature_celsius);
-    coldest_.offer(tile, vertex, celsius < coldest_.best().value_or(Extreme{}).temperature_celsius);
+    hottest_.offer(tile, vertex, index, celsius > hottest_.best().value_or(Extreme{}).temperature_celsius);
+    coldest_.offer(tile, vertex, index, celsius < coldest_.best().value_or(Extreme{}).temperature_celsius);
   }
   /// Whether a vertex of this temperature may change anything: only then it has to be known whether it is seen.
   bool may_want(float celsius) const {
@@ -256,7 +256,7 @@ ExtremesInView extremes_in_view(const SceneSnapshot& scene, const Camera& camera
       if (!eye.is_inside(place)) continue;
       const double front = 1 / map.nearness_around(place);
       if (point.depth - point.depth / eye.pixels_per_tangent() > front) continue;
-      choices.offer(*tile, i);
+      choices.offer(*tile, i, scene.vertex_index(*tile, i));
     }
   }
   return choices.result();

@@ -135,7 +135,9 @@ class Viewer {
 
 class ViewerSessionTest : public testing::Test {
  protected:
-  explicit ViewerSessionTest() : served_(2, 64U << 20U), api_(served_) { start(quick_options()); }
+  explicit ViewerSessionTest() : served_(2, 64U << 20U), map_(served_, nullptr), api_(served_, map_) {
+    start(quick_options());
+  }
 
   void start(server::NetOptions options) {
     options.limits.write_timeout = std::chrono::seconds(5);
@@ -157,8 +159,48 @@ class ViewerSessionTest : public testing::Test {
 
   std::unique_ptr<TestServer> server_;  // outlives the pool, whose jobs answer through it
   server::ServedScene served_;
+  server::MapKeeper map_;
   server::HttpApi api_;
 };
+
+TEST_F(ViewerSessionTest, TakesBlocksWhenTheMapIsOpen) {
+  const std::string body =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 "
+      "3\n";
+  const auto put = [&] {
+    return status_of(http_exchange(server_->port(),
+                                   "PUT /api/v1/blocks/a HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+                                   "Content-Length: " +
+                                       std::to_string(body.size()) + "\r\n\r\n" + body));
+  };
+  EXPECT_EQ(put(), 503) << "nothing is lost in a map that is replaced by the file that is still being read";
+  ASSERT_EQ(map_.restore(), std::nullopt);
+  EXPECT_EQ(put(), 200);
+  EXPECT_EQ(served_.scenes.current()->vertex_count(), 1U);
+  map_.end();
+  EXPECT_EQ(put(), 503);
+}
+
+TEST_F(ViewerSessionTest, BlocksBeyondTheBoundAreRefusedBeforeTheyAreRead) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.block_size_bytes = 2000;
+  options.limits.block_bytes_at_once = 3000;
+  start(options);
+  ASSERT_EQ(map_.restore(), std::nullopt);
+  const auto head = [](std::size_t size) {
+    return "PUT /api/v1/blocks/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) + "\r\n\r\n";
+  };
+  const auto too_large = http_exchange(server_->port(), head(2001));
+  EXPECT_EQ(status_of(too_large), 413);
+  EXPECT_NE(too_large.find("\"limits\":\"2000 bytes\""), std::string::npos);
+  RawClient slow(server_->port());
+  slow.send_some(head(1800));
+  const auto refused = http_exchange(server_->port(), head(1800));
+  EXPECT_EQ(status_of(refused), 503);
+  EXPECT_NE(refused.find("\"code\":\"busy\""), std::string::npos);
+  EXPECT_NE(refused.find("Retry-After"), std::string::npos);
+}
 
 TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
   serve(sheet(60));

@@ -150,6 +150,9 @@ test("with a store the map is there again after the server was killed", async ()
   for (let i = 0; i < 6; i += 1) await put(server, `b${i}`, patch(i, 0, { side: 21 }), `?observed_at=${i}`);
   await put(server, "b2", patch(2, 0, { side: 21, height: 2 }), "?temperature_unit=kelvin");
   await ask(server, "DELETE", "b4");
+  // The name that a served file has is a name like others.
+  await put(server, "scene", patch(7, 0, { side: 21 }));
+  assert.equal((await ask(server, "DELETE", "scene")).status, 200);
   const before = { scene: await sceneOf(server), blocks: await list(server) };
   server.process.kill("SIGKILL");
   await once(server.process, "exit");

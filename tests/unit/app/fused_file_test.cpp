@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "fusion/settings.hpp"
+#include "server/scene/scene_store.hpp"
 
 namespace spectra::server {
 namespace {
@@ -171,6 +172,31 @@ TEST(SceneFile, SaysWhereItCannotBeWritten) {
   const auto written = write_scene_file("/no/such/folder/a.glb", two_triangles(), kColours, {SceneFileFormat::Glb});
   ASSERT_FALSE(written);
   EXPECT_NE(written.error().message.find("/no/such/folder"), std::string::npos);
+}
+
+TEST(RoundForFile, MovesEveryVertexByItsStepAtMostInAMapOfSeveralBlocks) {
+  WorkerPool pool(2);
+  SceneStore scenes;
+  MapChange change;
+  for (const char* id : {"b", "a"}) {
+    fusion::LoadedScene block;
+    block.mesh = two_triangles();
+    for (fusion::Vec3f& p : block.mesh.positions()) p.x += id[0] == 'b' ? 10.3F : 0.1F;
+    change.put.push_back({.id = id, .scene = std::move(block), .observed_at = {}});
+  }
+  const auto scene = scenes.change(std::move(change), pool);
+  const auto exact = scene->whole_mesh();
+  auto rounded = scene->whole_mesh();
+  SceneFileOptions options{.format = SceneFileFormat::Draco};
+  ASSERT_TRUE(round_for_file(*scene, rounded, options));
+  for (std::size_t v = 0; v < exact.vertex_count(); ++v) {
+    const auto &p = exact.positions()[v], &q = rounded.positions()[v];
+    const float most = options.largest_position_step_m;
+    EXPECT_LE(std::abs(p.x - q.x), most);
+    EXPECT_LE(std::abs(p.y - q.y), most);
+    EXPECT_LE(std::abs(p.z - q.z), most);
+  }
+  EXPECT_LT(options.largest_position_step_m, 1);
 }
 
 TEST(TemperatureOfMesh, LeavesMissingValuesOut) {

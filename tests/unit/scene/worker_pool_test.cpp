@@ -135,6 +135,18 @@ TEST(WorkerPool, LongForEachLetsOtherJobsIn) {
   EXPECT_LT(seen, 99);
 }
 
+TEST(WorkerPool, DoesNothingMoreAfterItsStop) {
+  WorkerPool pool(2);
+  std::atomic<int> count{0};
+  pool.for_each(10, [&](std::size_t) { ++count; });
+  pool.stop();
+  pool.post([&] { ++count; });
+  pool.stop();
+  EXPECT_EQ(count, 10);
+  pool.for_each(3, [&](std::size_t) { ++count; });
+  EXPECT_EQ(count, 13) << "a loop runs on the thread that asks for it";
+}
+
 TEST(WorkerPool, DropsWaitingJobsWhenDestroyed) {
   const auto token = std::make_shared<int>(1);
   std::atomic<bool> has_run{false};

@@ -33,6 +33,7 @@ class FakeScene : public SceneSnapshot {
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return *temperature_; }
   std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const override { return temperature_; }
+  std::uint32_t vertex_index(const Tile& leaf, std::size_t vertex) const override { return leaf.source_vertex[vertex]; }
   std::optional<Probe> probe(fusion::Vec3f) const override { return std::nullopt; }
   std::optional<Extreme> hottest() const override { return std::nullopt; }
   std::optional<Extreme> over_range() const override { return std::nullopt; }
@@ -40,6 +41,7 @@ class FakeScene : public SceneSnapshot {
   double highlighted_share(const fusion::FusionPlan&) const override { return 0; }
   std::optional<Extreme> coldest() const override { return std::nullopt; }
   float suggested_position_step_m() const override { return 0.001F; }
+  std::optional<fusion::MultispectralMesh> block_mesh(std::string_view) const override { return std::nullopt; }
   fusion::MultispectralMesh whole_mesh() const override { return {}; }
 
  private:

@@ -1,0 +1,128 @@
+#include "server/app/block_api.hpp"
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "server/app/block_options.hpp"
+#include "server/app/fused_file.hpp"
+
+namespace spectra::server {
+namespace {
+
+/// So many blocks are listed at a time, at most.
+constexpr std::size_t kBlocksOfPage = 1000;
+
+/// Names and notes may hold what is no UTF-8.
+std::string text_of(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+nlohmann::json json_of(const BlockEntry& entry) {
+  const auto list = [](const fusion::Vec3d& v) { return nlohmann::json{v.x, v.y, v.z}; };
+  nlohmann::json json{{"id", entry.id},
+                      {"revision", entry.revision},
+                      {"observed_at", nullptr},
+                      {"vertex_count", entry.vertex_count},
+                      {"triangle_count", entry.triangle_count},
+                      {"bounds", {{"min", list(entry.bounds.min)}, {"max", list(entry.bounds.max)}}},
+                      {"sha256", nullptr}};
+  if (entry.observed_at) json["observed_at"] = *entry.observed_at;
+  if (!entry.sha256.empty()) json["sha256"] = entry.sha256;
+  return json;
+}
+
+}  // namespace
+
+BlockApi::BlockApi(ServedScene& served, MapKeeper& map, ExportSlots& exports)
+    : served_(served), map_(map), exports_(exports) {}
+
+void BlockApi::handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
+  const std::string& path = request.target.path;
+  if (path == kBlocksPath) {
+    std::string after;
+    std::size_t limit = kBlocksOfPage;
+    for (const auto& [name, value] : request.target.query) {
+      if (name == "after") {
+        after = value;
+        continue;
+      }
+      const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), limit);
+      const bool is_limit = name == "limit" && error == std::errc() && end == value.data() + value.size() &&
+                            limit > 0 && limit <= kBlocksOfPage;
+      if (!is_limit) {
+        return reply(refused({400, "bad_request", name, name + "=" + value + " is not understood",
+                              "after=ID, limit=1.." + std::to_string(kBlocksOfPage)}));
+      }
+    }
+    const auto page = map_.page(after, limit);
+    nlohmann::json blocks = nlohmann::json::array();
+    for (const BlockEntry& entry : page) blocks.push_back(json_of(entry));
+    nlohmann::json next = nullptr;
+    if (page.size() == limit && !map_.page(page.back().id, 1).empty()) next = page.back().id;
+    return reply(text_reply(200, text_of({{"blocks", blocks}, {"next", next}}), "application/json"));
+  }
+  const std::string id = path.substr(kBlocksPath.size() + 1);
+  if (!store::is_block_id(id)) {
+    return reply(refused({400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"}));
+  }
+  if (request.method == HttpMethod::Put) return put(id, request, reply);
+  if (request.method == HttpMethod::Get) return give(id, reply);
+  map_.remove(id, [reply](const std::optional<BlockRefusal>& refusal) {
+    reply(refusal ? refused(*refusal) : text_reply(200, "{}\n", "application/json"));
+  });
+}
+
+void BlockApi::put(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
+  auto block = incoming_block(id, request.target.query);
+  if (!block) {
+    const auto& error = block.error();
+    return reply(refused({400, "bad_request", error.field, error.message, ""}));
+  }
+  block.value().ply = request.body;
+  map_.put(std::move(block).value(), [reply](const std::variant<MapKeeper::Taken, BlockRefusal>& outcome) {
+    if (const auto* refusal = std::get_if<BlockRefusal>(&outcome)) return reply(refused(*refusal));
+    const auto& taken = std::get<MapKeeper::Taken>(outcome);
+    nlohmann::json notes = nlohmann::json::array();
+    for (const fusion::Note& note : taken.notes) {
+      notes.push_back({{"id", note.id}, {"count", note.count}, {"message", note.message}});
+    }
+    const nlohmann::json body{{"id", taken.entry.id},
+                              {"revision", taken.entry.revision},
+                              {"vertex_count", taken.entry.vertex_count},
+                              {"triangle_count", taken.entry.triangle_count},
+                              {"notes", notes}};
+    reply(text_reply(200, text_of(body), "application/json"));
+  });
+}
+
+void BlockApi::give(const std::string& id, const std::function<void(HttpReply)>& reply) {
+  const BlockRefusal unknown{404, "not_found", "id", "there is no block \"" + id + "\"", ""};
+  if (!map_.has(id)) return reply(refused(unknown));
+  const ExportSlots::Slot slot = exports_.take();
+  if (!slot) {
+    return reply(
+        refused({503, "busy", "", "too many files are being made", std::to_string(ExportSlots::kMost) + " at a time"}));
+  }
+  served_.pool.post(
+      [slot, scene = served_.scenes.current(), id, unknown, reply] {
+        const auto mesh = scene->block_mesh(id);
+        if (!mesh) return reply(refused(unknown));
+        SceneFileOptions options;
+        options.format = SceneFileFormat::Ply;
+        const std::vector<fusion::Rgb8> visible(mesh->visible().begin(), mesh->visible().end());
+        auto file = scene_file(*mesh, visible, options);
+        if (!file) return reply(refused({500, "not_written", "", file.error().message, ""}));
+        struct Body {
+          ExportSlots::Slot slot;
+          std::string bytes;
+        };
+        const auto body = std::make_shared<Body>(Body{slot, std::move(file.value().bytes)});
+        reply(HttpReply{200, std::string(content_type_of(SceneFileFormat::Ply)), {body, &body->bytes}, {}});
+      },
+      kExportPriority);
+}
+
+}  // namespace spectra::server

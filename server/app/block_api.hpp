@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "server/app/export_slots.hpp"
+#include "server/app/map_keeper.hpp"
+#include "server/app/served_scene.hpp"
+#include "server/net/http_types.hpp"
+
+namespace spectra::server {
+
+/// The paths of docs/protocol.md, "Blocks of the map".
+class BlockApi {
+ public:
+  /// A block that is given back takes a slot of the exports.
+  BlockApi(ServedScene& served, MapKeeper& map, ExportSlots& exports);
+
+  /// The path is kBlocksPath or begins with it and a slash.
+  void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+
+ private:
+  void put(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void give(const std::string& id, const std::function<void(HttpReply)>& reply);
+
+  ServedScene& served_;
+  MapKeeper& map_;
+  ExportSlots& exports_;
+};
+
+}  // namespace spectra::server
