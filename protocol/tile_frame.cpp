@@ -1,53 +1,14 @@
 #include "protocol/tile_frame.hpp"
 
-#include <bit>
-#include <concepts>
 #include <limits>
 #include <string>
 
+#include "protocol/little_endian.hpp"
+
 namespace spectra::protocol {
-namespace {
-
-/// Writes little-endian values one after another, whatever the machine's own order.
-class Writer {
- public:
-  explicit Writer(std::span<std::byte> out) : out_(out) {}
-
-  template <std::unsigned_integral T>
-  void put(T value) {
-    for (std::size_t i = 0; i < sizeof(T); ++i)
-      out_[at_++] = static_cast<std::byte>((static_cast<std::uint64_t>(value) >> (8 * i)) & 0xFF);
-  }
-  void put(float value) { put(std::bit_cast<std::uint32_t>(value)); }
-
- private:
-  std::span<std::byte> out_;
-  std::size_t at_ = 0;
-};
-
-/// Reads what Writer wrote; the caller has checked that there is enough.
-class Reader {
- public:
-  explicit Reader(std::span<const std::byte> in) : in_(in) {}
-
-  template <std::unsigned_integral T>
-  T get() {
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < sizeof(T); ++i) value |= std::to_integer<std::uint64_t>(in_[at_++]) << (8 * i);
-    return static_cast<T>(value);
-  }
-  float get_float() { return std::bit_cast<float>(get<std::uint32_t>()); }
-
- private:
-  std::span<const std::byte> in_;
-  std::size_t at_ = 0;
-};
-
-}  // namespace
-
 std::array<std::byte, kTileFrameHeaderSize> encoded_header(const TileFrameHeader& header) {
   std::array<std::byte, kTileFrameHeaderSize> bytes{};
-  Writer out(bytes);
+  LittleEndianWriter out(bytes);
   out.put(kTileFrameMagic);
   out.put(static_cast<std::uint8_t>(header.kind));
   out.put(header.child_mask);
@@ -78,7 +39,7 @@ Result<TileFrameView> decoded_frame(std::span<const std::byte> message) {
   if (message.size() < kSmallestTileFrameHeaderSize)
     return malformed("", "message of " + std::to_string(message.size()) + " bytes, a header has at least " +
                              std::to_string(kSmallestTileFrameHeaderSize));
-  Reader in(message);
+  LittleEndianReader in(message);
   if (in.get<std::uint32_t>() != kTileFrameMagic) return malformed("magic", "does not start with \"SPC1\"");
 
   TileFrameView view;

@@ -34,6 +34,10 @@ nlohmann::json json_of(const BlockEntry& entry) {
   return json;
 }
 
+BlockRefusal no_name() {
+  return {400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"};
+}
+
 }  // namespace
 
 BlockApi::BlockApi(ServedScene& served, MapKeeper& map, ExportSlots& exports)
@@ -65,13 +69,12 @@ void BlockApi::handle(const HttpRequest& request, const std::function<void(HttpR
     return reply(text_reply(200, text_of({{"blocks", blocks}, {"next", next}}), "application/json"));
   }
   const std::string id = path.substr(kBlocksPath.size() + 1);
-  if (!store::is_block_id(id)) {
-    return reply(refused({400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"}));
-  }
+  if (!store::is_block_id(id)) return reply(refused(no_name()));
   if (request.method == HttpMethod::Put) return put(id, request, reply);
   if (request.method == HttpMethod::Get) return give(id, reply);
-  map_.remove(id, [reply](const std::optional<BlockRefusal>& refusal) {
-    reply(refusal ? refused(*refusal) : text_reply(200, "{}\n", "application/json"));
+  map_.remove(id, [reply](const std::variant<store::Revision, BlockRefusal>& outcome) {
+    const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+    reply(refusal != nullptr ? refused(*refusal) : text_reply(200, "{}\n", "application/json"));
   });
 }
 
@@ -96,6 +99,34 @@ void BlockApi::put(const std::string& id, const HttpRequest& request, const std:
                               {"notes", notes}};
     reply(text_reply(200, text_of(body), "application/json"));
   });
+}
+
+void BlockApi::change(BlockChange change, std::function<void(BlockOutcome)> done) {
+  if (!store::is_block_id(change.id)) return done(no_name());
+  if (!change.ply) {
+    if (!change.query.empty()) {
+      return done(
+          BlockRefusal{400, "bad_request", change.query[0].first, "nothing is said of a block that is taken out", ""});
+    }
+    return map_.remove(
+        std::move(change.id),
+        [done = std::move(done)](const std::variant<store::Revision, BlockRefusal>& outcome) {
+          if (const auto* refusal = std::get_if<BlockRefusal>(&outcome)) return done(*refusal);
+          done(BlockTaken{std::get<store::Revision>(outcome), {}});
+        },
+        MapKeeper::WhenFull::Take);
+  }
+  auto block = incoming_block(std::move(change.id), change.query);
+  if (!block) return done(BlockRefusal{400, "bad_request", block.error().field, block.error().message, ""});
+  block.value().ply = std::move(change.ply);
+  map_.put(
+      std::move(block).value(),
+      [done = std::move(done)](std::variant<MapKeeper::Taken, BlockRefusal> outcome) {
+        if (auto* refusal = std::get_if<BlockRefusal>(&outcome)) return done(std::move(*refusal));
+        auto& taken = std::get<MapKeeper::Taken>(outcome);
+        done(BlockTaken{taken.entry.revision, std::move(taken.notes)});
+      },
+      MapKeeper::WhenFull::Take);
 }
 
 void BlockApi::give(const std::string& id, const std::function<void(HttpReply)>& reply) {

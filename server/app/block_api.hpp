@@ -6,6 +6,7 @@
 #include "server/app/export_slots.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/served_scene.hpp"
+#include "server/net/block_change.hpp"
 #include "server/net/http_types.hpp"
 
 namespace spectra::server {
@@ -18,6 +19,9 @@ class BlockApi {
 
   /// The path is kBlocksPath or begins with it and a slash.
   void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+
+  /// As BlockHandler says.
+  void change(BlockChange change, std::function<void(BlockOutcome)> done);
 
  private:
   void put(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply);

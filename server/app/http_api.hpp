@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <utility>
 
 #include "server/app/block_api.hpp"
 #include "server/app/served_scene.hpp"
@@ -17,6 +18,11 @@ class HttpApi {
   HttpApi(ServedScene& served, MapKeeper& map);
 
   void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+
+  /// As BlockHandler says.
+  void change_block(BlockChange change, std::function<void(BlockOutcome)> done) {
+    blocks_.change(std::move(change), std::move(done));
+  }
 
   /// Where the network side counts; to be set before the first request.
   void set_metrics(const NetMetrics& metrics) { net_metrics_ = &metrics; }

@@ -136,7 +136,7 @@ MapKeeper::~MapKeeper() {
 }
 
 void MapKeeper::end() {
-  std::deque<Change> refused;
+  Queue refused;
   {
     std::unique_lock lock(mutex_);
     is_ending_ = true;
@@ -145,7 +145,7 @@ void MapKeeper::end() {
   }
   has_work_.notify_all();
   if (writer_.joinable()) writer_.join();
-  for (Change& change : refused) refuse(change, busy("the server ends"));
+  for (Waiting& waiting : refused) refuse(waiting.change, busy("the server ends"));
 }
 
 std::optional<std::string> MapKeeper::restore() {
@@ -211,30 +211,53 @@ void MapKeeper::open_with_file() {
   is_open_ = true;
 }
 
-void MapKeeper::put(IncomingBlock block, PutDone done) {
+void MapKeeper::put(IncomingBlock block, PutDone done, WhenFull when_full) {
   const std::size_t size = block.ply->size();
-  std::optional<BlockRefusal> refusal;
-  {
-    const std::lock_guard lock(mutex_);
-    if (!is_open_ || is_ending_) {
-      refusal = busy("the map is not open yet, or not any more");
-    } else if (waiting_bytes_ + size > kWaitingBytes) {
-      refusal = busy("too many bytes of blocks are waiting", std::to_string(kWaitingBytes) + " bytes");
-    } else {
-      waiting_bytes_ += size;
-      ++reading_count_;
-    }
-  }
-  if (refusal) return done(std::move(*refusal));
-  const PutDone counted = [this, size, done = std::move(done)](std::variant<Taken, BlockRefusal> outcome) {
+  PutDone counted = [this, size, done = std::move(done)](std::variant<Taken, BlockRefusal> outcome) {
     {
       const std::lock_guard lock(mutex_);
       waiting_bytes_ -= size;
     }
     done(std::move(outcome));
   };
-  served_.pool.post([this, block = std::move(block), counted]() mutable {
-    read(std::move(block), counted);
+  enqueue(Put{std::move(block), {}, std::move(counted)}, size, when_full);
+}
+
+void MapKeeper::remove(std::string id, RemoveDone done, WhenFull when_full) {
+  enqueue(Remove{std::move(id), std::move(done)}, 0, when_full);
+}
+
+void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
+  std::optional<BlockRefusal> refusal;
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_bytes_ += bytes;
+    if (!is_open_ || is_ending_) {
+      refusal = busy("the map is not open yet, or not any more");
+    } else if (when_full == WhenFull::Refuse && waiting_bytes_ > kWaitingBytes) {
+      refusal = busy("too many bytes of blocks are waiting", std::to_string(kWaitingBytes) + " bytes");
+    } else if (when_full == WhenFull::Refuse && waiting_.size() >= kWaitingChanges) {
+      refusal = busy("too many changes are waiting", std::to_string(kWaitingChanges));
+    } else {
+      const bool is_ready = std::holds_alternative<Remove>(change);
+      waiting_.push_back({.change = std::move(change), .is_ready = is_ready});
+      if (is_ready) {
+        has_work_.notify_one();
+      } else {
+        begin_reading(std::prev(waiting_.end()));
+      }
+    }
+  }
+  if (refusal) refuse(change, *refusal);
+}
+
+void MapKeeper::begin_reading(Queue::iterator waiting) {
+  if (waiting->is_ready || waiting->is_reading || is_ending_ || (!origin_ && is_first_under_way_)) return;
+  is_first_under_way_ = !origin_;
+  waiting->is_reading = true;
+  ++reading_count_;
+  served_.pool.post([this, waiting] {
+    read(waiting);
     // Under the lock: after it nothing here is touched any more.
     const std::lock_guard lock(mutex_);
     --reading_count_;
@@ -242,40 +265,40 @@ void MapKeeper::put(IncomingBlock block, PutDone done) {
   });
 }
 
-void MapKeeper::read(IncomingBlock block, const PutDone& done) {
+void MapKeeper::read(Queue::iterator waiting) {
   std::optional<fusion::Vec3d> origin;
-  bool is_ending = false;
   {
     const std::lock_guard lock(mutex_);
     origin = origin_;
-    is_ending = is_ending_;
+    if (is_ending_) return;  // refused there
   }
-  if (is_ending) return done(busy("the server ends"));
+  auto& put = std::get<Put>(waiting->change);
+  std::optional<BlockRefusal> refusal;
   try {
-    auto scene = loaded(block, origin);
-    if (scene) return enqueue(Put{std::move(block), std::move(scene).value(), done});
-    const fusion::Error& error = scene.error();
-    done(BlockRefusal{422, "unreadable_block", error.field, error.message, ""});
+    auto scene = loaded(put.block, origin);
+    if (scene) {
+      put.scene = std::move(scene).value();
+    } else {
+      refusal = {422, "unreadable_block", scene.error().field, scene.error().message, ""};
+    }
   } catch (const std::exception& error) {
     spdlog::error("a block could not be read: {}", error.what());
-    done(busy("the block could not be read now"));
+    refusal = busy("the block could not be read now");
   }
-}
-
-void MapKeeper::remove(std::string id, RemoveDone done) {
-  enqueue(Remove{std::move(id), std::move(done)});
-}
-
-void MapKeeper::enqueue(Change change) {
+  Queue refused;
   {
     const std::lock_guard lock(mutex_);
-    if (is_open_ && !is_ending_ && waiting_.size() < kWaitingChanges) {
-      waiting_.push_back(std::move(change));
-      has_work_.notify_one();
-      return;
-    }
+    waiting->is_ready = true;
+    if (refusal) refused.splice(refused.begin(), waiting_, waiting);
+    if (refusal && !origin) read_next();
+    has_work_.notify_one();
   }
-  refuse(change, busy("too many changes are waiting, or the map is not open", std::to_string(kWaitingChanges)));
+  if (refusal) put.done(*refusal);
+}
+
+void MapKeeper::read_next() {
+  is_first_under_way_ = false;
+  for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) begin_reading(waiting);
 }
 
 void MapKeeper::refuse(Change& change, const BlockRefusal& refusal) {
@@ -283,25 +306,44 @@ void MapKeeper::refuse(Change& change, const BlockRefusal& refusal) {
   if (auto* gone = std::get_if<Remove>(&change)) gone->done(refusal);
 }
 
+const std::string& MapKeeper::id_of(const Change& change) {
+  const auto* put = std::get_if<Put>(&change);
+  return put != nullptr ? put->block.id : std::get<Remove>(change).id;
+}
+
 void MapKeeper::run() {
   for (;;) {
     std::vector<Change> batch = next_batch();
     if (batch.empty()) return;
+    const bool has_put =
+        std::any_of(batch.begin(), batch.end(), [](const Change& c) { return std::holds_alternative<Put>(c); });
     take(std::move(batch));
+    const std::lock_guard lock(mutex_);
+    if (has_put && is_first_under_way_) read_next();
   }
 }
 
 std::vector<MapKeeper::Change> MapKeeper::next_batch() {
   std::unique_lock lock(mutex_);
-  has_work_.wait(lock, [this] { return is_ending_ || !waiting_.empty(); });
   std::vector<Change> batch;
-  // One change a block: the next waits for a version of its own.
-  std::set<std::string> named;
-  while (!is_ending_ && !waiting_.empty()) {
-    const auto* put = std::get_if<Put>(&waiting_.front());
-    if (!named.insert(put != nullptr ? put->block.id : std::get<Remove>(waiting_.front()).id).second) break;
-    batch.push_back(std::move(waiting_.front()));
-    waiting_.pop_front();
+  while (!is_ending_) {
+    // One change a block, the first that waits: the next waits for a version of its own.
+    std::set<std::string> named;
+    std::size_t bytes = 0;
+    for (auto waiting = waiting_.begin(); waiting != waiting_.end();) {
+      const auto next = std::next(waiting);
+      const auto* put = std::get_if<Put>(&waiting->change);
+      const std::size_t size = put != nullptr ? put->block.ply->size() : 0;
+      if (named.insert(id_of(waiting->change)).second && waiting->is_ready) {
+        if (!batch.empty() && bytes + size > kBatchBytes) break;
+        bytes += size;
+        batch.push_back(std::move(waiting->change));
+        waiting_.erase(waiting);
+      }
+      waiting = next;
+    }
+    if (!batch.empty()) return batch;
+    has_work_.wait(lock);
   }
   return batch;
 }
@@ -400,7 +442,7 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
       }
     }
     if (auto* put = std::get_if<Put>(&batch[i])) put->done(std::move(taken[i]));
-    if (auto* gone = std::get_if<Remove>(&batch[i])) gone->done(std::nullopt);
+    if (auto* gone = std::get_if<Remove>(&batch[i])) gone->done(revisions[i]);
   }
 }
 

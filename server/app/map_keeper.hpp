@@ -2,8 +2,8 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -50,7 +50,13 @@ class MapKeeper {
     std::vector<fusion::Note> notes;
   };
   using PutDone = std::function<void(std::variant<Taken, BlockRefusal>)>;
-  using RemoveDone = std::function<void(std::optional<BlockRefusal>)>;
+  using RemoveDone = std::function<void(std::variant<store::Revision, BlockRefusal>)>;
+
+  /// What becomes of a change when too much waits.
+  enum class WhenFull {
+    Refuse,  ///< Busy.
+    Take,    ///< For callers who bound themselves what they hand over.
+  };
 
   /// `store` may be null: then the map is gone with the program.
   MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store);
@@ -67,9 +73,9 @@ class MapKeeper {
   void end();
 
   /// `done` is called once, from any thread, when the block is part of the map and durable where there is a store. Refused with
-  /// Busy (503) before the map is open.
-  void put(IncomingBlock block, PutDone done);
-  void remove(std::string id, RemoveDone done);
+  /// Busy (503) before the map is open. Changes of one block take effect in the order of the calls; those of others may overtake.
+  void put(IncomingBlock block, PutDone done, WhenFull when_full = WhenFull::Refuse);
+  void remove(std::string id, RemoveDone done, WhenFull when_full = WhenFull::Refuse);
 
   /// In order of id, those after `after`, at most `limit`.
   std::vector<BlockEntry> page(std::string_view after, std::size_t limit) const;
@@ -79,6 +85,8 @@ class MapKeeper {
   static constexpr std::size_t kWaitingBytes = 256u << 20;
   /// Changes that may wait at a time.
   static constexpr std::size_t kWaitingChanges = 4096;
+  /// Bytes of blocks that become one version, beside the first.
+  static constexpr std::size_t kBatchBytes = 64u << 20;
 
  private:
   struct Put {
@@ -92,14 +100,27 @@ class MapKeeper {
   };
   using Change = std::variant<Put, Remove>;
 
+  /// A change in its place in the queue, where it waits from the call on, so that reading does not change the order.
+  struct Waiting {
+    Change change;
+    bool is_reading = false;  ///< Its job is on the pool: only that may touch the change.
+    bool is_ready = false;
+  };
+  using Queue = std::list<Waiting>;
+
   /// The shape of what a batch puts, and the names of what it takes out.
   struct Shapes {
     std::vector<BlockShape> put;
     std::vector<std::string> removed;
   };
 
-  void read(IncomingBlock block, const PutDone& done);
-  void enqueue(Change change);
+  void enqueue(Change change, std::size_t bytes, WhenFull when_full);
+  /// Hands a block that waits to the pool; as long as the map has no origin one at a time, for what blocks share is the same only
+  /// relative to the same one. Under the lock.
+  void begin_reading(Queue::iterator waiting);
+  void read(Queue::iterator waiting);
+  /// After the block that may have given the map its origin: reads what waited for it. Under the lock.
+  void read_next();
   void run();
   std::vector<Change> next_batch();
   void take(std::vector<Change> batch);
@@ -107,6 +128,7 @@ class MapKeeper {
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
   void keep_constants();
   static void refuse(Change& change, const BlockRefusal& refusal);
+  static const std::string& id_of(const Change& change);
   static Shapes shapes_of(const std::vector<Change>& batch);
 
   ServedScene& served_;
@@ -114,13 +136,14 @@ class MapKeeper {
 
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
-  std::deque<Change> waiting_;
+  Queue waiting_;
   std::size_t waiting_bytes_ = 0;    ///< Of all that is under way.
   std::size_t reading_count_ = 0;    ///< Jobs on the pool.
   std::condition_variable is_read_;  ///< A job has ended.
   bool is_open_ = false;
   bool is_ending_ = false;
   std::optional<fusion::Vec3d> origin_;  ///< Of the map, once it has one.
+  bool is_first_under_way_ = false;      ///< The block that may give the map its origin.
   std::map<std::string, BlockEntry, std::less<>> entries_;
   std::uint64_t last_revision_ = 0;
 

@@ -82,6 +82,12 @@ std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
   out.counter("spectra_messages_sent_total", "JSON messages to viewers.", as_double(net.messages_sent));
   out.counter("spectra_frames_sent_total", "Tile frames to viewers.", as_double(net.frames_sent));
   out.counter("spectra_frame_bytes_sent_total", "Bytes of tile frames to viewers.", as_double(net.frame_bytes_sent));
+  out.gauge("spectra_senders", "Senders of blocks connected to /ingest now.", static_cast<double>(net.senders));
+  out.counter("spectra_blocks_received_total", "Block messages received over /ingest.", as_double(net.blocks_received));
+  out.counter("spectra_block_bytes_received_total", "Bytes of block messages received over /ingest.",
+              as_double(net.block_bytes_received));
+  out.counter("spectra_blocks_refused_total", "Block messages over /ingest that were refused.",
+              as_double(net.blocks_refused));
   out.gauge("spectra_frame_cache_bytes", "Encoded frames held for sharing.", as_double(served.cache.size_bytes()));
   out.counter("spectra_frame_cache_hits_total", "Frames that were encoded already.",
               as_double(served.cache.hit_count()));

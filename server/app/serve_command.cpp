@@ -164,7 +164,8 @@ int run_serve(const ServeOptions& options) {
         [&served, limits = net.limits](const std::shared_ptr<ViewerPeer>& peer) {
           return std::make_shared<ViewerSession>(peer, *served, limits);
         },
-        web_root(options));
+        web_root(options),
+        [&api](BlockChange change, auto done) { api.change_block(std::move(change), std::move(done)); });
   } catch (const std::runtime_error& error) {
     return fail(kJobFailed, error.what());
   }

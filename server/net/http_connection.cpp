@@ -19,7 +19,10 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/ingest_message.hpp"
 #include "server/net/block_refusal.hpp"
+#include "server/net/block_room.hpp"
+#include "server/net/ingest_session.hpp"
 #include "server/net/websocket_session.hpp"
 
 namespace spectra::server {
@@ -71,26 +74,6 @@ std::optional<HelloForm> hello_form_of(const RequestTarget& target) {
   return form;
 }
 
-/// Room for the body of a block, as long as it is in memory here.
-class BlockRoom {
- public:
-  BlockRoom(ServerContext& context, std::size_t size_bytes)
-      : context_(context),
-        size_bytes_(size_bytes),
-        is_there_(context.block_bytes.fetch_add(size_bytes) + size_bytes <=
-                  context.options.limits.block_bytes_at_once) {}
-  ~BlockRoom() { context_.block_bytes -= size_bytes_; }
-  BlockRoom(const BlockRoom&) = delete;
-  BlockRoom& operator=(const BlockRoom&) = delete;
-
-  bool is_there() const { return is_there_; }
-
- private:
-  ServerContext& context_;
-  const std::size_t size_bytes_;
-  const bool is_there_;
-};
-
 bool is_loopback(const asio::ip::address& address) {
   if (address.is_loopback()) return true;
   return address.is_v6() && address.to_v6().is_v4_mapped() &&
@@ -102,6 +85,21 @@ bool is_block_change(const http::request<http::string_body>& request) {
   return (request.method() == http::verb::put || request.method() == http::verb::delete_) &&
          view(request.target()).starts_with(std::string(kBlocksPath) + '/');
 }
+
+/// Counts a sender of blocks, as long as it is there.
+class SenderPlace {
+ public:
+  explicit SenderPlace(ServerContext& context) : senders_(context.metrics.senders), count_(++senders_) {}
+  ~SenderPlace() { --senders_; }
+  SenderPlace(const SenderPlace&) = delete;
+  SenderPlace& operator=(const SenderPlace&) = delete;
+
+  std::int64_t count() const { return count_; }
+
+ private:
+  std::atomic<std::int64_t>& senders_;
+  const std::int64_t count_;
+};
 
 /// Where a handler leaves its answer; outlives both the connection and the handler.
 struct PendingReply {
@@ -225,11 +223,33 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   auto target = *parsed_target(view(request.target()));
 
   if (target.path == "/ws") {
-    if (auto refused = upgrade_refusal_of(request, target)) {
+    auto refused = upgrade_refusal_of(request, "spectra.v1");
+    if (!refused && !hello_form_of(target)) refused = text_reply(400, "hello in the query must be full or brief\n");
+    if (refused) {
       context_.metrics.requests_refused += 1;
       co_return co_await write(*refused, request.version(), is_head, false);
     }
     const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *hello_form_of(target));
+    context_.remove(this);
+    co_await session->run(request);
+    co_return false;
+  }
+  if (target.path == "/ingest" && context_.blocks) {
+    const SenderPlace place(context_);
+    auto refused = upgrade_refusal_of(request, protocol::kIngestProtocol);
+    if (!refused && !is_from_here_) {
+      refused = text_reply(403, "the map is changed from the robot's own machine alone\n");
+    }
+    if (!refused && place.count() > static_cast<std::int64_t>(context_.options.limits.ingest_sessions)) {
+      refused = text_reply(503, "too many senders of blocks are connected already: " +
+                                    std::to_string(context_.options.limits.ingest_sessions) + " may be\n");
+      refused->headers.emplace_back("Retry-After", "1");
+    }
+    if (refused) {
+      context_.metrics.requests_refused += 1;
+      co_return co_await write(*refused, request.version(), is_head, false);
+    }
+    const auto session = std::make_shared<IngestSession>(std::move(stream_), context_);
     context_.remove(this);
     co_await session->run(request);
     co_return false;
@@ -283,11 +303,12 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) cons
   return std::nullopt;
 }
 
-std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request, const RequestTarget& target) const {
+std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& request,
+                                                            const std::string& subprotocol) const {
   // RFC 6455, 4.1; what came early is in our buffer and would be lost.
   if (buffer_.size() > 0) return text_reply(400, "nothing may follow an upgrade before it is answered\n");
   if (!beast::websocket::is_upgrade(request)) {
-    auto reply = text_reply(426, "a WebSocket upgrade with subprotocol spectra.v1 is required\n");
+    auto reply = text_reply(426, "a WebSocket upgrade with subprotocol " + subprotocol + " is required\n");
     reply.headers.emplace_back("Upgrade", "websocket");
     return reply;
   }
@@ -296,14 +317,13 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
       (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
     return text_reply(403, "pages of that origin may not connect; see --allow-host\n");
   }
-  if (!hello_form_of(target)) return text_reply(400, "hello in the query must be full or brief\n");
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto it = begin; it != end; ++it) {
     for (const auto& offered : http::token_list(it->value())) {
-      if (offered == "spectra.v1") return std::nullopt;
+      if (view(offered) == subprotocol) return std::nullopt;
     }
   }
-  return text_reply(400, "the subprotocol spectra.v1 is required\n");
+  return text_reply(400, "the subprotocol " + subprotocol + " is required\n");
 }
 
 HttpReply HttpConnection::static_reply(const HttpRequest& request) const {

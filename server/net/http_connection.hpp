@@ -15,8 +15,8 @@
 
 namespace spectra::server {
 
-/// One TCP connection from its first byte: checks every request, answers HTTP, and hands an upgrade of /ws over to a
-/// WebSocketSession. Runs on its strand.
+/// One TCP connection from its first byte: checks every request, answers HTTP, and hands an upgrade over to a
+/// WebSocketSession (/ws) or an IngestSession (/ingest). Runs on its strand.
 class HttpConnection final : public Stoppable, public std::enable_shared_from_this<HttpConnection> {
  public:
   /// `stream` is connected and its executor is a strand.
@@ -39,7 +39,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   HttpReply static_reply(const HttpRequest& request) const;
   /// Why the request is refused before anything looks at what it asks for.
   std::optional<HttpReply> refusal_of(const Request& request) const;
-  std::optional<HttpReply> upgrade_refusal_of(const Request& request, const RequestTarget& target) const;
+  std::optional<HttpReply> upgrade_refusal_of(const Request& request, const std::string& subprotocol) const;
 
   ConnectionStream stream_;
   ServerContext& context_;

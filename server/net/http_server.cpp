@@ -108,9 +108,10 @@ std::optional<ListenAddress> parsed_listen_address(std::string_view text) {
 }
 
 struct HttpServer::State {
-  State(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root)
+  State(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root,
+        BlockHandler blocks)
       : files(std::move(web_root)),
-        context(std::move(options), std::move(http), std::move(viewers), files, metrics),
+        context(std::move(options), std::move(http), std::move(viewers), std::move(blocks), files, metrics),
         io(static_cast<int>(context.options.io_thread_count)),
         acceptor(asio::make_strand(io)),
         accept_timer(acceptor.get_executor()),
@@ -219,8 +220,9 @@ void HttpServer::State::begin_stop() {
 }
 
 HttpServer::HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory viewers,
-                       std::filesystem::path web_root)
-    : state_(std::make_unique<State>(std::move(options), std::move(http), std::move(viewers), std::move(web_root))) {
+                       std::filesystem::path web_root, BlockHandler blocks)
+    : state_(std::make_unique<State>(std::move(options), std::move(http), std::move(viewers), std::move(web_root),
+                                     std::move(blocks))) {
   state_->listen();
 }
 

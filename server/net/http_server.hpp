@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/net/block_change.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
 #include "server/net/net_options.hpp"
@@ -26,8 +27,10 @@ std::optional<ListenAddress> parsed_listen_address(std::string_view text);
 class HttpServer {
  public:
   /// Opens the port; connections wait in the kernel until run(). Throws std::runtime_error with one clear sentence when
-  /// it cannot. `web_root` may be empty. `viewers` and `http` are called from I/O threads.
-  HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root);
+  /// it cannot. `web_root` may be empty. `viewers`, `http` and `blocks` are called from I/O threads; without
+  /// `blocks` there is no /ingest.
+  HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root,
+             BlockHandler blocks = {});
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -20,6 +20,10 @@ struct NetMetrics {
   std::atomic<std::uint64_t> messages_sent{0};
   std::atomic<std::uint64_t> frames_sent{0};
   std::atomic<std::uint64_t> frame_bytes_sent{0};
+  std::atomic<std::int64_t> senders{0};           ///< Sessions of /ingest now.
+  std::atomic<std::uint64_t> blocks_received{0};  ///< Over /ingest.
+  std::atomic<std::uint64_t> block_bytes_received{0};
+  std::atomic<std::uint64_t> blocks_refused{0};
 };
 
 }  // namespace spectra::server

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/net/block_change.hpp"
 #include "server/net/host_list.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
@@ -32,17 +33,19 @@ class Stoppable {
 /// What all connections of one server share. Outlives them.
 class ServerContext {
  public:
-  ServerContext(NetOptions options_in, HttpHandler http_in, ViewerClientFactory viewers_in, StaticFiles& files_in,
-                NetMetrics& metrics_in)
+  ServerContext(NetOptions options_in, HttpHandler http_in, ViewerClientFactory viewers_in, BlockHandler blocks_in,
+                StaticFiles& files_in, NetMetrics& metrics_in)
       : options(std::move(options_in)),
         http(std::move(http_in)),
         viewers(std::move(viewers_in)),
+        blocks(std::move(blocks_in)),
         files(files_in),
         metrics(metrics_in) {}
 
   const NetOptions options;
   const HttpHandler http;
   const ViewerClientFactory viewers;
+  const BlockHandler blocks;  ///< Empty: there is no /ingest.
   StaticFiles& files;
   NetMetrics& metrics;
   HostList hosts;

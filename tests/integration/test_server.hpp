@@ -28,8 +28,8 @@ inline server::NetOptions quick_options() {
 class TestServer {
  public:
   TestServer(server::NetOptions options, server::HttpHandler http, server::ViewerClientFactory viewers,
-             std::filesystem::path web_root = {})
-      : server_(std::move(options), std::move(http), std::move(viewers), std::move(web_root)),
+             std::filesystem::path web_root = {}, server::BlockHandler blocks = {})
+      : server_(std::move(options), std::move(http), std::move(viewers), std::move(web_root), std::move(blocks)),
         thread_([this] { server_.run(); }) {}
   ~TestServer() { stop(); }
 

@@ -17,6 +17,7 @@
 #include "protocol/draco_codec.hpp"
 #include "protocol/incoming_message.hpp"
 #include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/ingest_messages.hpp"
 #include "protocol/messages/quality_messages.hpp"
 #include "protocol/messages/query_messages.hpp"
 #include "protocol/messages/scene_messages.hpp"
@@ -77,6 +78,9 @@ const std::map<std::string, MethodPassages> kMethods{
     {"stream.complete", {through<StreamComplete>(), unchanged}},
     {"stream.stats", {through<StreamStats>(), unchanged}},
     {"status", {through<Status>(), unchanged}},
+    {"ingest.hello", {through<IngestHello>(), unchanged}},
+    {"ingest.acknowledged", {through<IngestAcknowledged>(), unchanged}},
+    {"ingest.refused", {through<IngestRefused>(), unchanged}},
 };
 
 /// The method that a file is an example of: the longest known name that its name starts with.

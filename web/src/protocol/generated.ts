@@ -79,6 +79,11 @@ export interface ProtocolDefinitions {
   Hello: Hello;
   HistogramReply: HistogramReply;
   HistogramRequest: HistogramRequest;
+  IngestAcknowledged: IngestAcknowledged;
+  IngestCredit: IngestCredit;
+  IngestHello: IngestHello;
+  IngestLimits: IngestLimits;
+  IngestRefused: IngestRefused;
   Limits: Limits;
   MethodDescription: MethodDescription;
   MissingDisplay: MissingDisplay;
@@ -513,6 +518,87 @@ export interface HistogramReply {
  */
 export interface HistogramRequest {
   bins: number;
+}
+/**
+ * Params of the notification ingest.acknowledged: the change is part of the map, and durable where there is a store.
+ */
+export interface IngestAcknowledged {
+  /**
+   * Of the message.
+   */
+  sequence: number;
+  /**
+   * Of the block; of the change, when one was taken out.
+   */
+  revision: number;
+  /**
+   * What was noticed in the block; left out when there is nothing.
+   */
+  notes?: SceneNote[];
+  credit: IngestCredit;
+}
+/**
+ * What may have been sent since the connection began; only ever grows.
+ */
+export interface IngestCredit {
+  /**
+   * Messages.
+   */
+  blocks: number;
+  /**
+   * Of messages; the last one may go beyond it.
+   */
+  bytes: number;
+}
+/**
+ * Params of the notification ingest.hello.
+ */
+export interface IngestHello {
+  /**
+   * spectra.ingest.v1
+   */
+  protocol: string;
+  limits: IngestLimits;
+  credit: IngestCredit;
+}
+/**
+ * What one message may hold.
+ */
+export interface IngestLimits {
+  /**
+   * PLY.
+   */
+  max_block_bytes: number;
+  /**
+   * Name and query.
+   */
+  max_target_bytes: number;
+}
+/**
+ * Params of the notification ingest.refused: the map is as it was.
+ */
+export interface IngestRefused {
+  /**
+   * Of the message.
+   */
+  sequence: number;
+  /**
+   * snake_case, stable.
+   */
+  code: string;
+  /**
+   * What is wrong; may be empty.
+   */
+  field: string;
+  /**
+   * One sentence for a person.
+   */
+  reason: string;
+  /**
+   * What would be accepted, for a person; left out when there is nothing to say.
+   */
+  limits?: string;
+  credit: IngestCredit;
 }
 /**
  * Result of scene.probe: the nearest vertex at full accuracy.
