@@ -128,7 +128,7 @@ test("a server that has much to do slows its senders, keeps within its memory an
   }
   clearInterval(watching);
   t.diagnostic(`the sender waited ${sender.waits} times; ${((most - before) / 2 ** 20).toFixed(0)} MiB more than before at most`);
-  assert.ok(sender.waits > 20, "the sender had to wait");
+  assert.ok(sender.waits > 5, "the sender had to wait");
   assert.ok(most - before < 150 * 2 ** 20, "less than half of what was sent was in memory");
   const { vertex_count, revision } = await (await fetch(`${server.url}/api/v1/scene`)).json();
   assert.equal(vertex_count, 2 * 260 * 260);
