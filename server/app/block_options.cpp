@@ -74,7 +74,29 @@ fusion::Result<void> read_field(IncomingBlock& block, const std::string& name, c
   return fusion::success();
 }
 
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
 }  // namespace
+
+std::vector<std::pair<std::string, std::string>> query_of(const fusion::ReadOptions& read) {
+  std::vector<std::pair<std::string, std::string>> query;
+  if (!read.temperature_property.empty()) query.emplace_back("temperature_property", read.temperature_property);
+  for (const char* name : {"celsius", "kelvin", "centikelvin", "fahrenheit"}) {
+    if (read.temperature_unit && read.temperature_unit == fusion::temperature_unit(name)) {
+      query.emplace_back("temperature_unit", name);
+    }
+  }
+  if (read.temperature_scale) query.emplace_back("temperature_scale", number_text(*read.temperature_scale));
+  if (read.temperature_offset) query.emplace_back("temperature_offset", number_text(*read.temperature_offset));
+  for (const double value : read.no_data) query.emplace_back("no_data", number_text(value));
+  if (read.metres_per_unit) query.emplace_back("scale", number_text(*read.metres_per_unit));
+  if (read.up) query.emplace_back("up", fusion::to_string(*read.up));
+  return query;
+}
 
 fusion::Result<IncomingBlock> incoming_block(std::string id,
                                              const std::vector<std::pair<std::string, std::string>>& query) {

@@ -15,6 +15,9 @@ namespace spectra::server {
 fusion::Result<IncomingBlock> incoming_block(std::string id,
                                              const std::vector<std::pair<std::string, std::string>>& query);
 
+/// The other way round: what a query says of reading options.
+std::vector<std::pair<std::string, std::string>> query_of(const fusion::ReadOptions& read);
+
 /// The same from the text that it keeps of its reading options.
 fusion::Result<IncomingBlock> incoming_block(std::string id, const std::string& read_text);
 

@@ -64,6 +64,15 @@ struct StoreSalvageOptions {
   std::filesystem::path output;  ///< Must not be there yet.
 };
 
+struct PushOptions {
+  std::filesystem::path input;  ///< A PLY file, or a folder of them.
+  std::string to;               ///< The server's address, http://HOST:PORT.
+  std::string id;               ///< Of the block of one file; empty: its name.
+  std::optional<double> blocks_per_s;
+  std::string observed_at = "file";  ///< "file", "now" or Unix seconds.
+  fusion::ReadOptions read;
+};
+
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
 int run_fuse(const FuseOptions& options);
@@ -71,6 +80,7 @@ int run_info(const InfoOptions& options);
 int run_methods(bool as_json);
 int run_demo_scene(const DemoSceneFileOptions& options);
 int run_tradeoff(const TradeoffCommandOptions& options);
+int run_push(const PushOptions& options);
 int run_store_check(const std::filesystem::path& store);
 int run_store_salvage(const StoreSalvageOptions& options);
 

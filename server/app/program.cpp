@@ -1,5 +1,7 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <functional>
@@ -142,6 +144,28 @@ void add_tradeoff(CLI::App& app, TradeoffCommandOptions& options, Run& run) {
   command->final_callback([&options, &run] { run = [&options] { return run_tradeoff(options); }; });
 }
 
+void add_push(CLI::App& app, PushOptions& options, Run& run) {
+  auto* command = app.add_subcommand("push", "Put PLY files into the map of a server as blocks");
+  command->add_option("input", options.input, "A PLY file, or a folder: all PLY files in it, in order of their names")
+      ->required();
+  command->add_option("--to", options.to, "The server, such as http://127.0.0.1:8080")->required();
+  command->add_option("--rate", options.blocks_per_s, "Blocks a second at most")->check(CLI::Range(1e-3, 1e6));
+  command->add_option("--id", options.id, "The name of the block, for one file; else the file's without its ending");
+  const auto is_time = [](const std::string& text) {
+    char* end = nullptr;
+    const double seconds = std::strtod(text.c_str(), &end);
+    const bool is_number = !text.empty() && *end == '\0' && std::isfinite(seconds);
+    return text == "file" || text == "now" || is_number ? "" : "file, now or Unix seconds is wanted";
+  };
+  command
+      ->add_option("--observed-at", options.observed_at,
+                   "When it was seen: file (when the file was written), now, or Unix seconds")
+      ->capture_default_str()
+      ->check(CLI::Validator(is_time, ""));
+  add_reading(*command, options.read);
+  command->final_callback([&options, &run] { run = [&options] { return run_push(options); }; });
+}
+
 void add_store(CLI::App& app, std::filesystem::path& checked, StoreSalvageOptions& salvage, Run& run) {
   auto* command = app.add_subcommand("store", "Check or rescue the store of a map");
   command->require_subcommand(1);
@@ -168,6 +192,7 @@ int parse_and_run(int argc, const char* const* argv) {
   bool methods_as_json = false;
   DemoSceneFileOptions demo_scene;
   TradeoffCommandOptions tradeoff;
+  PushOptions push;
   std::filesystem::path checked_store;
   StoreSalvageOptions salvage;
   Run run;
@@ -178,6 +203,7 @@ int parse_and_run(int argc, const char* const* argv) {
   add_methods(app, methods_as_json, run);
   add_demo_scene(app, demo_scene, run);
   add_tradeoff(app, tradeoff, run);
+  add_push(app, push, run);
   add_store(app, checked_store, salvage, run);
   bool is_quiet = false;
   constexpr auto* kQuietHelp = "No progress on the terminal";

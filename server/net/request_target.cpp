@@ -44,7 +44,31 @@ bool has_plain_segments(std::string_view path) {
   return path.find('\\') == std::string_view::npos;
 }
 
+std::string percent_encoded(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  constexpr std::string_view kPlain = "-._~/,";
+  std::string encoded;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_letter_or_digit = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (is_letter_or_digit || kPlain.find(c) != std::string_view::npos) {
+      encoded += c;
+    } else {
+      encoded.append({'%', kDigits[byte >> 4U], kDigits[byte & 15U]});
+    }
+  }
+  return encoded;
+}
+
 }  // namespace
+
+std::string target_text(std::string_view path, const std::vector<std::pair<std::string, std::string>>& query) {
+  std::string text = percent_encoded(path);
+  for (std::size_t i = 0; i < query.size(); ++i) {
+    text += (i == 0 ? '?' : '&') + percent_encoded(query[i].first) + '=' + percent_encoded(query[i].second);
+  }
+  return text;
+}
 
 std::optional<RequestTarget> parsed_target(std::string_view target) {
   if (!target.starts_with('/')) return std::nullopt;

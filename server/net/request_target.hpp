@@ -18,4 +18,7 @@ struct RequestTarget {
 /// encoding, control characters, backslashes, "." and ".." segments (encoded ones too). Safe on untrusted input.
 std::optional<RequestTarget> parsed_target(std::string_view target);
 
+/// The other way round, without the first slash: what parsed_target reads again, after a slash.
+std::string target_text(std::string_view path, const std::vector<std::pair<std::string, std::string>>& query);
+
 }  // namespace spectra::server

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace spectra::server {
 namespace {
 
@@ -36,6 +38,29 @@ TEST(BlockOptions, ComeBackFromTheTextThatIsKept) {
   EXPECT_EQ(back.value().read.temperature_offset, -3);
   EXPECT_EQ(back.value().read.no_data, std::vector<double>{7});
   EXPECT_EQ(back.value().read_text, block.value().read_text);
+}
+
+TEST(BlockOptions, AreWrittenAsAQueryThatIsReadBack) {
+  fusion::ReadOptions read;
+  EXPECT_TRUE(query_of(read).empty());
+  read.temperature_property = "heat";
+  read.temperature_scale = 0.1;
+  read.temperature_offset = -273.15;
+  read.no_data = {-9999, std::numeric_limits<double>::infinity()};
+  read.metres_per_unit = 1e-3;
+  read.up = fusion::UpAxis::MinusZ;
+  const auto block = incoming_block("a", query_of(read));
+  ASSERT_TRUE(block) << block.error().message;
+  const fusion::ReadOptions& back = block.value().read;
+  EXPECT_EQ(back.temperature_property, "heat");
+  EXPECT_EQ(back.temperature_scale, 0.1);
+  EXPECT_EQ(back.temperature_offset, -273.15);
+  EXPECT_EQ(back.no_data, read.no_data);
+  EXPECT_EQ(back.metres_per_unit, 1e-3);
+  EXPECT_EQ(back.up, read.up);
+  fusion::ReadOptions unit;
+  unit.temperature_unit = fusion::TemperatureUnit::Centikelvin;
+  EXPECT_EQ(incoming_block("a", query_of(unit)).value().read.temperature_unit, unit.temperature_unit);
 }
 
 TEST(BlockOptions, NameTheFieldThatCannotBeMeant) {

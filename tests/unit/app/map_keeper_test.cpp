@@ -11,8 +11,8 @@
 namespace spectra::server {
 namespace {
 
-/// A flat square of side x side vertices at x0, y0 as a PLY file with double coordinates.
-std::string square(std::size_t side, double x0 = 0, double y0 = 0, double spacing = 1) {
+/// A flat sheet of side x side vertices as a PLY file with double coordinates, the part of a lattice that begins at `column`.
+std::string square(std::size_t side, std::size_t column = 0, double x0 = 0, double y0 = 0, double spacing = 1) {
   std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(side * side) +
                     "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
                     std::to_string(2 * (side - 1) * (side - 1)) +
@@ -23,13 +23,14 @@ std::string square(std::size_t side, double x0 = 0, double y0 = 0, double spacin
     ply.append(bytes, sizeof value);
   };
   for (std::size_t i = 0; i < side * side; ++i) {
-    put(x0 + spacing * static_cast<double>(i % side));
-    put(y0 + spacing * static_cast<double>(i / side));
+    const auto row = static_cast<double>(i / side);
+    put(x0 + spacing * static_cast<double>(column + i % side) + 0.137 * row);
+    put(y0 + spacing * row);
     put(0.0);
   }
   for (std::size_t row = 0; row + 1 < side; ++row) {
-    for (std::size_t column = 0; column + 1 < side; ++column) {
-      const auto corner = static_cast<std::int32_t>(row * side + column);
+    for (std::size_t step = 0; step + 1 < side; ++step) {
+      const auto corner = static_cast<std::int32_t>(row * side + step);
       const auto next = static_cast<std::int32_t>(side);
       for (const auto& triangle :
            {std::array{corner, corner + 1, corner + next}, std::array{corner + 1, corner + next + 1, corner + next}}) {
@@ -128,9 +129,9 @@ TEST_F(MapKeeperTest, ALongReadKeepsNoOtherBlockWaiting) {
 TEST_F(MapKeeperTest, WhatBlocksShareIsTheSameWhenAllComeAtOnceIntoAnEmptyMap) {
   // Coordinates whose last bits a float does not have, and blocks that would choose different origins for themselves.
   put("not a PLY", "x");
-  for (int i = 0; i < 6; ++i) put("b" + std::to_string(i), square(9, 500'000.1 + 8.8 * i, 4'000'000.3, 1.1));
-  ASSERT_EQ(answers().size(), 7U);
-  for (int i = 0; i + 1 < 6; ++i) {
+  for (std::size_t i = 0; i < 12; ++i) put("b" + std::to_string(i), square(9, 8 * i, 500'000.1, 4'000'000.3, 1.1));
+  ASSERT_EQ(answers().size(), 13U);
+  for (std::size_t i = 0; i + 1 < 12; ++i) {
     const auto left = positions_of("b" + std::to_string(i)), right = positions_of("b" + std::to_string(i + 1));
     ASSERT_EQ(left.size(), 81U);
     for (std::size_t row = 0; row < 9; ++row) EXPECT_EQ(left[9 * row + 8], right[9 * row]) << i;

@@ -32,5 +32,17 @@ TEST(RequestTarget, RefusesWhatLeavesTheRoot) {
   }
 }
 
+TEST(TargetText, IsReadBackAsItWas) {
+  const RequestTarget target{"/kitchen",
+                             {{"observed_at", "17.5"}, {"sensor", "1,-2,3"}, {"a b&c", "x=y+z%\xc3\xa4#?"}}};
+  const std::string text = target_text("kitchen", target.query);
+  EXPECT_EQ(text.find("kitchen?observed_at=17.5&sensor=1,-2,3&a%20b%26c=x%3Dy%2Bz%25%C3%A4%23%3F"), 0U) << text;
+  const auto back = parsed_target('/' + text);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->path, target.path);
+  EXPECT_EQ(back->query, target.query);
+  EXPECT_EQ(target_text("a", {}), "a");
+}
+
 }  // namespace
 }  // namespace spectra::server
