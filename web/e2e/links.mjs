@@ -15,18 +15,58 @@ function sample(image) {
 }
 
 /** Of the client itself, everything up to the first picture, headers with it. */
-const LARGEST_CLIENT_BYTES = 252_000;
+const LARGEST_CLIENT_BYTES = 210_000;
 
 /**
  * What a link of 1 Mbit/s and 200 ms may take for everything up to the first picture, by its bytes and round trips: two for the page, one
- * for what it asks for, one from scene.subscribe to the first tile. Within 5 s, with a second for decoding and drawing.
+ * for what it asks for, one from scene.subscribe to the first tile.
  */
-const LONGEST_ON_LINK_MS = 4_000;
+const LONGEST_ON_LINK_MS = 3_400;
+/** Until it is on the screen, with decoding and drawing. */
+const LONGEST_TO_PICTURE_MS = 5_000;
 const ROUND_TRIPS = 4;
 
 /** Waits until the scene is there. */
 async function ready(server) {
   while ((await fetch(`${server.url}readyz`)).status !== 200) await new Promise((resolve) => setTimeout(resolve, 100));
+}
+
+/** Loads the page, cold, over 1 Mbit/s and 200 ms there and back: when the first picture is there, and the bytes that it took. */
+async function loadOverThinLink(browser, server) {
+  const proxy = await linkProxy(server.url, { rate_bytes_per_s: 125_000, delay_ms: 100 });
+  const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
+  await context.addInitScript(() => {
+    const look = () => {
+      const store = globalThis.spectra?.store;
+      if (store?.shown.tiles > 0) globalThis.firstTile_ms ??= performance.now();
+      if (store?.pictureStands) globalThis.firstPicture_ms = performance.now();
+      else setTimeout(look, 5);
+    };
+    look();
+  });
+  const page = await context.newPage();
+  // Messages up to the first colours: those of the coarsest tile, which is the first picture. What the page asks for from then on is not there yet.
+  let picture_bytes = 0;
+  let client_bytes = null;
+  page.on('websocket', (socket) =>
+    socket.on('framereceived', ({ payload }) => {
+      if (client_bytes !== null) return;
+      picture_bytes += payload.length;
+      if (typeof payload === 'string' || !COLOURS.includes(payload[4])) return;
+      client_bytes = proxy.connections
+        .filter(({ path }) => !path.startsWith('/ws'))
+        .reduce((all, { received_bytes }) => all + received_bytes, 0);
+    }),
+  );
+  await page.goto(proxy.url);
+  await page.waitForFunction(() => globalThis.firstPicture_ms, null, { timeout: 120_000 });
+  const { tile_ms, picture_ms } = await page.evaluate(() => ({
+    tile_ms: Math.round(globalThis.firstTile_ms),
+    picture_ms: Math.round(globalThis.firstPicture_ms),
+  }));
+  await context.close();
+  await proxy.close();
+  return { tile_ms, picture_ms, client_bytes, picture_bytes };
 }
 
 const shownTiles = (page) => page.evaluate(() => globalThis.spectra.store.shown.tiles);
@@ -75,55 +115,29 @@ export function addLinkTests(browser) {
     await server.stop();
   });
 
-  test('The client is small: over a thin link it leaves the line to the scene', async () => {
-    // 1 Mbit/s, 200 ms there and back. How long it takes is said, not judged: decoding and drawing without a GPU are a part of it.
+  test('The client is small: over a thin link it leaves the line to the scene, and the first picture stands within 5 s', async () => {
     const server = await startServer(['--demo']);
     // What it takes to make the scene is not counted.
     await ready(server);
-    const proxy = await linkProxy(server.url, { rate_bytes_per_s: 125_000, delay_ms: 100 });
-    const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
-    await context.addInitScript(() => {
-      const look = () => {
-        const store = globalThis.spectra?.store;
-        if (store?.shown.tiles > 0) globalThis.firstTile_ms ??= performance.now();
-        if (store?.pictureStands) globalThis.firstPicture_ms = performance.now();
-        else setTimeout(look, 5);
-      };
-      look();
-    });
-    const page = await context.newPage();
-    let catalogue_bytes = 0;
-    page.on('requestfinished', async (request) => {
-      const { responseHeadersSize, responseBodySize } = await request.sizes();
-      if (request.url().includes('/api/v1/catalogue/')) catalogue_bytes = responseHeadersSize + responseBodySize;
-    });
-    // Messages up to the first colours: those of the coarsest tile, which is the first picture.
-    let picture_bytes = 0;
-    let hasColours = false;
-    page.on('websocket', (socket) =>
-      socket.on('framereceived', ({ payload }) => {
-        if (!hasColours) picture_bytes += payload.length;
-        hasColours ||= typeof payload !== 'string' && COLOURS.includes(payload[4]);
-      }),
+    const times = [];
+    // Decoding and drawing without a GPU are a part of the time, and so is whatever else the machine does: one of at most five loads has
+    // to be in time. The bytes are the same in every one.
+    while (times.length < 5 && !times.some((picture_ms) => picture_ms <= LONGEST_TO_PICTURE_MS)) {
+      const { tile_ms, picture_ms, client_bytes, picture_bytes } = await loadOverThinLink(browser, server);
+      times.push(picture_ms);
+      const link_ms = Math.round((client_bytes + picture_bytes) / 125) + 200 * ROUND_TRIPS;
+      console.log(
+        `        first picture decoded after ${tile_ms} ms, on the screen after ${picture_ms} ms: client ${client_bytes} bytes, scene ${picture_bytes} bytes, which take the link ${link_ms} ms`,
+      );
+      assert.ok(picture_bytes > 50_000, `${picture_bytes} bytes are no picture`);
+      assert.ok(link_ms < LONGEST_ON_LINK_MS, `the link alone takes ${link_ms} ms`);
+      assert.ok(client_bytes > 50_000, `${client_bytes} bytes are no client`);
+      assert.ok(client_bytes < LARGEST_CLIENT_BYTES, `the client takes ${client_bytes} bytes`);
+    }
+    assert.ok(
+      times.some((picture_ms) => picture_ms <= LONGEST_TO_PICTURE_MS),
+      `on the screen after ${times.join(', ')} ms`,
     );
-    await page.goto(proxy.url);
-    await page.waitForFunction(() => globalThis.firstPicture_ms, null, { timeout: 120_000 });
-    const { tile_ms, picture_ms } = await page.evaluate(() => ({
-      tile_ms: Math.round(globalThis.firstTile_ms),
-      picture_ms: Math.round(globalThis.firstPicture_ms),
-    }));
-    const sum = (wanted) => proxy.connections.filter(wanted).reduce((all, { received_bytes }) => all + received_bytes, 0);
-    const client_bytes = sum(({ path }) => !path.startsWith('/ws')) - catalogue_bytes;
-    const link_ms = Math.round((client_bytes + picture_bytes) / 125) + 200 * ROUND_TRIPS;
-    console.log(
-      `        first picture decoded after ${tile_ms} ms, on the screen after ${picture_ms} ms: client ${client_bytes} bytes, scene ${picture_bytes} bytes, which take the link ${link_ms} ms; methods and palettes, later: ${catalogue_bytes} bytes`,
-    );
-    assert.ok(picture_bytes > 50_000, `${picture_bytes} bytes are no picture`);
-    assert.ok(link_ms < LONGEST_ON_LINK_MS, `the link alone takes ${link_ms} ms`);
-    assert.ok(client_bytes > 50_000, `${client_bytes} bytes are no client`);
-    assert.ok(client_bytes < LARGEST_CLIENT_BYTES, `the client takes ${client_bytes} bytes`);
-    await context.close();
-    await proxy.close();
     await server.stop();
   });
 
@@ -224,6 +238,55 @@ export function addLinkTests(browser) {
     assert.equal(times[1], times[0], 'it was asked for again');
     await context.close();
     await proxy.close();
+    await server.stop();
+  });
+
+  test('The controls come after the first picture, and are asked for again when they do not come', async () => {
+    const server = await startServer(['--demo']);
+    await ready(server);
+    const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
+    const page = await context.newPage();
+    let hasColours = false;
+    page.on('websocket', (socket) =>
+      socket.on('framereceived', ({ payload }) => {
+        hasColours ||= typeof payload !== 'string' && COLOURS.includes(payload[4]);
+      }),
+    );
+    const asked = [];
+    let isBroken = true;
+    await page.route(/\/instruments-/, async (route) => {
+      asked.push({ hasColours });
+      if (isBroken) await route.fulfill({ status: 503 });
+      else await route.continue();
+    });
+    await page.goto(server.url);
+    const failure = page.locator('[data-part-failure]');
+    await failure.getByText('The controls could not be loaded').waitFor();
+    await settled(page);
+    assert.ok(
+      asked.every((request) => request.hasColours),
+      'the controls were asked for before the first tile had come',
+    );
+    // Keys do what they can; what moves the camera is kept until that can be done.
+    await page.keyboard.press('2');
+    await settled(page);
+    assert.equal(await page.evaluate(() => globalThis.spectra.store.pictureMethod), 'visible_only');
+    const eye = () => page.evaluate(() => globalThis.spectra.viewport.pose.eye);
+    const before = await eye();
+    await page.locator('canvas').focus();
+    await page.keyboard.press('ArrowLeft');
+    assert.deepEqual(await eye(), before);
+    assert.equal(await page.locator('aside.panel').count(), 0);
+
+    isBroken = false;
+    await failure.getByText('Try now').click();
+    await page.locator('aside.panel').waitFor();
+    assert.equal(await failure.count(), 0);
+    await page.waitForFunction(
+      (from) => globalThis.spectra.viewport.pose.eye.some((value, axis) => Math.abs(value - from[axis]) > 0.01),
+      before,
+    );
+    await context.close();
     await server.stop();
   });
 

@@ -1,3 +1,4 @@
+import decoderAddress from 'draco3d/draco_decoder.wasm?url';
 import type { SocketLike } from './transport/connection';
 import { EarlySocket } from './transport/early_socket';
 
@@ -51,9 +52,19 @@ export function serverAddress(): string {
 }
 
 export function beginHeadStart(): void {
+  socket = new EarlySocket(serverAddress(), openSocket);
   if (CAN_DRAW_IN_WORKER) picture.start();
   draco.start();
-  socket = new EarlySocket(serverAddress(), openSocket);
+}
+
+/**
+ * The program has come: now the decoder's own, which is behind what the server says first on a slow link, and fills it while that is
+ * answered. The worker finds it in the browser's cache.
+ */
+export function continueHeadStart(): void {
+  fetch(new URL(decoderAddress, location.href))
+    .then((response) => response.arrayBuffer())
+    .catch(() => undefined);
 }
 
 /** The worker that draws. */

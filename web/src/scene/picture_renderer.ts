@@ -10,7 +10,9 @@ import {
   Scene,
   Sphere,
   Vector3,
+  type RawShaderMaterial,
   WebGLRenderer,
+  WebGLRenderTarget,
 } from 'three';
 import type { Vec3 } from '../protocol/messages';
 import { clearSight } from './clear_sight';
@@ -69,6 +71,8 @@ export class PictureRenderer {
   /** Made when it is first wanted. */
   #outline: Outline | null = null;
   #isOutlined = false;
+  /** The shaders of every material are. */
+  #isCompiled = false;
   /** Under way; a newer one takes its place. */
   #picture: Picture | null = null;
   #pointDiameter: number | null = null;
@@ -86,7 +90,7 @@ export class PictureRenderer {
     this.#renderer.outputColorSpace = LinearSRGBColorSpace;
     this.#scene.matrixAutoUpdate = false;
     this.#camera.matrixAutoUpdate = false;
-    this.#drawSpecimens();
+    this.#drawSpecimens([this.#materials.surface]);
     canvas.addEventListener('webglcontextlost', () => this.reply({ kind: 'context', isLost: true }));
     // The renderer makes its objects anew from the arrays as they are drawn.
     canvas.addEventListener('webglcontextrestored', () => {
@@ -197,8 +201,8 @@ export class PictureRenderer {
     return { object, isShown: false, colours, arrays: { positions, indices, centre, radius, point_spacing } };
   }
 
-  /** Draws an empty tile of each kind in each way, so that the shaders are compiled before the first real one comes. */
-  #drawSpecimens(): void {
+  /** Draws an empty tile with each of these materials, so that their shaders are compiled before the first real one comes. */
+  #drawSpecimens(materials: RawShaderMaterial[]): void {
     const specimen = {
       rgba: new Uint8Array(12),
       positions: new Float32Array(9),
@@ -206,11 +210,14 @@ export class PictureRenderer {
       radius: 1,
       point_spacing: 1,
     } satisfies Partial<TileArrays>;
+    // A point of a specimen may be seen: not on the canvas, and not in a picture that is under way.
+    const target = new WebGLRenderTarget(1, 1);
+    this.#renderer.setRenderTarget(target);
     for (const indices of [Uint16Array.from([0, 0, 0]), null]) {
       const { object } = this.#create({ ...specimen, indices });
       object.visible = true;
       object.frustumCulled = false;
-      for (const material of this.#materials.all) {
+      for (const material of materials) {
         if ((material.defines['POINTS'] !== undefined) !== (indices === null)) continue;
         object.material = material;
         this.#renderer.render(this.#scene, this.#camera);
@@ -218,6 +225,15 @@ export class PictureRenderer {
       this.#scene.remove(object);
       object.geometry.dispose();
     }
+    this.#renderer.setRenderTarget(null);
+    target.dispose();
+  }
+
+  /** What the first picture of most scenes does not need is compiled when that stands, before it is needed. */
+  #compileRest(): void {
+    if (this.#isCompiled) return;
+    this.#isCompiled = true;
+    this.#drawSpecimens(this.#materials.all);
   }
 
   #drawSoon(): void {
@@ -252,9 +268,11 @@ export class PictureRenderer {
 
   #finish(picture: Picture): void {
     this.#show(picture);
-    this.#afterGpu(() =>
-      this.reply({ kind: 'drawn', number: picture.number, gpu: this.#gpuObjects, ms: performance.now() - picture.start }),
-    );
+    this.#afterGpu(() => {
+      const ms = performance.now() - picture.start;
+      if (picture.tiles.length > 0) this.#compileRest();
+      this.reply({ kind: 'drawn', number: picture.number, gpu: this.#gpuObjects, ms });
+    });
   }
 
   #begin(): Picture {

@@ -1,12 +1,12 @@
 import type { DecodedGeometry } from '../decode/messages';
 import type { CameraPose, Vec3 } from '../protocol/messages';
-import { AimedControls } from './aimed_controls';
+import { directionInScene, distanceOf, type Look, lookAt, toView, worldFromCamera } from '../view/look';
+import type { Steering } from '../view/steering';
 import { UP, type UpAxis, type View } from './first_view';
 import type { SightWish } from './clear_sight';
 import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from './render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
 import { MotionPace, type Notch } from './motion_pace';
-import { PerspectiveCamera, Vector3 } from './three_math';
 import type { Drawable } from './tile_set';
 
 export const FIELD_OF_VIEW_DEG = 45;
@@ -34,12 +34,22 @@ export interface ViewportEvents {
   onFailure: (message: string, everDrew: boolean) => void;
 }
 
-/** The 3D picture: camera, controls, and the way to what draws it. Draws only when something has changed. */
+/** How the first picture is drawn, and those before it with nothing in them: seen at once, and sharp as soon as it stands. */
+const FIRST: Notch = { resolution: 0.5, levels: 0 };
+/** Where the camera stands before anything says where. */
+const NOWHERE = lookAt([0, 0, 1], [0, 0, 0], UP.y);
+
+/** The 3D picture: camera, steering, and the way to what draws it. Draws only when something has changed. */
 export class Viewport {
   readonly #port: RenderPort;
-  /** The planes of near and far are chosen where it is known what is drawn. */
-  readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.1, 1000);
-  readonly #controls: AimedControls;
+  #look: Look = NOWHERE;
+  /** Null before startSteering(): until then the camera stands where it is put. */
+  #steering: Steering | null = null;
+  /** What is to be done as soon as it is. */
+  #toSteer: ((steering: Steering) => void)[] = [];
+  #reach: [number, number] | null = null;
+  /** The camera has been put elsewhere, and no picture has been sent from there yet. */
+  #hasMoved = false;
   readonly #resize: ResizeObserver;
   readonly #reducedMotion = matchMedia('(prefers-reduced-motion: reduce)');
   #frame = 0;
@@ -69,6 +79,7 @@ export class Viewport {
   /** Number of the first picture that has any of the scene in it; null: it has not been sent, or it stands already. */
   #firstPicture: number | null = null;
   #hasShown = false;
+  #isFirstDrawn = false;
   #gpu: GpuObjects = { geometries: 0, textures: 0, programs: 0, triangles: 0, calls: 0 };
   #questionId = 0;
   #questions = new Map<number, (reply: RenderReply) => void>();
@@ -80,17 +91,6 @@ export class Viewport {
   ) {
     const start = inWorker ? startRenderWorker : startRenderingHere;
     this.#port = start(canvas, (reply) => this.#replied(reply));
-    this.#controls = new AimedControls(this.#camera, canvas);
-    this.#controls.dollyToCursor = true;
-    this.#controls.smoothTime = this.#reducedMotion.matches ? 0 : 0.06;
-    this.#controls.draggingSmoothTime = this.#reducedMotion.matches ? 0 : 0.03;
-    this.#controls.mouseButtons.middle = AimedControls.ACTION.TRUCK;
-    this.#controls.touches.two = AimedControls.ACTION.TOUCH_DOLLY_TRUCK;
-    this.#controls.touches.three = AimedControls.ACTION.TOUCH_TRUCK;
-    this.#controls.addEventListener('control', () => this.events.onUserMove());
-    for (const wake of ['control', 'controlstart', 'wake', 'transitionstart'] as const) {
-      this.#controls.addEventListener(wake, () => this.invalidate());
-    }
     // Before the controls come nearer to it.
     canvas.addEventListener('wheel', this.#aimAtPointer, { capture: true, passive: true });
     canvas.addEventListener('pointerdown', this.#aimAtPointer, { capture: true, passive: true });
@@ -163,34 +163,32 @@ export class Viewport {
   }
 
   get pose(): CameraPose {
-    const target = this.#controls.getTarget(new Vector3(), false);
+    const { eye, target } = this.#look;
     return {
-      eye: this.#camera.position.toArray(),
-      target: target.toArray(),
+      eye,
+      target,
       up: UP[this.#up],
-      fov_y_deg: this.#camera.fov,
+      fov_y_deg: FIELD_OF_VIEW_DEG,
       viewport: [...this.#size],
     };
   }
 
   /** The axes of the scene as the camera sees them: right, up, towards the viewer. */
   axesInView(): { x: Vec3; y: Vec3; z: Vec3 } {
-    const inverse = this.#camera.quaternion.clone().invert();
-    const axis = (x: number, y: number, z: number): Vec3 => new Vector3(x, y, z).applyQuaternion(inverse).toArray();
-    return { x: axis(1, 0, 0), y: axis(0, 1, 0), z: axis(0, 0, 1) };
+    const { right, up, back } = this.#look;
+    const axis = (i: 0 | 1 | 2): Vec3 => [right[i], up[i], back[i]];
+    return { x: axis(0), y: axis(1), z: axis(2) };
   }
 
   /** Tells of a sphere (metres) whether any of it may be on the screen. */
   visibility(): (centre: Vec3, radius: number) => boolean {
-    this.#camera.updateMatrixWorld();
-    const toView = this.#camera.matrixWorldInverse.clone();
+    const look = this.#look;
     const [right, top] = this.#tangents;
-    const place = new Vector3();
-    // A plane through the eye and a side of the picture: how far beyond it the sphere's centre is.
-    const beyond = (across: number, tangent: number) => (Math.abs(across) + place.z * tangent) / Math.hypot(1, tangent);
     return (centre, radius) => {
-      place.set(...centre).applyMatrix4(toView);
-      return -place.z > -radius && beyond(place.x, right) < radius && beyond(place.y, top) < radius;
+      const [x, y, z] = toView(look, centre);
+      // A plane through the eye and a side of the picture: how far beyond it the sphere's centre is.
+      const beyond = (across: number, tangent: number) => (Math.abs(across) + z * tangent) / Math.hypot(1, tangent);
+      return -z > -radius && beyond(x, right) < radius && beyond(y, top) < radius;
     };
   }
 
@@ -200,11 +198,9 @@ export class Viewport {
 
   setUpAxis(up: UpAxis): void {
     if (this.#up === up) return;
-    const { eye, target } = this.pose;
     this.#up = up;
-    this.#camera.up.set(...UP[up]);
-    this.#controls.updateCameraUp();
-    void this.#controls.setLookAt(...eye, ...target, false);
+    this.#stand(this.#look.eye, this.#look.target);
+    this.#steering?.setUp(UP[up], this.#look);
     this.invalidate();
   }
 
@@ -222,21 +218,42 @@ export class Viewport {
 
   /** How near to and how far from what is looked at the controls go, metres. */
   setReach(nearest: number, farthest: number): void {
-    this.#controls.minDistance = nearest;
-    this.#controls.maxDistance = farthest;
+    this.#reach = [nearest, farthest];
+    this.#steering?.setReach(nearest, farthest);
+  }
+
+  /** From now on a person moves the camera: what has been asked for before is done now. */
+  startSteering(SteeringOfPage: typeof Steering): void {
+    if (this.#steering !== null) return;
+    const from = {
+      look: this.#look,
+      up: UP[this.#up],
+      fov_deg: FIELD_OF_VIEW_DEG,
+      reach: this.#reach,
+      isStill: this.#reducedMotion.matches,
+    };
+    this.#steering = new SteeringOfPage(this.canvas, from, {
+      onSteer: () => this.events.onUserMove(),
+      onWake: () => this.invalidate(),
+    });
+    this.#steering.setAspect(this.aspect);
+    for (const act of this.#toSteer.splice(0)) act(this.#steering);
   }
 
   setView(view: View, animated: boolean): void {
-    const isTravel = animated && !this.#reducedMotion.matches;
+    const isTravel = animated && !this.#reducedMotion.matches && this.#steering !== null;
     this.#isJump = !isTravel;
-    void this.#controls.setLookAt(...view.eye, ...view.target, isTravel);
+    if (this.#steering === null) {
+      this.#stand(view.eye, view.target);
+      this.#hasMoved = true;
+    } else this.#steering.setView(view.eye, view.target, isTravel);
     this.invalidate();
   }
 
   /** Turns the camera about its target so that it looks along an axis of the scene. */
   lookAlong(direction: Vec3): void {
     const { target } = this.pose;
-    const distance = this.#controls.distance;
+    const distance = this.#steering?.distance ?? distanceOf(this.#look);
     this.events.onUserMove();
     this.setView(
       {
@@ -249,41 +266,36 @@ export class Viewport {
 
   /** Puts what the camera turns about and comes nearer to at the depth of this point. The picture stays as it is. */
   aimAt(point: Vec3): void {
-    this.#controls.aimAt(point);
+    this.#steering?.aimAt(point);
   }
 
   /** Keyboard control: radians for turning, shares of the distance for moving and nearing. */
   turn(azimuth_rad: number, polar_rad: number): void {
-    this.events.onUserMove();
-    void this.#controls.rotate(azimuth_rad, polar_rad, !this.#reducedMotion.matches);
-    this.invalidate();
+    this.#steer((steering, isAnimated) => steering.turn(azimuth_rad, polar_rad, isAnimated));
   }
   move(right: number, down: number): void {
-    this.events.onUserMove();
-    const distance = this.#controls.distance;
-    void this.#controls.truck(right * distance, down * distance, !this.#reducedMotion.matches);
-    this.invalidate();
+    this.#steer((steering, isAnimated) => steering.move(right, down, isAnimated));
   }
   approach(share: number): void {
-    this.events.onUserMove();
-    void this.#aim(this.#size[0] / 2, this.#size[1] / 2);
-    void this.#controls.dolly(share * this.#controls.distance, !this.#reducedMotion.matches);
-    this.invalidate();
+    this.#steer((steering, isAnimated) => {
+      void this.#aim(this.#size[0] / 2, this.#size[1] / 2);
+      steering.approach(share, isAnimated);
+    });
   }
 
   /** Point of the scene under a place on the canvas (CSS pixels from its corner), or null. */
   async pick(x: number, y: number): Promise<Vec3 | null> {
     const [width, height] = this.#size;
     const [right, top] = this.#tangents;
-    const eye = this.#camera.position.clone();
-    const direction = new Vector3(((x / width) * 2 - 1) * right, (1 - (y / height) * 2) * top, -1)
-      .normalize()
-      .applyQuaternion(this.#camera.quaternion);
+    const { eye } = this.#look;
+    const across: Vec3 = [((x / width) * 2 - 1) * right, (1 - (y / height) * 2) * top, -1];
+    const length = Math.hypot(...across);
+    const direction = directionInScene(this.#look, across.map((value) => value / length) as Vec3);
     const cone = (4 * top * 2) / height;
-    const ray = { origin: eye.toArray(), direction: direction.toArray() };
-    const reply = await this.#ask((id) => ({ kind: 'pick', id, ray, cone }));
+    const reply = await this.#ask((id) => ({ kind: 'pick', id, ray: { origin: eye, direction }, cone }));
     if (reply.kind !== 'picked' || reply.distance === null) return null;
-    return direction.multiplyScalar(reply.distance).add(eye).toArray();
+    const { distance } = reply;
+    return eye.map((value, axis) => value + direction[axis]! * distance) as Vec3;
   }
 
   /** Where a place on a surface is seen from, by what is drawn; null where it is walled in. */
@@ -294,8 +306,7 @@ export class Viewport {
 
   /** Where a point of the scene is on the canvas, in CSS pixels; null behind the camera. */
   project(point: Vec3): { x: number; y: number; depth: number } | null {
-    this.#camera.updateMatrixWorld();
-    const { x, y, z } = new Vector3(...point).applyMatrix4(this.#camera.matrixWorldInverse);
+    const [x, y, z] = toView(this.#look, point);
     if (z >= 0) return null;
     const [right, top] = this.#tangents;
     return { x: ((1 - x / z / right) / 2) * this.#size[0], y: ((1 + y / z / top) / 2) * this.#size[1], depth: -z };
@@ -321,7 +332,7 @@ export class Viewport {
     this.#resize.disconnect();
     this.canvas.removeEventListener('wheel', this.#aimAtPointer, { capture: true });
     this.canvas.removeEventListener('pointerdown', this.#aimAtPointer, { capture: true });
-    this.#controls.dispose();
+    this.#steering?.dispose();
     this.#port.dispose();
     this.#questions.clear();
   }
@@ -339,12 +350,12 @@ export class Viewport {
     const undrawn = [...this.#notches.values()].filter((notch) => !this.#isMoving || notch !== null).length;
     // The first one is not given up for what comes next: on a slow machine there would be none for as long as tiles come.
     const isFirst = this.#firstPicture !== null && this.#sent >= this.#firstPicture && !this.#isMoving;
-    if ((isFirst || undrawn >= MOST_UNDRAWN) && (this.#isMoving || !this.#controls.active)) {
+    if ((isFirst || undrawn >= MOST_UNDRAWN) && (this.#isMoving || this.#steering?.isActive !== true)) {
       this.#isHeldUp = true;
       return;
     }
     this.#lastFrameAt = now;
-    const moved = this.#controls.update(elapsed_s);
+    const moved = this.#follow(elapsed_s);
     if (moved && !this.#isJump) this.#moves();
     this.#isJump = false;
     // What changes meanwhile is in this picture: it calls for no other one.
@@ -352,22 +363,45 @@ export class Viewport {
     const more = this.events.beforeRender();
     this.#isPutTogether = false;
     // It may have decided where to look from, too: nothing is seen from anywhere else first.
-    const jumped = this.#isJump && this.#controls.update(0);
+    const jumped = this.#isJump && this.#follow(0);
     this.#isJump = false;
     this.#send();
     if (moved || jumped) this.events.onCamera(this.pose);
     if (moved || more) this.invalidate();
   }
 
+  #stand(eye: Vec3, target: Vec3): void {
+    this.#look = lookAt(eye, target, UP[this.#up]);
+  }
+
+  /** Takes over where the camera is by now. Returns whether that is another place than before. */
+  #follow(elapsed_s: number): boolean {
+    const look = this.#steering?.update(elapsed_s) ?? null;
+    if (look !== null) this.#look = look;
+    const moved = look !== null || this.#hasMoved;
+    this.#hasMoved = false;
+    return moved;
+  }
+
+  /** A person moves the camera by keys: at once, or as soon as that can be done. */
+  #steer(act: (steering: Steering, isAnimated: boolean) => void): void {
+    this.events.onUserMove();
+    const acting = (steering: Steering) => {
+      act(steering, !this.#reducedMotion.matches);
+      this.invalidate();
+    };
+    if (this.#steering === null) this.#toSteer.push(acting);
+    else acting(this.#steering);
+  }
+
   #send(): void {
-    this.#camera.updateMatrixWorld();
     this.#sent += 1;
     const eye = {
-      world_from_camera: this.#camera.matrixWorld.toArray(),
+      world_from_camera: worldFromCamera(this.#look),
       tangents: this.#tangents,
-      distance: this.#controls.distance,
+      distance: distanceOf(this.#look),
     };
-    const notch = this.#isMoving ? this.#pace.moving : null;
+    const notch = this.#isMoving ? this.#pace.moving : this.#isFirstDrawn ? null : FIRST;
     this.#notches.set(this.#sent, notch);
     const resolution = notch?.resolution ?? 1;
     const isMoving = notch !== null;
@@ -394,7 +428,7 @@ export class Viewport {
 
   /** Half the picture's width and height at distance 1. */
   get #tangents(): [number, number] {
-    const top = Math.tan((this.#camera.fov * Math.PI) / 360);
+    const top = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
     return [top * this.aspect, top];
   }
 
@@ -421,8 +455,9 @@ export class Viewport {
     });
   }
 
-  #drawnIn(ms: number, notch: Notch | null): void {
-    this.#pace.drawn(ms, notch);
+  #drawnIn({ number, ms }: Extract<RenderReply, { kind: 'drawn' }>): void {
+    const notch = this.#notches.get(number) ?? null;
+    if (notch !== FIRST) this.#pace.drawn(ms, notch);
     if (notch === null) this.#picture_ms = ms;
   }
 
@@ -432,11 +467,14 @@ export class Viewport {
         // Of two pictures the GPU may be found to be through with the later one first.
         this.#drawn = Math.max(this.#drawn, reply.number);
         this.#gpu = reply.gpu;
-        this.#drawnIn(reply.ms, this.#notches.get(reply.number) ?? null);
+        this.#drawnIn(reply);
         for (const number of this.#notches.keys()) if (number <= reply.number) this.#notches.delete(number);
         if (this.#firstPicture !== null && reply.number >= this.#firstPicture) {
           this.#firstPicture = null;
+          this.#isFirstDrawn = true;
           this.events.onFirstPicture();
+          // Now as sharp as the screen is.
+          this.invalidate();
         }
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
@@ -458,8 +496,7 @@ export class Viewport {
     const width = Math.max(1, this.canvas.clientWidth);
     const height = Math.max(1, this.canvas.clientHeight);
     this.#size = [width, height];
-    this.#camera.aspect = width / height;
-    this.#camera.updateProjectionMatrix();
+    this.#steering?.setAspect(width / height);
     this.#change({ change: 'size', width, height, pixel_ratio: Math.min(devicePixelRatio, 2) });
   }
 }

@@ -64,6 +64,8 @@ export class Session {
   readonly #look: FirstLook;
   readonly #markers: Markers;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
+  /** Colours of all of the scene in its first picture, which does not wait for what is said of them. */
+  #firstColours: Uint8Array | null = null;
   #connectionNumber = 0;
   /** Where methods and palettes are; null when it is known, or being asked for. */
   #catalogueAddress: string | null = null;
@@ -93,6 +95,7 @@ export class Session {
       },
       onFirstPicture: () => {
         store.pictureStands = true;
+        if (this.#firstColours !== null) this.#judge(this.#firstColours);
         this.#askFacts();
       },
       onFailure: drawing.onFailure,
@@ -123,8 +126,9 @@ export class Session {
       onDecoded: (sequence) => this.#connection.notify('stream.ack', { sequence }),
       onArrival: () => this.viewport.invalidate(),
       onWholeColours: (rgba) => {
-        store.highlightContrast = highlightContrast(rgba);
-        this.viewport.setOutline(store.isOutlined);
+        if (store.pictureStands) this.#judge(rgba);
+        // The colours themselves move on to what draws.
+        else this.#firstColours = rgba.slice();
       },
       onProblem: (error) => this.#say(error),
     });
@@ -342,13 +346,14 @@ export class Session {
     if ('catalogue' in message) {
       this.#catalogueAddress = new URL(message.catalogue, this.url.replace(/^ws/, 'http')).href;
       // The first picture goes before it.
-      if (returning || message.scene === null) this.#askCatalogue();
+      if (returning) this.#linkIsFree();
     } else {
       this.#catalogueAddress = null;
       this.#catalogue.wantNone();
       store.methods = message.methods;
       store.palettes = message.palettes;
     }
+    if (message.scene === null) this.#linkIsFree();
     const before = this.settings.greeted(message.fusion, returning);
     store.quality = qualityBefore ?? message.quality;
     store.lostAt = null;
@@ -364,7 +369,9 @@ export class Session {
     this.#askMarks();
   }
 
-  #askCatalogue(): void {
+  /** What the first picture takes has come, or there will be none: now it is the turn of the rest. */
+  #linkIsFree(): void {
+    this.store.isLinkFree = true;
     const address = this.#catalogueAddress;
     this.#catalogueAddress = null;
     if (address !== null) this.#catalogue.want(address);
@@ -425,7 +432,7 @@ export class Session {
         break;
       }
       case 'stream.complete':
-        this.#askCatalogue();
+        this.#linkIsFree();
         this.#intake.completeAfterAll(streamComplete(params, method));
         break;
       case 'stream.stats':
@@ -520,7 +527,7 @@ export class Session {
     }
     this.#intake.receive(frame);
     // The link is free while the first picture is decoded and drawn.
-    if (frame.kind !== FrameKind.geometry) this.#askCatalogue();
+    if (frame.kind !== FrameKind.geometry) this.#linkIsFree();
   }
 
   /** Brings decoded tiles into the picture. Returns true when the next one has work, too. */
@@ -535,6 +542,13 @@ export class Session {
     clearTimeout(this.#nextPicture);
     if (next_ms !== null && next_ms > 0) this.#nextPicture = setTimeout(() => this.viewport.invalidate(), next_ms);
     return next_ms === 0;
+  }
+
+  /** Whether what is highlighted stands out from the rest. */
+  #judge(rgba: Uint8Array): void {
+    this.#firstColours = null;
+    this.store.highlightContrast = highlightContrast(rgba);
+    this.viewport.setOutline(this.store.isOutlined);
   }
 
   #completed(message: StreamComplete): void {

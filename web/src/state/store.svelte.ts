@@ -18,6 +18,7 @@ import type {
 import type { UpAxis } from '../scene/first_view';
 import type { DrawnError, TileCounts } from '../scene/tile_set';
 import type { CatalogueFailure } from '../transport/catalogue_loader';
+import type { PartFailure } from '../transport/part_loader';
 import type { LinkState } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
@@ -62,6 +63,10 @@ export class Store {
   palettes = $state.raw<Palette[]>([]);
   /** Why there are no methods and palettes, or only those of before. */
   catalogueFailure = $state.raw<CatalogueFailure | null>(null);
+  /** Why the controls around the picture are not there. */
+  partFailure = $state.raw<PartFailure | null>(null);
+  /** What the first picture takes has come over the link, or there is none: now anything else may be asked for. */
+  isLinkFree = $state(false);
   /** As the server last said it. */
   fusionInForce = $state.raw<Fusion | null>(null);
   generation = $state(0);
