@@ -21,6 +21,7 @@ import {
 import { addAccuracyTests } from './accuracy.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLinkTests } from './links.mjs';
+import { addLiveTests } from './live.mjs';
 import { addLoadTests } from './load.mjs';
 import { addViewTests } from './view.mjs';
 
@@ -515,6 +516,7 @@ test('Nothing broke the content policy', () => {
 addAccuracyTests(browser);
 addLayoutTests(browser);
 addLinkTests(browser);
+addLiveTests(browser);
 addLoadTests(browser, scratch);
 addViewTests(browser, scratch);
 

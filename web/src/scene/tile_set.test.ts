@@ -47,6 +47,66 @@ function recolour(tile: TileId, generation: number, revision = 1): void {
 }
 const drawn = () => made.filter(({ visible, disposed }) => visible && !disposed).length;
 
+describe('TileSet, of a scene that changes by itself', () => {
+  const children = [0, 1].map((octant) => childTile(root, octant));
+
+  function fine(): FakeDrawable[] {
+    const [top, ...details] = [
+      add(root, { child_mask: 3, generation: 4 }, 4),
+      ...children.map((child) => add(child, { generation: 4 }, 4)),
+    ];
+    expect([top!, ...details].map(({ visible }) => visible)).toEqual([false, true, true]);
+    return [top!, ...details];
+  }
+
+  it('leaves detail where it is until its own successor has come', () => {
+    const [top, one, other] = fine();
+    tiles.isVersion(5);
+    recolour(root, 5);
+    expect(tiles.wouldHideDetail(frame(root, { generation: 5 }))).toBe(false);
+    expect([top, one, other].map((tile) => tile!.visible)).toEqual([false, true, true]);
+    // The one that has changed is made anew; all the while something is drawn at its place.
+    tiles.addGeometry(frame(children[0]!, { generation: 5, revision: 2 }), geometry());
+    tiles.updateSelection();
+    expect(drawn()).toBe(2);
+    tiles.addColours(frame(children[0]!, { generation: 5, revision: 2 }), colours(5));
+    tiles.updateSelection();
+    expect(drawn()).toBe(2);
+    expect(one!.disposed).toBe(true);
+    expect(made.at(-1)).toMatchObject({ shade: 5, visible: true });
+    recolour(children[1]!, 5);
+    expect(other).toMatchObject({ shade: 5, visible: true });
+    expect(top!.visible).toBe(false);
+  });
+
+  it('does so through any number of versions, and still shows at once what was asked for', () => {
+    const [top, one] = fine();
+    for (let generation = 5; generation < 500; generation += 1) {
+      tiles.isVersion(generation);
+      recolour(root, generation);
+      expect([top!.visible, one!.visible]).toEqual([false, true]);
+    }
+    // Asked for: no old detail stands in front of it.
+    recolour(root, 500);
+    expect([top!.visible, one!.visible]).toEqual([true, false]);
+    // The next version of that, with detail still from before.
+    tiles.isVersion(501);
+    recolour(children[0]!, 501);
+    expect([top!.visible, one!.visible]).toEqual([true, false]);
+    recolour(children[1]!, 501);
+    expect([top!.visible, one!.visible]).toEqual([false, true]);
+  });
+
+  it('counts generations anew on a new connection', () => {
+    const [top, one] = fine();
+    tiles.isVersion(5);
+    tiles.beginConnection();
+    tiles.resume(tiles.claims(100), true);
+    recolour(root, 5);
+    expect([top!.visible, one!.visible]).toEqual([true, false]);
+  });
+});
+
 describe('TileSet', () => {
   it('draws a tile once it has geometry and colours, in either order', () => {
     tiles.addColours(frame(root), colours(5));

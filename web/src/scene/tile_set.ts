@@ -30,6 +30,8 @@ interface Shown {
   error: DrawnError;
   /** How new the colours are: later connections before earlier ones, then later generations before earlier ones. */
   rank: number;
+  /** Rank of what was asked for that they answer: what they may hide, and be hidden by, is decided by it. */
+  answer: number;
   /** The server that is or was connected knows that this geometry is held here. */
   isKnownToServer: boolean;
 }
@@ -79,6 +81,9 @@ const OCTANTS = [0, 1, 2, 3, 4, 5, 6, 7] as const;
  * The children of a tile are drawn in its place when all of them can be (the REPLACE rule of docs/protocol.md) and nothing that is
  * drawn then has older colours than the tile itself. So no old detail ever stands in front of a newer answer, however coarse; where
  * both are equally new the detail wins. A tile that its children replace may keep old colours: it hides nothing that is newer.
+ *
+ * A generation that nobody has asked for, because the scene has changed by itself, is the same answer in another version: detail in the
+ * version before stays where it is until its own successor has come.
  */
 export class TileSet {
   #nodes = new Map<string, TileNode>();
@@ -89,6 +94,8 @@ export class TileSet {
   #connection = 0;
   /** The geometry of the earlier connection is still good: its colours come alone. */
   #isResumed = false;
+  /** Runs of generations, first and last, that answer what the one before the first answers; of this connection, in order. */
+  #versions: [number, number][] = [];
   /** Tiles of this level and beyond are not replaced by their children, unless those are newer. */
   #finestLevel = Infinity;
 
@@ -125,6 +132,7 @@ export class TileSet {
   beginConnection(): void {
     this.#connection += 1;
     this.#isResumed = false;
+    this.#versions = [];
     for (const node of [...this.#nodes.values()]) {
       node.waitingGeometry = null;
       node.waitingColours = null;
@@ -164,6 +172,13 @@ export class TileSet {
     this.#selectionDirty = finest !== Infinity;
   }
 
+  /** This generation, of which nothing has come yet, is another version of what the one before it answers. */
+  isVersion(generation: number): void {
+    const last = this.#versions.at(-1);
+    if (last !== undefined && last[1] === generation - 1) last[1] = generation;
+    else if (last === undefined || last[1] < generation) this.#versions.push([generation, generation]);
+  }
+
   addGeometry(frame: TileFrame, geometry: DecodedGeometry): void {
     const node = this.#node(frame.tile);
     this.#setChildMask(node, frame.child_mask);
@@ -197,15 +212,15 @@ export class TileSet {
       node !== undefined &&
       node.shown !== null &&
       node.replacedIn === this.#selectionCount &&
-      node.coverRank >= node.shown.rank &&
-      node.coverRank < this.#rank(frame.generation)
+      node.coverRank >= node.shown.answer &&
+      node.coverRank < this.#answer(frame.generation)
     );
   }
 
   /** False while the tile is held and is to be drawn itself rather than its children. */
   isReplaced(id: TileId): boolean {
     const node = this.#nodes.get(tileKey(id));
-    return node === undefined || node.shown === null || node.coverRank >= node.shown.rank;
+    return node === undefined || node.shown === null || node.coverRank >= node.shown.answer;
   }
 
   remove(id: TileId): void {
@@ -299,6 +314,16 @@ export class TileSet {
     return this.#connection * CONNECTION_RANKS + generation;
   }
 
+  /** Rank of the generation that was asked for and of which this one is a version. */
+  #answer(generation: number): number {
+    for (let i = this.#versions.length - 1; i >= 0; i -= 1) {
+      const [first, last] = this.#versions[i]!;
+      if (last < generation) break;
+      if (first <= generation) return this.#rank(first - 1);
+    }
+    return this.#rank(generation);
+  }
+
   /** From an earlier connection: drawn until its successor is complete, never changed. */
   #isStale(shown: Shown): boolean {
     return shown.rank < this.#rank(0);
@@ -348,6 +373,7 @@ export class TileSet {
       if (rank < shown.rank) return;
       checkLength(node, rgba, shown.geometry);
       shown.rank = rank;
+      shown.answer = this.#answer(generation);
       shown.error.rounding_levels = roundingOf(rgba);
       shown.drawable.setColours(rgba);
       this.#arrived(node);
@@ -359,7 +385,8 @@ export class TileSet {
       shown?.drawable.dispose();
       const drawable = this.createDrawable(geometry, rgba);
       error.rounding_levels = roundingOf(rgba);
-      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, isKnownToServer: true };
+      const answer = this.#answer(generation);
+      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, answer, isKnownToServer: true };
       if (node.isDrawn) drawable.setVisible(true);
       this.#arrived(node);
     }
@@ -398,7 +425,7 @@ export class TileSet {
     this.#selectionDirty = true;
     for (let at: TileNode | null = node; at !== null; at = at.parent) {
       at.coverRank = coverRankOf(at);
-      const bestRank = Math.max(at.coverRank, at.shown?.rank ?? NOTHING);
+      const bestRank = Math.max(at.coverRank, at.shown?.answer ?? NOTHING);
       if (bestRank === at.bestRank) return;
       at.bestRank = bestRank;
     }
@@ -406,7 +433,7 @@ export class TileSet {
 
   #select(node: TileNode): void {
     const isFineEnough = node.id.level >= this.#finestLevel && isAsNewAsBelow(node);
-    if (node.shown !== null && (node.coverRank < node.shown.rank || isFineEnough)) {
+    if (node.shown !== null && (node.coverRank < node.shown.answer || isFineEnough)) {
       this.#drawn.add(node);
       if (node.isDrawn) return;
       node.isDrawn = true;
@@ -446,9 +473,9 @@ function isHeld(node: TileNode): boolean {
 
 /** Nothing that the tile stands for has newer colours. */
 function isAsNewAsBelow(node: TileNode): boolean {
-  const rank = node.shown?.rank ?? NOTHING;
+  const answer = node.shown?.answer ?? NOTHING;
   const isOlder = (child: TileNode | undefined): boolean =>
-    child !== undefined && ((child.shown?.rank ?? NOTHING) > rank || child.children.some(isOlder));
+    child !== undefined && ((child.shown?.answer ?? NOTHING) > answer || child.children.some(isOlder));
   return !node.children.some(isOlder);
 }
 

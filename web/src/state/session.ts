@@ -428,6 +428,8 @@ export class Session {
         break;
       case 'fusion.changed': {
         const { generation, fusion } = fusionState(params, method);
+        // Nobody has asked for it: the scene has changed by itself.
+        if (store.wanted === null && !this.settings.busy) this.tiles.isVersion(generation);
         this.settings.inForce(generation, fusion);
         break;
       }

@@ -23,6 +23,7 @@ import type { LinkState } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
+import { MapAge } from './map_age';
 import { type Note, notesOf } from './notes';
 
 /** A reading of the scene at a place. */
@@ -151,6 +152,14 @@ export class Store {
       this.statuses.filter(({ id }) => !/palette|fusion_safe/.test(id)),
     ),
   );
+  readonly #mapAge = new MapAge();
+  /** How long ago the newest part of a live map was seen, seconds; null where nobody has said when. */
+  readonly mapAge_s = $derived.by(() => {
+    const newest = this.scene?.live === true ? (this.scene.observed?.newest ?? null) : null;
+    const now_s = (performance.timeOrigin + this.now) / 1000;
+    this.#mapAge.newestIs(newest, now_s);
+    return this.#mapAge.at(now_s);
+  });
   readonly connected = $derived(this.link.phase === 'open');
   /** All that was asked for has come. */
   readonly settled = $derived(this.complete !== null && this.behindSince === null);

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { accuracyWords, bytes, celsius, count, duration, extent, figures, length, reading } from './format';
+import { accuracyWords, bytes, celsius, count, duration, extent, figures, length, liveWords, reading } from './format';
 
 const plain = (text: string | null) => text?.replaceAll('\u202f', ' ') ?? null;
 
@@ -17,6 +17,22 @@ describe('Numbers', () => {
     ]);
     expect(plain(bytes(512))).toBe('512 B');
     expect(plain(bytes(1_230_000))).toBe('1.23 MB');
+  });
+
+  it('tell how new a live map is', () => {
+    const words = (age_s: number | null) => plain(liveWords(age_s, false, false));
+    expect([null, 0, 0.44, 9.94, 9.96, 59.9, 245, 90_000].map(words)).toEqual([
+      'live',
+      'live, newest 0.0 s',
+      'live, newest 0.4 s',
+      'live, newest 9.9 s',
+      'live, newest 9 s',
+      'live, newest 59 s',
+      'live, newest 4 min',
+      'live, newest 25 h',
+    ]);
+    expect(plain(liveWords(245, false, true))).toBe('live, 4 min');
+    expect(liveWords(null, true, false)).toBe('live, empty');
   });
 
   it('have one decimal for temperatures and a real minus sign', () => {

@@ -102,6 +102,14 @@ export function duration(seconds: number): string {
   return `${fixed(Math.floor(seconds / 3600), 0)}${THIN_SPACE}h`;
 }
 
+/** What the status says of a map that grows: how long ago the newest of it was seen. */
+export function liveWords(age_s: number | null, isEmpty: boolean, isNarrow: boolean): string {
+  if (isEmpty) return 'live, empty';
+  if (age_s === null) return 'live';
+  const age = age_s < 9.95 ? withUnit(fixed(age_s, 1), 's') : duration(age_s);
+  return isNarrow ? `live, ${age}` : `live, newest ${age}`;
+}
+
 /** How exact the picture is, in words: farthest that it may be off, for all but a twentieth of colours and temperatures. */
 export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMetric: boolean): string | null {
   if (error === null) return null;

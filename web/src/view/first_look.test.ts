@@ -156,6 +156,61 @@ describe('FirstLook', () => {
     expect(seen.views).toBe(views + 2);
   });
 
+  it('follows a live map as it grows, from the same side, until the user takes the camera', () => {
+    const { look, tiles, seen, distance } = setUp();
+    const live = (size: number) => scene({ live: true, bounds: { min: [0, 0, 0], max: [size, size, 0] } });
+    look.sceneIs(live(0));
+    look.pictureChanged();
+    const { views } = seen;
+    tiles.push(tile(grid(2)));
+    look.sceneIs(live(2));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 1);
+    const first = distance();
+    const direction = [0, 1, 2].map((axis) => (seen.view!.eye[axis]! - seen.view!.target[axis]!) / first);
+    // The same again, and a little more: nothing that anybody would see.
+    look.pictureChanged();
+    tiles[0] = tile(grid(2.02));
+    look.sceneIs(live(2.02));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 1);
+    // Ten times as large, and its surfaces face another way.
+    tiles[0] = tile(grid(20), [1, 0, 0]);
+    look.sceneIs(live(20));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 2);
+    expect(distance()).toBeGreaterThan(5 * first);
+    direction.forEach((value, axis) =>
+      expect((seen.view!.eye[axis]! - seen.view!.target[axis]!) / distance()).toBeCloseTo(value, 6),
+    );
+    // A corner goes and comes: its bounds are the same all the while.
+    tiles[0] = tile(grid(20).filter(([x, y]) => x + y <= 20));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 3);
+    tiles[0] = tile(grid(20));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 4);
+    look.userMoved();
+    tiles[0] = tile(grid(200));
+    look.sceneIs(live(200));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 4);
+    // Back to the first view is to all that there is by now.
+    look.reset();
+    expect(distance()).toBeGreaterThan(50 * first);
+  });
+
+  it('leaves a scene that is not live where it was decided, whatever comes', () => {
+    const { look, tiles, seen } = setUp();
+    look.sceneIs(scene());
+    tiles.push(tile(grid(2)));
+    look.pictureChanged();
+    const { views } = seen;
+    tiles[0] = tile(grid(8));
+    look.pictureChanged();
+    expect(seen.views).toBe(views);
+  });
+
   it('lets the controls near the finest detail, and go back to see everything', () => {
     const { look, seen } = setUp();
     look.sceneIs(scene({ bounds: { min: [0, 0, 0], max: [4000, 0, 3000] } }));

@@ -27,9 +27,12 @@ export interface Looking {
 const NEAREST_SHARE = 1e-6;
 const FARTHEST_RADII = 20;
 
+/** A live map is followed when it would be looked at from a place that is this share of the distance away. */
+const FOLLOWED_SHARE = 0.02;
+
 /**
  * Where the scene is looked at from until the user takes the camera: decided when the first tile is there, however coarse, and then
- * left alone, but for the size of the picture.
+ * left alone, but for the size of the picture. A live map stays in the picture as a whole while it grows, seen from the same side.
  */
 export class FirstLook {
   #scene: Scene | null = null;
@@ -37,6 +40,8 @@ export class FirstLook {
   #userMoved = false;
   /** What the first tile said; null until it has come. */
   #decided: { points: Vec3[]; facing: Vec3 } | null = null;
+  /** What was last looked from. */
+  #view: View | null = null;
   #insets: Insets = { left: 0, right: 0, top: 0, bottom: 0 };
 
   constructor(
@@ -52,8 +57,8 @@ export class FirstLook {
     this.#scene = scene;
     if (scene === null) return;
     this.#updateReach();
-    if (before !== null && before.name === scene.name && before.up === scene.up && (this.#userMoved || isLike(before, scene)))
-      return;
+    const isSame = before !== null && before.name === scene.name && before.up === scene.up;
+    if (isSame && (this.#userMoved || scene.live === true || isLike(before, scene))) return;
     this.#decided = null;
     this.#userMoved = false;
     this.#setUp(this.choices.get(scene.name, scene.bounds) ?? scene.up);
@@ -62,15 +67,13 @@ export class FirstLook {
 
   /** Tiles have come. */
   pictureChanged(): void {
-    if (this.#scene === null || this.#decided !== null) return;
-    // Whatever finer ones have come with it: what is seen first must not depend on how fast they are.
-    const geometries = this.#coarsest();
-    if (geometries.length === 0) return;
-    this.#decided = {
-      points: withoutStrays(samplePoints(geometries), this.#scene.core_bounds ?? null),
-      facing: meanNormal(geometries),
-    };
-    if (!this.#userMoved) this.#look(false);
+    if (this.#scene === null) return;
+    if (this.#decided !== null) {
+      if (this.#scene.live === true && !this.#userMoved) this.#follow();
+      return;
+    }
+    this.#decide();
+    if (this.#decided !== null && !this.#userMoved) this.#look(false);
   }
 
   /** The user moved the camera: from now on it is not moved for them. */
@@ -99,14 +102,38 @@ export class FirstLook {
     if (scene === null) return;
     this.#userMoved = true;
     const { eye, target } = this.viewport.pose;
-    const points = withoutStrays(samplePoints(this.#geometries()), scene.core_bounds ?? this.#decidedBox());
+    const points = withoutStrays(samplePoints(this.#geometries()), scene.core_bounds ?? boxOf(this.#decided?.points ?? []));
     this.#fit(points, [eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]], true);
   }
 
   /** Back to the first view. */
   reset(): void {
     this.#userMoved = false;
+    // By now it may have quite another face.
+    if (this.#scene?.live === true) this.#decide();
     this.#look(true);
+  }
+
+  #decide(): void {
+    // Whatever finer ones have come with it: what is seen first must not depend on how fast they are.
+    const geometries = this.#coarsest();
+    if (geometries.length === 0) return;
+    this.#decided = { points: this.#pointsOf(geometries), facing: meanNormal(geometries) };
+  }
+
+  #follow(): void {
+    const points = this.#pointsOf(this.#coarsest());
+    if (this.#decided === null || this.#view === null || points.length === 0) return;
+    const { facing } = this.#decided;
+    const [before, next] = [this.#view, this.#fitted(points, viewDirection(facing, this.#up))];
+    const step = FOLLOWED_SHARE * between(next.eye, next.target);
+    if (between(before.eye, next.eye) <= step && between(before.target, next.target) <= step) return;
+    this.#decided = { points, facing };
+    this.#look(true);
+  }
+
+  #pointsOf(geometries: GeometrySummary[]): Vec3[] {
+    return withoutStrays(samplePoints(geometries), this.#scene?.core_bounds ?? null);
   }
 
   #setUp(up: UpAxis): void {
@@ -123,9 +150,14 @@ export class FirstLook {
   }
 
   #fit(points: readonly Vec3[], direction: Vec3, animated: boolean): void {
+    this.#view = this.#fitted(points, direction);
+    this.viewport.setView(this.#view, animated);
+  }
+
+  #fitted(points: readonly Vec3[], direction: Vec3): View {
     const { fov_y_deg } = this.viewport.pose;
     const fov = (fov_y_deg * Math.PI) / 180;
-    this.viewport.setView(fittedView(points, direction, this.#up, fov, this.viewport.aspect, this.#insets), animated);
+    return fittedView(points, direction, this.#up, fov, this.viewport.aspect, this.#insets);
   }
 
   #geometries(): GeometrySummary[] {
@@ -138,20 +170,23 @@ export class FirstLook {
     return tiles.filter(({ level }) => level === coarsest).map(({ geometry }) => geometry);
   }
 
-  #decidedBox(): Bounds | null {
-    const points = this.#decided?.points ?? [];
-    if (points.length === 0) return null;
-    const ends = (pick: (...values: number[]) => number): Vec3 =>
-      [0, 1, 2].map((axis) => points.reduce((end, point) => pick(end, point[axis]!), points[0]![axis]!)) as Vec3;
-    return { min: ends(Math.min), max: ends(Math.max) };
-  }
-
   /** Far enough away to see everything, strays too; near enough to see the finest detail that there is. */
   #updateReach(): void {
     if (this.#scene === null) return;
     const { bounds, core_bounds } = this.#scene;
     this.viewport.setReach(sizeOf(core_bounds ?? bounds) * NEAREST_SHARE, (sizeOf(bounds) / 2) * FARTHEST_RADII);
   }
+}
+
+function boxOf(points: readonly Vec3[]): Bounds | null {
+  if (points.length === 0) return null;
+  const ends = (pick: (...values: number[]) => number): Vec3 =>
+    [0, 1, 2].map((axis) => points.reduce((end, point) => pick(end, point[axis]!), points[0]![axis]!)) as Vec3;
+  return { min: ends(Math.min), max: ends(Math.max) };
+}
+
+function between(a: Vec3, b: Vec3): number {
+  return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
 function sizeOf({ min, max }: Bounds): number {

@@ -1,0 +1,170 @@
+// A second program puts blocks into a live map while the browser watches.
+import assert from 'node:assert/strict';
+import { patch } from '../../tests/integration/node/patch.mjs';
+import { decodePng, drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+
+const SIDE = 41;
+const SCALE = 0.1;
+const STEP_M = (SIDE - 1) * SCALE;
+
+/** Puts a block of a grid of 4 by 4 into the map, as any mapper would. Returns the revision of the map that has it. */
+async function put(server, column, row, { celsius = 20, height = 0, age_s = 0 } = {}) {
+  const observed_at = Date.now() / 1000 - age_s;
+  const reply = await fetch(`${server.url}api/v1/blocks/b${column}.${row}?observed_at=${observed_at}`, {
+    method: 'PUT',
+    body: patch(column, row, { side: SIDE, scale: SCALE, celsius, height }),
+  });
+  assert.equal(reply.status, 200, await reply.text());
+  return (await (await fetch(`${server.url}api/v1/scene`)).json()).revision;
+}
+
+/** Waits until all of this revision of the map, or of a later one, is on the screen. */
+async function shows(page, revision) {
+  await page.waitForFunction((wanted) => (globalThis.spectra?.store.complete?.scene_revision ?? 0) >= wanted, revision, {
+    timeout: 60_000,
+  });
+  await settled(page);
+}
+
+/** Where the middle of a block is on the screen; the origin of the scene's positions is that of its first block. */
+const placeOf = (page, column, row, height = 0) =>
+  page.evaluate(
+    ([x, y, z]) => {
+      const { store, viewport } = globalThis.spectra;
+      const { origin } = store.scene;
+      const at = viewport.project([x - origin[0], y - origin[1], z - origin[2]]);
+      return at === null ? null : [at.x, at.y];
+    },
+    [(column + 0.5) * STEP_M, (row + 0.5) * STEP_M, height * SCALE],
+  );
+
+const near = (a, b, levels) => a.every((value, channel) => Math.abs(value - b[channel]) <= levels);
+
+export function addLiveTests(browser) {
+  test('A live map grows on the screen: it is said how new it is, all of it stays in view, and a range that moves is announced and can be held', async () => {
+    const server = await startServer(['--live']);
+    const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 800 });
+    await page.getByText('The map is empty yet').waitFor();
+    const live = page.locator('[data-status="live"]');
+    assert.equal(await live.innerText(), 'live, empty');
+
+    await shows(page, await put(server, 0, 0, { age_s: 250 }));
+    assert.equal(await page.getByText('The map is empty yet').count(), 0);
+    assert.match((await live.innerText()).replaceAll('\u202f', ' '), /^live, newest 4 min$/);
+    const small = await page.evaluate(() => globalThis.spectra.viewport.pose.eye);
+
+    let revision = 0;
+    for (let i = 1; i < 16; i += 1) revision = await put(server, i % 4, Math.floor(i / 4));
+    await shows(page, revision);
+    assert.match((await live.innerText()).replaceAll('\u202f', ' '), /^live, newest \d+(\.\d)? s$/);
+    assert.match(await page.locator('footer').innerText(), /1 viewer/);
+    await screenshot(page, 'live-whole');
+    // Nobody has moved the camera: all of it is in the picture, between the controls, as the first view of any scene is (it cuts the tips
+    // of corners).
+    assert.notDeepEqual(await page.evaluate(() => globalThis.spectra.viewport.pose.eye), small);
+    for (const [column, row] of [
+      [-0.5, -0.5],
+      [3.5, -0.5],
+      [-0.5, 3.5],
+      [3.5, 3.5],
+    ]) {
+      const [x, y] = await placeOf(page, column, row);
+      assert.ok(x > 100 && x < 1060 && y > 0 && y < 780, `a corner of the map is at ${x}, ${y}`);
+    }
+
+    const range = () => page.evaluate(() => globalThis.spectra.store.fusionInForce.range);
+    const announced = page.locator('[data-range="moved"]');
+    const before = await range();
+    assert.notEqual(before.mode, 'manual');
+    await shows(page, await put(server, 1, 1, { celsius: 60 }));
+    await announced.waitFor();
+    assert.match((await announced.innerText()).replaceAll('\u202f', ' '), /^Range now [\d.]+ to [\d.]+ °C\. L locks it$/);
+    await screenshot(page, 'live-range-moved');
+    const moved = await range();
+    assert.ok(moved.max > before.max + 20, `${before.max} to ${moved.max}`);
+    await announced.waitFor({ state: 'detached' });
+
+    // Held by one key; then whatever comes is shown in the same colours.
+    await page.keyboard.press('l');
+    await page.locator('[data-range="lock"][aria-pressed="true"]').waitFor();
+    await settled(page);
+    await shows(page, await put(server, 2, 2, { celsius: 90 }));
+    const held = await range();
+    assert.deepEqual([held.mode, held.min, held.max], ['manual', moved.min, moved.max]);
+    assert.equal(await announced.count(), 0);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('A block that is replaced changes its place on the screen and no other, and the old one stays until the new one is complete', async () => {
+    const server = await startServer(['--live']);
+    let revision = 0;
+    const CHANGED = 0;
+    const update = (celsius) => put(server, CHANGED % 4, Math.floor(CHANGED / 4), { celsius, height: celsius / 10 });
+    for (let i = 1; i < 16; i += 1) await put(server, i % 4, Math.floor(i / 4));
+    revision = await update(40);
+    const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 800 });
+    await shows(page, revision);
+    await page.keyboard.press('1');
+    await page.keyboard.press('h');
+    await settled(page);
+    // The colours of what stays are to stay, too.
+    await page.keyboard.press('l');
+    await settled(page);
+    // From above, and from now on the camera is the viewer's.
+    await page.evaluate((size) => {
+      const { viewport, store } = globalThis.spectra;
+      const { origin } = store.scene;
+      const target = [size / 2 - origin[0], size / 2 - origin[1], -origin[2]];
+      viewport.lookAlong([0, 0, 1]);
+      globalThis.spectra.setView({ eye: [target[0], target[1] - 0.01, target[2] + 2.2 * size], target });
+    }, 4 * STEP_M);
+    await settled(page);
+    const places = [];
+    for (let i = 0; i < 16; i += 1) places.push(await placeOf(page, i % 4, Math.floor(i / 4)));
+    // Not those beside it: a tile may reach across the border.
+    const others = places.map((_, i) => i).filter((i) => i % 4 > 1 || i > 7);
+
+    const background = await page.evaluate(() => {
+      const colour = Number.parseInt(globalThis.spectra.store.background.slice(1), 16);
+      return [colour >> 16, (colour >> 8) & 255, colour & 255];
+    });
+    const at = (image, [x, y]) => image.at(Math.round(x), Math.round(y));
+    const first = await screenshot(page, 'live-before');
+    for (const place of places) assert.ok(!near(at(first, place), background, 24), `no surface at ${place}`);
+
+    const session = await page.context().newCDPSession(page);
+    const frames = [];
+    session.on('Page.screencastFrame', ({ data, sessionId }) => {
+      frames.push(Buffer.from(data, 'base64'));
+      void session.send('Page.screencastFrameAck', { sessionId });
+    });
+    await session.send('Page.startScreencast', { format: 'png', everyNthFrame: 1 });
+    let last = first;
+    for (let round = 1; round <= 4; round += 1) {
+      revision = await update(round % 2 === 1 ? 20 : 40);
+      await shows(page, revision);
+      const next = await screenshot(page, `live-after-${round}`);
+      assert.ok(!near(at(next, places[CHANGED]), at(last, places[CHANGED]), 24), 'the place that has changed looks as before');
+      for (const i of others) assert.deepEqual(at(next, places[i]), at(last, places[i]), `block ${i} looks otherwise`);
+      last = next;
+    }
+    await session.send('Page.stopScreencast');
+    console.log(`        ${frames.length} frames while it was replaced 4 times`);
+    assert.ok(frames.length >= 8, `${frames.length} frames`);
+    frames.forEach((data, n) => {
+      const image = decodePng(data);
+      assert.equal(image.width, first.width);
+      for (const [i, place] of places.entries()) {
+        const pixel = at(image, place);
+        assert.ok(!near(pixel, background, 24), `frame ${n} has a hole at block ${i}`);
+        if (others.includes(i)) assert.deepEqual(pixel, at(first, place), `block ${i} flickers in frame ${n}`);
+      }
+    });
+    await drawn(page);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+}
