@@ -15,8 +15,8 @@ struct NetLimits {
   std::size_t block_size_bytes = std::size_t{256} * 1024 * 1024;     ///< One block that is put into the map.
   std::size_t block_bytes_at_once = std::size_t{512} * 1024 * 1024;  ///< All that are being received or answered.
   std::size_t ingest_sessions = 16;                                  ///< Senders of blocks at a time.
-  std::uint64_t ingest_credit_blocks = 64;  ///< Messages of one sender that wait for their answers.
-  std::uint64_t ingest_credit_bytes = std::uint64_t{16} * 1024 * 1024;  ///< Their bytes; the last may go beyond.
+  std::uint64_t ingest_credit_blocks = 256;  ///< Messages of one sender that wait for their answers.
+  std::uint64_t ingest_credit_bytes = std::uint64_t{32} * 1024 * 1024;  ///< Their bytes; the last may go beyond.
   std::size_t message_size_bytes = 64 * 1024;                           ///< One WebSocket message of a client.
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
   std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.

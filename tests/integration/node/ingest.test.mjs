@@ -101,7 +101,9 @@ test("who does not speak the protocol is told so", async () => {
     assert.ok(closed.reason.length > 10, closed.reason);
   }
   const sender = await IngestSender.connect(server.url);
-  for (let i = 0; i <= sender.hello.credit.blocks; i += 1) sender.sendAnyway("a", patch(0, 0));
+  // None is answered before the first, which takes long.
+  sender.sendAnyway("a", patch(0, 0, { side: 400 }));
+  for (let i = 0; i < sender.hello.credit.blocks; i += 1) sender.sendAnyway("a", undefined, REMOVE);
   assert.equal((await sender.closed).code, 4001);
   await server.stop();
 });
@@ -119,17 +121,17 @@ test("a server that has much to do slows its senders, keeps within its memory an
   const watching = setInterval(async () => (most = Math.max(most, await resident().catch(() => 0))), 50);
   const sender = await IngestSender.connect(server.url);
   const sent = [];
-  // 120 x 2.9 MB; most of them end a little too early, so that the map need not be made anew for each.
-  for (let i = 0; i < 120; i += 1) {
-    sent.push(await sender.send(`s${i % 2}`, i < 116 ? large[i % 2].subarray(0, large[0].length - 7) : large[i % 2]));
+  // 160 x 2.9 MB; most of them end a little too early, so that the map need not be made anew for each.
+  for (let i = 0; i < 160; i += 1) {
+    sent.push(await sender.send(`s${i % 2}`, i < 156 ? large[i % 2].subarray(0, large[0].length - 7) : large[i % 2]));
   }
   for (const [i, sequence] of sent.entries()) {
-    assert.equal((await sender.answer(sequence)).method, i < 116 ? "ingest.refused" : "ingest.acknowledged");
+    assert.equal((await sender.answer(sequence)).method, i < 156 ? "ingest.refused" : "ingest.acknowledged");
   }
   clearInterval(watching);
   t.diagnostic(`the sender waited ${sender.waits} times; ${((most - before) / 2 ** 20).toFixed(0)} MiB more than before at most`);
   assert.ok(sender.waits > 5, "the sender had to wait");
-  assert.ok(most - before < 150 * 2 ** 20, "less than half of what was sent was in memory");
+  assert.ok(most - before < 200 * 2 ** 20, "less than half of what was sent was in memory");
   const { vertex_count, revision } = await (await fetch(`${server.url}/api/v1/scene`)).json();
   assert.equal(vertex_count, 2 * 260 * 260);
   await viewer.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision >= revision);
