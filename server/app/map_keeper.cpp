@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +22,8 @@ namespace spectra::server {
 namespace {
 
 constexpr const char* kConstantsKey = "map";
+/// Fusing and encoding for viewers get ten times as much of a processor as coarse tiles.
+constexpr int kCoarseNiceness = 10;
 
 /// Bytes as a file that only this process sees.
 class MemoryFile {
@@ -129,7 +132,7 @@ std::optional<MapConstants> constants_of(const std::string& text) {
 }  // namespace
 
 MapKeeper::MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store)
-    : served_(served), store_(std::move(store)), writer_([this] { run(); }) {}
+    : served_(served), store_(std::move(store)), writer_([this] { run(); }), coarse_maker_([this] { make_coarse(); }) {}
 
 MapKeeper::~MapKeeper() {
   end();
@@ -144,7 +147,9 @@ void MapKeeper::end() {
     refused.swap(waiting_);
   }
   has_work_.notify_all();
+  has_coarse_work_.notify_all();
   if (writer_.joinable()) writer_.join();
+  if (coarse_maker_.joinable()) coarse_maker_.join();
   for (Waiting& waiting : refused) refuse(waiting.change, busy("the server ends"));
 }
 
@@ -323,6 +328,31 @@ void MapKeeper::run() {
   }
 }
 
+void MapKeeper::make_coarse() {
+  // Of a thread alone, on Linux.
+  if (setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kCoarseNiceness) != 0) {
+    spdlog::debug("coarse tiles are made at the priority of everything else");
+  }
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      has_coarse_work_.wait(lock, [this] { return is_ending_ || is_behind_; });
+      if (is_ending_) return;
+      is_behind_ = false;
+    }
+    const auto is_ending = [this] {
+      const std::lock_guard lock(mutex_);
+      return is_ending_;
+    };
+    try {
+      while (!is_ending() && served_.scenes.make_coarse()) {
+      }
+    } catch (const std::exception& error) {
+      spdlog::error("a coarse tile could not be made: {}", error.what());
+    }
+  }
+}
+
 std::vector<MapKeeper::Change> MapKeeper::next_batch() {
   std::unique_lock lock(mutex_);
   std::vector<Change> batch;
@@ -431,6 +461,11 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
     wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at});
   }
   served_.scenes.change(std::move(wanted), served_.pool);
+  {
+    const std::lock_guard lock(mutex_);
+    is_behind_ = true;
+  }
+  has_coarse_work_.notify_one();
   keep_constants();
   for (std::size_t i = 0; i < batch.size(); ++i) {
     {

@@ -122,6 +122,8 @@ class MapKeeper {
   /// After the block that may have given the map its origin: reads what waited for it. Under the lock.
   void read_next();
   void run();
+  /// Makes coarse tiles when nobody else needs the processor; see SceneStore::make_coarse().
+  void make_coarse();
   std::vector<Change> next_batch();
   void take(std::vector<Change> batch);
   std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
@@ -147,7 +149,12 @@ class MapKeeper {
   std::map<std::string, BlockEntry, std::less<>> entries_;
   std::uint64_t last_revision_ = 0;
 
-  std::thread writer_;  ///< Last: it uses the others.
+  std::condition_variable has_coarse_work_;
+  bool is_behind_ = false;  ///< Coarse tiles are to be made.
+
+  // Last: they use the others.
+  std::thread writer_;
+  std::thread coarse_maker_;
 };
 
 }  // namespace spectra::server

@@ -18,33 +18,33 @@ std::size_t BorderIndex::Hash::operator()(const Vec3f& p) const {
   return hash;
 }
 
-void BorderIndex::add(const TileId& leaf, std::span<const Vec3f> positions) {
+void BorderIndex::Change::add(const TileId& leaf, std::span<const Vec3f> positions) {
   for (const Vec3f& position : positions) {
-    std::uint32_t e = free_;
+    std::uint32_t e = index_.free_;
     if (e == kNone) {
-      e = static_cast<std::uint32_t>(entries_.size());
-      entries_.emplace_back();
+      e = static_cast<std::uint32_t>(index_.entries_.size());
+      index_.entries_.emplace_back();
     } else {
-      free_ = entries_[e].next;
+      index_.free_ = index_.entries_[e].next;
     }
-    const auto [first, is_new] = first_.try_emplace(position, kNone);
-    entries_[e] = {leaf, first->second};
+    const auto [first, is_new] = index_.first_.try_emplace(position, kNone);
+    index_.entries_[e] = {leaf, first->second};
     first->second = e;
   }
 }
 
-void BorderIndex::remove(const TileId& leaf, std::span<const Vec3f> positions) {
+void BorderIndex::Change::remove(const TileId& leaf, std::span<const Vec3f> positions) {
   for (const Vec3f& position : positions) {
-    const auto first = first_.find(position);
-    if (first == first_.end()) continue;
+    const auto first = index_.first_.find(position);
+    if (first == index_.first_.end()) continue;
     std::uint32_t* link = &first->second;
-    while (*link != kNone && entries_[*link].leaf != leaf) link = &entries_[*link].next;
+    while (*link != kNone && index_.entries_[*link].leaf != leaf) link = &index_.entries_[*link].next;
     if (*link == kNone) continue;
     const std::uint32_t e = *link;
-    *link = entries_[e].next;
-    entries_[e].next = free_;
-    free_ = e;
-    if (first->second == kNone) first_.erase(first);
+    *link = index_.entries_[e].next;
+    index_.entries_[e].next = index_.free_;
+    index_.free_ = e;
+    if (first->second == kNone) index_.first_.erase(first);
   }
 }
 
@@ -56,6 +56,14 @@ std::uint8_t BorderIndex::sharing_level(const Vec3f& position) const {
     common = common_ancestor(common, entries_[e].leaf);
   }
   return common.level;
+}
+
+std::vector<std::uint8_t> BorderIndex::sharing_levels(std::span<const Vec3f> positions) const {
+  std::vector<std::uint8_t> levels;
+  levels.reserve(positions.size());
+  const std::shared_lock lock(mutex_);
+  for (const Vec3f& position : positions) levels.push_back(sharing_level(position));
+  return levels;
 }
 
 }  // namespace spectra::server

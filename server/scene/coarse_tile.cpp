@@ -111,7 +111,7 @@ Merged merged(std::vector<Child>& children, const Tile& parent, const BorderInde
     }
   }
   result.positions = std::move(index).take_positions();
-  for (const Vec3f& position : result.positions) result.sharing_level.push_back(borders.sharing_level(position));
+  result.sharing_level = borders.sharing_levels(result.positions);
   return result;
 }
 

@@ -1,7 +1,6 @@
 #include "server/scene/living_map.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -21,7 +20,6 @@ namespace spectra::server {
 namespace {
 
 using fusion::Vec3f;
-using protocol::TileId;
 
 /// About what share of the making is done with the leaves; and of that, when they are cut and when the steps are known.
 constexpr double kLeavesShare = 0.25;
@@ -66,37 +64,12 @@ Vec3f moved(const Vec3f& p, const fusion::Vec3d& by) {
           static_cast<float>(double{p.z} + by.z)};
 }
 
-/// The median of all finite temperatures, the lower one of an even number, NaN without any; and between which nearly all
-/// lie, at least a degree apart: noise of a scene of one temperature is no contrast.
-std::pair<float, double> temperature_spread(std::span<const std::shared_ptr<const MapNode>> leaves) {
-  std::vector<float> finite;
-  for (const auto& leaf : leaves) {
-    for (const float t : owned_temperature(*leaf->tile)) {
-      if (std::isfinite(t)) finite.push_back(t);
-    }
-  }
-  if (finite.empty()) return {std::numeric_limits<float>::quiet_NaN(), 1};
-  const auto at = [&](double share) {
-    const auto place = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
-    std::nth_element(finite.begin(), place, finite.end());
-    return *place;
-  };
-  const double low = double{at(0.005)}, high = double{at(0.995)};
-  return {at(0.5), std::max(high - low, 1.0)};
-}
-
 void collect_shown(const std::shared_ptr<const MapNode>& node, bool is_point_cloud, bool with_coarse,
                    std::vector<std::shared_ptr<const Tile>>& tiles) {
   const bool is_shown = node->tile && (is_point_cloud || !node->tile->triangles.empty());
   // Leaves alone are the whole scene, whatever is drawn of it.
   if (node->is_leaf() ? (is_shown || !with_coarse) : (is_shown && with_coarse)) tiles.push_back(node->tile);
   for (const auto& branch : node->branches) collect_shown(branch.node, is_point_cloud, with_coarse, tiles);
-}
-
-void collect_inner(const std::shared_ptr<const MapNode>& node, std::set<TileId>& ids) {
-  if (node->is_leaf()) return;
-  ids.insert(node->id);
-  for (const auto& branch : node->branches) collect_inner(branch.node, ids);
 }
 
 bool has_moved(double from, double to, double span) {
@@ -171,13 +144,22 @@ std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, s
   }
   if (!put.empty() || !change_wanted.removed.empty()) change(std::move(put), change_wanted.removed, pool, progress);
 
-  auto snapshot = snapshot_of(version(revision));
-  if (snapshot->reference_temperature() != reference_) {
-    reference_ = snapshot->reference_temperature();
+  auto made = snapshot(revision);
+  fusion::report(progress, kTilingPhase, 1);
+  return made;
+}
+
+std::shared_ptr<const SceneSnapshot> LivingMap::snapshot(std::uint32_t revision) {
+  auto made = snapshot_of(version(revision));
+  if (made->reference_temperature() != reference_) {
+    reference_ = made->reference_temperature();
     changed_vertex_count_ = 0;
   }
-  fusion::report(progress, kTilingPhase, 1);
-  return snapshot;
+  return made;
+}
+
+CoarseLevels::Options LivingMap::coarse_options() const {
+  return {.sizes = sizes(), .position_step_m = constants_->position_step_m};
 }
 
 MapVersion LivingMap::version(std::uint32_t revision) {
@@ -361,112 +343,26 @@ void LivingMap::take(ChangedTree changed, WorkerPool& pool, const fusion::Progre
   }
   for (const auto& leaf : changed.dropped_leaves) changed_vertex_count_ += leaf->tile->owned_count;
   if (options_.levels == LevelsOfDetail::All) {
-    make_coarse_tiles(changed, pool, progress);
+    const auto coarse_progress = [&](std::string_view phase, double share) {
+      fusion::report(progress, phase, kLeavesShare + (1 - kLeavesShare) * share);
+    };
+    coarse_.change(changed, root_, coarse_options(), pool, coarse_progress);
   }
   root_ = std::move(changed.root);
 }
 
-std::set<TileId> LivingMap::update_borders(const ChangedTree& changed, WorkerPool& pool) {
-  std::vector<MapNode*> leaves;
-  for (const auto& node : changed.made) {
-    if (node->is_leaf()) leaves.push_back(node.get());
-  }
-  pool.for_each(leaves.size(), [&](std::size_t i) { leaves[i]->open_positions = open_positions(*leaves[i]->tile); });
-  std::vector<std::vector<std::uint8_t>> before(leaves.size());
-  for (std::size_t i = 0; i < leaves.size(); ++i) {
-    for (const Vec3f& position : leaves[i]->open_positions) before[i].push_back(borders_.sharing_level(position));
-  }
-  for (const auto& leaf : changed.dropped_leaves) borders_.remove(leaf->id, leaf->open_positions);
-  for (const MapNode* leaf : leaves) borders_.add(leaf->id, leaf->open_positions);
-  // Vertices of others that may not move any more, because something has come to their other side.
-  std::set<TileId> locked_anew;
-  for (std::size_t i = 0; i < leaves.size(); ++i) {
-    for (std::size_t p = 0; p < before[i].size(); ++p) {
-      const Vec3f& position = leaves[i]->open_positions[p];
-      const std::uint8_t level = borders_.sharing_level(position);
-      if (level >= before[i][p]) continue;
-      borders_.for_each_holder(position, [&](TileId holder) {
-        while (holder.level > level) locked_anew.insert(holder = parent_of(holder));
-      });
-    }
-  }
-  return locked_anew;
+bool LivingMap::is_behind() const {
+  return coarse_.are_behind();
 }
 
-bool LivingMap::has_new_spread() {
-  const std::uint64_t count = root_ ? root_->content.owned_count : 0;
-  if (count < 2 * spread_vertex_count_ && !std::isnan(median_celsius_)) return false;
-  const auto [median, span] = temperature_spread(leaves_of(root_));
-  spread_vertex_count_ = count;
-  const bool is_new = std::isnan(median) != std::isnan(median_celsius_) ||
-                      std::abs(double{median} - double{median_celsius_}) > span / 16 ||
-                      std::abs(span - span_celsius_) > span / 4;
-  if (is_new) {
-    median_celsius_ = median;
-    span_celsius_ = span;
-  }
-  return is_new;
+std::optional<CoarseWork> LivingMap::next_coarse() {
+  if (!root_) return std::nullopt;
+  return coarse_.next(root_, coarse_options());
 }
 
-void LivingMap::make_coarse_tiles(const ChangedTree& changed, WorkerPool& pool, const fusion::Progress& progress) {
-  const std::shared_ptr<const MapNode> old_top = top_of(root_);
-  std::set<TileId> wanted = update_borders(changed, pool);
-  root_ = changed.root;
-  if (!root_) return;
-  if (has_new_spread()) collect_inner(root_, wanted);
-  const std::shared_ptr<const MapNode> top = top_of(root_);
-  if (!top->is_top) wanted.insert(top->id);
-  // Above the top there are no tiles.
-  for (const MapNode* node = root_.get(); node != top.get(); node = node->branches.front().node.get()) {
-    if (node->tile) wanted.insert(node->id);
-  }
-  if (old_top && old_top->id != top->id) wanted.insert(old_top->id);
-
-  std::map<TileId, std::shared_ptr<MapNode>> open;  // Those that may be changed.
-  for (const auto& node : changed.made) open.emplace(node->id, node);
-  std::set<TileId> path;
-  for (TileId id : wanted) {
-    while (path.insert(id).second && id.level > 0) id = parent_of(id);
-  }
-  for (const TileId& id : path) {  // Coarse before fine.
-    if (open.contains(id) || id.level == 0) continue;
-    const auto parent = open.find(parent_of(id));
-    if (parent == open.end()) continue;
-    for (MapNode::Branch& branch : parent->second->branches) {
-      if (branch.node->id != id) continue;
-      const auto copy = std::make_shared<MapNode>(*branch.node);
-      branch.node = copy;
-      open.emplace(id, copy);
-    }
-  }
-  std::vector<std::vector<MapNode*>> by_level(kDeepestLevel + 1);
-  std::size_t count = 0;
-  for (const auto& [id, node] : open) {
-    if (node->is_leaf()) continue;
-    if (id.level < top->id.level) {
-      node->tile = nullptr;
-      node->weight = {};
-      node->samples = {};
-      continue;
-    }
-    by_level[id.level].push_back(node.get());
-    ++count;
-  }
-  const CoarseOptions options{.tile_vertex_count = sizes().leaf_vertex_count,
-                              .top_vertex_count = sizes().root_vertex_count,
-                              .median_celsius = median_celsius_,
-                              .span_celsius = span_celsius_,
-                              .is_point_cloud = root_->content.triangle_count == 0,
-                              .position_step_m = constants_->position_step_m};
-  std::atomic<std::size_t> made_count{0};
-  for (auto level = by_level.rbegin(); level != by_level.rend(); ++level) {
-    pool.for_each(level->size(), [&](std::size_t i) {
-      MapNode& node = *(*level)[i];
-      make_coarse_tile(node, node.id == top->id, borders_, options);
-      const double share = static_cast<double>(++made_count) / static_cast<double>(count);
-      fusion::report(progress, kTilingPhase, kLeavesShare + (1 - kLeavesShare) * share);
-    });
-  }
+std::shared_ptr<const SceneSnapshot> LivingMap::take_coarse(const CoarseWork& work, std::uint32_t revision) {
+  if (root_) root_ = coarse_.taken(root_, work);
+  return snapshot(revision);
 }
 
 }  // namespace spectra::server

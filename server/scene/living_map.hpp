@@ -15,8 +15,7 @@
 #include "fusion/error.hpp"
 #include "fusion/mesh/ply_reader.hpp"
 #include "fusion/progress.hpp"
-#include "server/scene/border_index.hpp"
-#include "server/scene/coarse_tile.hpp"
+#include "server/scene/coarse_levels.hpp"
 #include "server/scene/map_grid.hpp"
 #include "server/scene/map_tree.hpp"
 #include "server/scene/map_version.hpp"
@@ -75,11 +74,20 @@ class LivingMap {
   std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
 
   /// The next version. Positions of blocks are taken relative to the origin of the map. The blocks that are put have different
-  /// names, and there is no refusal_of() them. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
+  /// names, and there is no refusal_of() them. Coarse tiles that were there before may not show yet what has changed beneath
+  /// them; see next_coarse(). Must not be called from a job of the pool. `progress` is told of kTilingPhase.
   std::shared_ptr<const SceneSnapshot> apply(MapChange change, std::uint32_t revision, WorkerPool& pool,
                                              const fusion::Progress& progress = {});
 
+  /// Some coarse tiles do not show yet what is beneath them.
+  bool is_behind() const;
+  /// The next of them, to be run and taken; nothing when the map is complete.
+  std::optional<CoarseWork> next_coarse();
+  /// The next version, with a tile that was made. The map may have changed meanwhile.
+  std::shared_ptr<const SceneSnapshot> take_coarse(const CoarseWork& work, std::uint32_t revision);
+
  private:
+  std::shared_ptr<const SceneSnapshot> snapshot(std::uint32_t revision);
   MapVersion version(std::uint32_t revision);
   std::vector<fusion::Note> notes() const;
   void put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress);
@@ -87,12 +95,10 @@ class LivingMap {
               const fusion::Progress& progress);
   /// Of a block that comes in, its positions relative to the origin of the map from then on.
   std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
-  /// The tree with what has changed, its coarse tiles made.
+  /// The tree with what has changed.
   void take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress);
-  void make_coarse_tiles(const ChangedTree& changed, WorkerPool& pool, const fusion::Progress& progress);
-  std::set<protocol::TileId> update_borders(const ChangedTree& changed, WorkerPool& pool);
-  bool has_new_spread();
   TileSizes sizes() const;
+  CoarseLevels::Options coarse_options() const;
 
   const Options options_;
   std::optional<MapConstants> constants_;
@@ -101,10 +107,7 @@ class LivingMap {
   BlockNames names_;
   BlockNumber last_number_ = 0;
   std::shared_ptr<const MapNode> root_;
-  BorderIndex borders_;
-  float median_celsius_ = std::numeric_limits<float>::quiet_NaN();
-  double span_celsius_ = 1;
-  std::uint64_t spread_vertex_count_ = 0;  ///< So many vertices the map had when the last two were found.
+  CoarseLevels coarse_;
 
   // Of the last version.
   std::optional<fusion::Histogram> percentiles_;

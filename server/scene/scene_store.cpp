@@ -24,7 +24,7 @@ std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene sce
                                                          const fusion::Progress& progress) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
-  map_ = std::make_unique<LivingMap>(LivingMap::Options{.levels = levels, .first_level = kFirstLevel});
+  map_ = std::make_shared<LivingMap>(LivingMap::Options{.levels = levels, .first_level = kFirstLevel});
   MapChange change;
   change.put.push_back({.id = std::string(kFileBlock), .scene = std::move(scene), .observed_at = {}});
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool, progress), before);
@@ -34,14 +34,29 @@ std::shared_ptr<const SceneSnapshot> SceneStore::change(MapChange change, Worker
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   if (!map_) {
-    map_ = std::make_unique<LivingMap>(live_options());
+    map_ = std::make_shared<LivingMap>(live_options());
   }
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool), {});
 }
 
+bool SceneStore::make_coarse() {
+  std::shared_ptr<LivingMap> map;
+  std::optional<CoarseWork> work;
+  {
+    const std::lock_guard replacing(replace_mutex_);
+    map = map_;
+    if (map) work = map->next_coarse();
+  }
+  if (!work) return false;
+  work->run();
+  const std::lock_guard replacing(replace_mutex_);
+  if (map == map_) publish(map_->take_coarse(*work, current()->revision() + 1), {});
+  return true;
+}
+
 void SceneStore::begin(const MapConstants& constants) {
   const std::lock_guard replacing(replace_mutex_);
-  map_ = std::make_unique<LivingMap>(live_options(), constants);
+  map_ = std::make_shared<LivingMap>(live_options(), constants);
 }
 
 std::optional<MapConstants> SceneStore::constants() const {

@@ -52,6 +52,10 @@ class SceneStore {
   /// Changes the map (an empty one begins with this), in the same way; there is no refusal_of() it.
   std::shared_ptr<const SceneSnapshot> change(MapChange change, WorkerPool& pool);
 
+  /// Makes one of the coarse tiles that do not show yet what has changed beneath them, beside all changes, and publishes the map with
+  /// it. False when there is none. One thread at a time.
+  bool make_coarse();
+
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);
 
@@ -69,7 +73,7 @@ class SceneStore {
   std::shared_ptr<const SceneSnapshot> publish(std::shared_ptr<const SceneSnapshot> snapshot, const Listener& before);
 
   mutable std::mutex replace_mutex_;  // held while a scene is built and told of; taken before mutex_
-  std::unique_ptr<LivingMap> map_;
+  std::shared_ptr<LivingMap> map_;
   mutable std::mutex mutex_;
   std::shared_ptr<const SceneSnapshot> current_;
   std::vector<std::weak_ptr<Listener>> listeners_;

@@ -14,6 +14,7 @@ void TileSlot::forget_held() {
   held_revision = 0;
   held_name = 0;
   held_vertex_count = 0;
+  held_child_mask = 0;
   held_bytes = 0;
   held_geometry_epoch = 0;
   held_colour_epoch = 0;
@@ -34,6 +35,7 @@ void ViewerTiles::adopt(const SceneSnapshot& scene) {
       } else {
         slot->held_revision = known->second->held_revision;
         slot->held_name = known->second->held_name;
+        slot->held_child_mask = known->second->held_child_mask;
         slot->held_bytes = known->second->held_bytes;
         abandon(*known->second);
       }
@@ -77,6 +79,7 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   prepared_bytes_ -= slot.geometry->payload->size();
   slot.held_name = name;
   slot.held_revision = slot.geometry->revision;
+  slot.held_child_mask = slot.tile->child_mask;
   slot.held_bytes = decoded_bytes(*slot.tile);
   slot.held_geometry_epoch = geometry_epoch;
   slot.held_colour_epoch = 0;
@@ -97,7 +100,10 @@ bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const
       (slot.has_colours(demand) || slot.failed_colour_epoch == demand.colour_epoch)) {
     return true;
   }
-  return !slot.is_target && !slot.is_preview && slot.is_drawable() && are_children_drawable(slot);
+  if (slot.is_target) return false;
+  if (!slot.is_preview && slot.is_drawable() && are_children_drawable(slot)) return true;
+  const bool is_of_before = slot.held_name != 0 && slot.held_geometry_epoch == 0;
+  return is_of_before && slot.held_child_mask == slot.tile->child_mask && is_covered(slot, demand);
 }
 
 bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
@@ -134,6 +140,7 @@ bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Dem
   if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
   slot.held_revision = revision;
   slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+  slot.held_child_mask = slot.tile->child_mask;
   slot.held_bytes = decoded_bytes(*slot.tile);
   slot.held_geometry_epoch = demand.geometry_epoch;
   slot.held_colour_epoch = Demand::kEarlierColourEpoch;

@@ -41,6 +41,7 @@ struct TileSlot {
   std::uint32_t held_revision = 0;
   std::uint32_t held_name = 0;
   std::uint32_t held_vertex_count = 0;
+  std::uint8_t held_child_mask = 0;
   std::uint64_t held_bytes = 0;  ///< Decoded.
   std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
@@ -85,7 +86,8 @@ class ViewerTiles {
   /// Bytes of all frames that are Ready and not given out.
   std::size_t prepared_bytes() const { return prepared_bytes_; }
 
-  /// True when nothing is to be sent of the tile: it is as demanded, cannot be encoded, or is replaced by its children.
+  /// True when nothing is to be sent of the tile: it is as demanded, cannot be encoded, or is replaced by its children. What a
+  /// viewer has of an earlier scene is good enough to be hidden behind them.
   bool is_satisfied(const TileSlot& slot, const Demand& demand) const;
 
   /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume().

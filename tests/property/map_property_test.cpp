@@ -166,6 +166,18 @@ void expect_promises(const SceneSnapshot& scene) {
   }
 }
 
+/// Every tile is in the mask of the one above it, and the other way round: a viewer replaces a tile by all of its children.
+void expect_all_are_there(const SceneSnapshot& scene) {
+  std::set<TileId> ids;
+  for (const auto& tile : scene.tiles()) ids.insert(tile->id);
+  for (const auto& tile : scene.tiles()) {
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      RC_ASSERT(ids.contains(child_of(tile->id, octant)) == ((tile->child_mask >> octant & 1) != 0));
+    }
+    RC_ASSERT((tile->child_mask == 0) == (tile->geometric_error_m == 0));
+  }
+}
+
 RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
   WorkerPool pool(2);
   const LivingMap::Options options{.leaf_vertex_count = kLeafSize, .first_level = 6};
@@ -173,6 +185,7 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
   std::map<std::string, Patch> in_it;
   const int steps = *rc::gen::inRange(1, 9);
   std::shared_ptr<const SceneSnapshot> scene;
+  std::uint32_t revision = 0;
   for (int step = 0; step < steps; ++step) {
     MapChange change;
     std::set<std::string> named;
@@ -195,10 +208,25 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
         sum += static_cast<std::uint64_t>(patch.side * patch.side + patch.lone_count);
       return sum;
     }();
-    scene = map.apply(std::move(change), static_cast<std::uint32_t>(step + 1), pool);
+    scene = map.apply(std::move(change), ++revision, pool);
     RC_ASSERT(scene->vertex_count() == expected);
-    expect_promises(*scene);
+    expect_all_are_there(*scene);
+    // Coarse tiles follow, while the map may change again.
+    const int followed = *rc::gen::inRange(0, 12);
+    for (int i = 0; i < followed; ++i) {
+      auto work = map.next_coarse();
+      if (!work) break;
+      work->run();
+      scene = map.take_coarse(*work, ++revision);
+      expect_all_are_there(*scene);
+    }
+    if (!map.is_behind()) expect_promises(*scene);
   }
+  while (auto work = map.next_coarse()) {
+    work->run();
+    scene = map.take_coarse(*work, ++revision);
+  }
+  expect_promises(*scene);
   if (!map.constants()) return;
   LivingMap at_once(options, map.constants());
   MapChange all;

@@ -43,6 +43,16 @@ class LivingMapTest : public ::testing::Test {
     return apply(std::move(blocks));
   }
 
+  /// With all coarse tiles; there are some to be made.
+  std::shared_ptr<const SceneSnapshot> completed() {
+    std::shared_ptr<const SceneSnapshot> scene;
+    while (auto work = map_.next_coarse()) {
+      work->run();
+      scene = map_.take_coarse(*work, ++revision_);
+    }
+    return scene;
+  }
+
   WorkerPool pool_{2};
   LivingMap map_{kOptions};
   std::uint32_t revision_ = 0;
@@ -71,6 +81,44 @@ TEST_F(LivingMapTest, SharesTilesThatAreTheSameWithTheVersionBefore) {
   }
   EXPECT_GT(same, after->tiles().size() / 2);
   EXPECT_LT(same, after->tiles().size());
+}
+
+TEST_F(LivingMapTest, CoarseTilesFollowAfterTheLeaves) {
+  LivingMap other(kOptions);
+  std::vector<BlockPut> only;
+  only.push_back(put("whole", terrain(1, 0)));
+  other.apply({.put = std::move(only), .removed = {}}, 1, pool_);
+  EXPECT_FALSE(other.is_behind()) << "what is built at once is complete";
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    blocks.push_back(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
+  }
+  apply(std::move(blocks));
+  const auto before = completed();
+  const auto at_once = apply(put("b0", terrain(0, 0, 0.5F)));
+  EXPECT_TRUE(map_.is_behind());
+  std::size_t changed_leaves = 0;
+  for (const auto& tile : at_once->tiles()) {
+    const bool is_same = std::ranges::count(before->tiles(), tile) > 0;
+    EXPECT_TRUE(is_same || tile->child_mask == 0) << "a coarse tile takes time";
+    if (!is_same) ++changed_leaves;
+  }
+  EXPECT_GT(changed_leaves, 0U);
+
+  // What changes while a tile is being made is shown in the next round.
+  auto work = map_.next_coarse();
+  ASSERT_TRUE(work);
+  EXPECT_GT(work->from()->id.level, before->tiles().front()->id.level) << "fine before coarse";
+  apply(put("b0", terrain(0, 0, 1)));
+  work->run();
+  map_.take_coarse(*work, ++revision_);
+  EXPECT_TRUE(map_.is_behind());
+  const auto complete = completed();
+  EXPECT_FALSE(map_.is_behind());
+  for (const auto& tile : complete->tiles()) {
+    EXPECT_EQ(tile->child_mask == 0, tile->geometric_error_m == 0);
+  }
+  EXPECT_NE(complete->tiles()[0], before->tiles()[0]);
 }
 
 TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {

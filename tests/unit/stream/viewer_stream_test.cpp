@@ -223,6 +223,38 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
   expect_picture(viewer, *next, 0.3);
 }
 
+TEST_F(ViewerStreamTest, ACoarseTileThatNobodySeesIsNotSentAgain) {
+  std::vector<std::shared_ptr<const Tile>> tiles = testing::quadtree_tiles(3, 12);
+  const auto first = scene_of(tiles);
+  TestViewer viewer(first, cache_, pool_);
+  viewer.stream().subscribe({});
+  viewer.stream().set_plan(plan_with_alpha(*first, 0.3));
+  viewer.complete();
+  const std::size_t frame_count = viewer.frames.size();
+
+  const auto another = [&](auto change) {
+    auto tile = std::make_shared<Tile>(*tiles[0]);
+    change(*tile);
+    tiles[0] = tile;
+    return scene_of(tiles, first->revision() + 1);
+  };
+  viewer.stream().set_scene(another([](Tile& tile) { tile.positions[0].z += 1; }));
+  EXPECT_EQ(viewer.complete().scene_revision, 2U);
+  EXPECT_EQ(viewer.frames.size(), frame_count) << "its children are drawn in its place";
+
+  // From far away it is what is drawn.
+  viewer.stream().set_camera({.eye = {2, 2, 5000}, .target = {2, 2, 0}, .up = {0, 1, 0}});
+  viewer.complete();
+  ASSERT_EQ(viewer.frames.size(), frame_count + 2);
+  EXPECT_EQ(viewer.frames.back().tile, tiles[0]->id);
+
+  // A viewer has to know which children take its place.
+  viewer.stream().set_camera({.eye = {2, 2, 1}, .target = {2, 2, 0}, .up = {0, 1, 0}});
+  viewer.stream().set_scene(another([](Tile& tile) { tile.child_mask ^= 0x80; }));
+  viewer.complete();
+  EXPECT_EQ(viewer.frames.size(), frame_count + 4);
+}
+
 TEST_F(ViewerStreamTest, AnEmptySceneIsComplete) {
   const auto empty = scene_of({});
   TestViewer viewer(empty, cache_, pool_);
