@@ -75,8 +75,9 @@ void put_in_order(std::vector<Element>& elements, const Pieces& pieces, const Bl
   };
   std::vector<Key> keys;
   keys.reserve(elements.size());
+  PieceCursor piece_of(pieces);
   for (const Element& element : elements) {
-    const Piece& its = pieces[element.piece];
+    const Piece& its = piece_of(element);
     const std::uint32_t source =
         element.is_lone_vertex() ? its.source_of_vertex(element.index) : its.source_of_triangle(element.index);
     keys.push_back({&names.at(block_of(its, element)), element.is_lone_vertex(), source, element});
@@ -183,18 +184,10 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   const auto key_of = [](const Piece& its, std::uint32_t v) {
     return std::uint64_t{its.block_of_vertex(v)} << 32 | its.source_of_vertex(v);
   };
-  std::uint32_t last_number = 0xffffffffu;
-  const Piece* last = nullptr;
-  const auto piece_at = [&](const Element& element) -> const Piece& {
-    if (element.piece != last_number) {
-      last_number = element.piece;
-      last = &pieces[element.piece];
-    }
-    return *last;
-  };
+  PieceCursor piece_of(pieces);
   for (const Element& element : elements) {
     if (element.is_lone_vertex()) continue;
-    const Piece& its = piece_at(element);
+    const Piece& its = piece_of(element);
     for (unsigned corner = 0; corner < 3; ++corner) {
       if ((element.owned_corners >> corner & 1) == 0) continue;
       const std::uint32_t v = its.triangles[element.index][corner];
@@ -204,14 +197,14 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   }
   const std::size_t referenced_count = vertices.size();
   for (const Element& element : elements) {
-    if (element.is_lone_vertex()) vertices.push_back({&piece_at(element), element.index});
+    if (element.is_lone_vertex()) vertices.push_back({&piece_of(element), element.index});
   }
   tile->owned_count = static_cast<std::uint32_t>(vertices.size());
   tile->triangles.reserve(content.triangle_count);
   tile->source_triangle.reserve(content.triangle_count);
   for (const Element& element : elements) {
     if (element.is_lone_vertex()) continue;
-    const Piece& its = piece_at(element);
+    const Piece& its = piece_of(element);
     Triangle triangle{};
     for (unsigned corner = 0; corner < 3; ++corner) {
       const std::uint32_t v = its.triangles[element.index][corner];

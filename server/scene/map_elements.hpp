@@ -71,6 +71,25 @@ struct Element {
   }
 };
 
+/// Gives the pieces of elements one after the other; neighbours in a list mostly have the same.
+class PieceCursor {
+ public:
+  explicit PieceCursor(const Pieces& pieces) : pieces_(pieces) {}
+
+  const Piece& operator()(const Element& element) {
+    if (last_ == nullptr || element.piece != last_number_) {
+      last_number_ = element.piece;
+      last_ = &pieces_[last_number_];
+    }
+    return *last_;
+  }
+
+ private:
+  const Pieces& pieces_;
+  std::uint32_t last_number_ = 0;
+  const Piece* last_ = nullptr;
+};
+
 BlockNumber block_of(const Piece& piece, const Element& element);
 CellContent content_of(std::span<const Element> elements);
 /// Of their places.

@@ -127,8 +127,9 @@ class TreeChange {
     collect_touched(root, leaves);
     std::vector<TouchedLeaf> parts(leaves.size());
     pool.for_each(leaves.size(), [&](std::size_t i) {
+      PieceCursor piece_of(pieces_);
       for (const Element& element : elements_of_leaf(*leaves[i])) {
-        const bool goes = is_removed(block_of(pieces_[element.piece], element));
+        const bool goes = is_removed(block_of(piece_of(element), element));
         (goes ? parts[i].removed : parts[i].kept).push_back(element);
       }
     });

@@ -224,27 +224,33 @@ class Pieces {
 
 namespace {
 
-/// The box of some vertices, as they are and as they are rounded.
-struct Extent {
+/// Where the ends of the box of some vertices are, as they are and as they are rounded; those at the upper end negative, so that
+/// every number is a least one.
+struct Ends {
   static constexpr float kFar = std::numeric_limits<float>::infinity();
-  std::array<float, 3> low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
-  std::array<float, 3> rounded_low{low}, rounded_high{high};
+  std::array<float, 12> least{kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar};
 
-  void add(const std::array<float, 3>& place, const std::array<float, 3>& rounded) {
-    join({place, place, rounded, rounded});
-  }
-  void join(const Extent& other) {
+  Ends() = default;
+  Ends(const std::array<float, 3>& place, const std::array<float, 3>& rounded) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], other.low[axis]);
-      high[axis] = std::max(high[axis], other.high[axis]);
-      rounded_low[axis] = std::min(rounded_low[axis], other.rounded_low[axis]);
-      rounded_high[axis] = std::max(rounded_high[axis], other.rounded_high[axis]);
+      least[axis] = place[axis];
+      least[3 + axis] = rounded[axis];
+      least[6 + axis] = -place[axis];
+      least[9 + axis] = -rounded[axis];
     }
   }
+  float low(std::size_t axis) const { return least[axis]; }
+  float high(std::size_t axis) const { return -least[6 + axis]; }
+  float rounded_low(std::size_t axis) const { return least[3 + axis]; }
+  float rounded_high(std::size_t axis) const { return -least[9 + axis]; }
+
+  void join(const Ends& other) {
+    for (std::size_t i = 0; i < least.size(); ++i) least[i] = std::min(least[i], other.least[i]);
+  }
   /// Whether a side changes by more than is left to it.
-  bool is_off() const {
+  bool are_off() const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float side = high[axis] - low[axis], rounded_side = rounded_high[axis] - rounded_low[axis];
+      const float side = high(axis) - low(axis), rounded_side = rounded_high(axis) - rounded_low(axis);
       if (std::abs(rounded_side - side) > static_cast<float>(kMostSideChange) * side) return true;
     }
     return false;
@@ -258,6 +264,7 @@ struct PositionSteps::Neighbourhood {
   std::array<float, 3> corner{};
   std::vector<std::uint32_t> points;
   std::vector<std::array<float, 3>> place, rounded;
+  std::vector<Ends> ends;       ///< Of each alone.
   std::vector<float> distance;  ///< To a vertex of the cell, squared.
   std::vector<std::uint32_t> near, ball;
   std::vector<float> near_distance;
@@ -265,6 +272,7 @@ struct PositionSteps::Neighbourhood {
   void resize(std::size_t count) {
     place.resize(count);
     rounded.resize(count);
+    ends.resize(count);
     distance.resize(count);
     near.resize(count);
     ball.resize(count);
@@ -472,7 +480,7 @@ void PositionSteps::cut(WorkerPool& pool) {
 }
 
 void PositionSteps::ask_cells(WorkerPool& pool) {
-  constexpr std::size_t kChunk = 4096;
+  constexpr std::size_t kChunk = 64;
   const auto step_m = static_cast<double>(largest_step_m_);
   pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     std::vector<Vec3f> positions;
@@ -566,7 +574,7 @@ void PositionSteps::for_each_cell(const std::array<double, 3>& low, const std::a
 }
 
 void PositionSteps::ask_neighbours(WorkerPool& pool) {
-  constexpr std::size_t kChunk = 4096;
+  constexpr std::size_t kChunk = 64;
   for (Cell& cell : cells_) cell.halvings = finer(cell.halvings, cell.own);
   pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
@@ -611,7 +619,7 @@ void PositionSteps::limit_to_one_tile() {
 }
 
 void PositionSteps::keep_sides(WorkerPool& pool) {
-  constexpr std::size_t kChunk = 256;
+  constexpr std::size_t kChunk = 16;
   const auto step_m = static_cast<double>(largest_step_m_);
   halvings_.resize(points_.size());
   std::vector<std::uint32_t> thin;  // Cells with a side of few steps.
@@ -662,15 +670,18 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
   if (!is_any_changed) return;
   const std::size_t count = around.points.size();
   around.resize(count);
+  std::array<double, kMostHalvings + 1> steps_m{};
+  for (std::size_t h = 0; h < steps_m.size(); ++h) steps_m[h] = std::ldexp(step_m, -static_cast<int>(h));
   for (std::size_t n = 0; n < count; ++n) {
     const std::uint32_t point = around.points[n];
     const auto p = coordinates(points_[point].position);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double step = std::ldexp(step_m, -halvings_[point][axis]);
+      const double step = steps_m[halvings_[point][axis]];
       around.place[n][axis] = static_cast<float>(double{p[axis]} - double{around.corner[axis]});
       around.rounded[n][axis] =
           static_cast<float>(std::floor(double{p[axis]} / step + 0.5) * step - double{around.corner[axis]});
     }
+    around.ends[n] = Ends(around.place[n], around.rounded[n]);
   }
   constexpr float kEverywhere = std::numeric_limits<float>::infinity();
   float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
@@ -691,20 +702,22 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
     near_count = around.gather(radius * kLargestBall);
     // What each ring between a ball and the next larger one adds to it.
     const float ring_width = radius * (kLargestBall - 1) / kRings;
-    std::array<Extent, kRings + 1> rings{};
+    std::array<Ends, kRings + 1> rings;
     for (std::size_t n = 0; n < near_count; ++n) {
       const std::uint32_t point = around.near[n];
       const float beyond = (around.distance[point] - radius) / ring_width;
-      // Where floats end it is no number.
-      const std::size_t ring = around.distance[point] <= radius ? 0
-                               : beyond < kRings                ? static_cast<std::size_t>(std::ceil(beyond))
-                                                                : kRings;
-      rings[ring].add(around.place[point], around.rounded[point]);
+      std::size_t ring = 0;
+      if (!(around.distance[point] <= radius)) {
+        // Where floats end it is no number.
+        ring = beyond < kRings ? static_cast<std::size_t>(beyond) : kRings;
+        if (static_cast<float>(ring) < beyond && ring < kRings) ++ring;
+      }
+      rings[ring].join(around.ends[point]);
     }
-    Extent ball;
+    Ends ball;
     for (std::size_t ring = 0; ring <= kRings; ++ring) {
       ball.join(rings[ring]);
-      if (!ball.is_off()) continue;
+      if (!ball.are_off()) continue;
       const float ball_radius = radius + static_cast<float>(ring) * ring_width;
       std::size_t kept = 0;
       for (std::size_t n = 0; n < near_count; ++n) {
@@ -719,12 +732,16 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
 void PositionSteps::keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
                                   std::vector<StepHalvings>& wanted) {
   constexpr auto kMost = static_cast<float>(kMostSideChange);
-  Extent extent;
-  for (const std::uint32_t n : ball) extent.add(around.place[n], around.rounded[n]);
-  const auto& [low, high, rounded_low, rounded_high] = extent;
+  Ends ends;
+  for (const std::uint32_t n : ball) ends.join(around.ends[n]);
+  std::array<float, 3> low{}, high{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = ends.low(axis);
+    high[axis] = ends.high(axis);
+  }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float side = high[axis] - low[axis];
-    const float at_low = low[axis] - rounded_low[axis], at_high = rounded_high[axis] - high[axis];
+    const float at_low = low[axis] - ends.rounded_low(axis), at_high = ends.rounded_high(axis) - high[axis];
     if (std::abs(at_low + at_high) <= kMost * side) continue;
     const auto absolute = [&](const std::array<float, 3>& p) {
       return Vec3f{p[0] + around.corner[0], p[1] + around.corner[1], p[2] + around.corner[2]};

@@ -9,7 +9,7 @@ import { patch } from "../../integration/node/patch.mjs";
 import { isColours, SpectraClient } from "../../integration/node/spectra_client.mjs";
 import { binary, serve } from "../../integration/node/spectra_server.mjs";
 
-const ROUNDS = 20;
+const ROUNDS = Number(process.env.ROUNDS ?? 20);
 const scratch = mkdtempSync(path.join(tmpdir(), "spectra-update-"));
 const scenes = process.argv.slice(2);
 if (scenes.length === 0) {

@@ -1,0 +1,123 @@
+// What it costs the processor to put a block of 10,000 vertices into the middle of a demo scene, for scenes of several sizes: until its leaves
+// are published, and until the coarse tiles above have followed.
+//   update_bench [--rounds N] [VERTICES ...]     (without: 100,000, 1,000,000 and 10,000,000; the last takes minutes)
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fusion/mesh/demo_scene.hpp"
+#include "server/scene/living_map.hpp"
+
+namespace {
+
+using namespace spectra;
+using namespace spectra::server;
+
+double cpu_ms() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto ms = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_usec) / 1e3;
+  };
+  return ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// A bumpy patch of 10,000 vertices, `extent` metres wide around `middle`.
+BlockPut patch(const fusion::Vec3f& middle, float extent, float celsius) {
+  constexpr std::uint32_t kSide = 100;
+  BlockPut put{.id = "patch", .scene = {}, .observed_at = {}};
+  fusion::MultispectralMesh& mesh = put.scene.mesh;
+  mesh.resize_vertices(std::size_t{kSide} * kSide);
+  mesh.has_visible = mesh.has_temperature = true;
+  for (std::uint32_t v = 0; v < kSide * kSide; ++v) {
+    const float x = static_cast<float>(v % kSide) / kSide - 0.5F, z = static_cast<float>(v / kSide) / kSide - 0.5F;
+    mesh.positions()[v] = {middle.x + extent * x, middle.y + extent * 0.05F * std::sin(9 * x) * std::cos(7 * z),
+                           middle.z + extent * z};
+    mesh.visible()[v] = {static_cast<std::uint8_t>(v % 251), 90, 120};
+    mesh.temperature_celsius()[v] = celsius + std::sin(static_cast<float>(v));
+  }
+  for (std::uint32_t row = 0; row + 1 < kSide; ++row) {
+    for (std::uint32_t column = 0; column + 1 < kSide; ++column) {
+      const std::uint32_t a = row * kSide + column;
+      mesh.triangles().push_back({a, a + 1, a + kSide});
+      mesh.triangles().push_back({a + 1, a + kSide + 1, a + kSide});
+    }
+  }
+  return put;
+}
+
+struct Cost {
+  double leaves_ms = 0, coarse_ms = 0;
+};
+
+Cost cost_of(std::uint64_t vertex_count, int rounds) {
+  WorkerPool pool(2);
+  LivingMap map({.levels = LevelsOfDetail::All, .first_level = 12});
+  std::uint32_t revision = 0;
+  std::vector<BlockPut> whole(1);
+  whole[0].id = "scene";
+  whole[0].scene.mesh = fusion::demo_scene({.vertex_count = vertex_count});
+  map.apply({.put = std::move(whole), .removed = {}}, ++revision, pool);
+  std::vector<double> leaves, coarse;
+  std::size_t tile_count = 0, coarse_count = 0;
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<BlockPut> block;
+    block.push_back(patch({0, 1.2F, 0.5F}, 0.3F, 24 + static_cast<float>(round % 5)));
+    const double before = cpu_ms();
+    tile_count = map.apply({.put = std::move(block), .removed = {}}, ++revision, pool)->tiles().size();
+    const double between = cpu_ms();
+    coarse_count = 0;
+    while (auto work = map.next_coarse()) {
+      work->run();
+      map.take_coarse(*work, ++revision);
+      ++coarse_count;
+    }
+    if (round == 0) continue;  // It is put, not replaced.
+    leaves.push_back(between - before);
+    coarse.push_back(cpu_ms() - between);
+  }
+  const Cost cost{median(leaves), median(coarse)};
+  std::printf("%9llu vertices, %4zu tiles: leaves %6.1f ms, %zu coarse tiles %7.1f ms\n",
+              static_cast<unsigned long long>(vertex_count), tile_count, cost.leaves_ms, coarse_count, cost.coarse_ms);
+  std::fflush(stdout);
+  return cost;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int rounds = 21;
+  std::vector<std::uint64_t> counts;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--rounds" && i + 1 < argc) {
+      rounds = std::max(2, std::atoi(argv[++i]));
+    } else {
+      counts.push_back(std::strtoull(argv[i], nullptr, 10));
+    }
+  }
+  if (counts.empty()) counts = {100'000, 1'000'000, 10'000'000};
+  std::vector<double> leaves, all;
+  for (const std::uint64_t count : counts) {
+    const Cost cost = cost_of(count, rounds);
+    leaves.push_back(cost.leaves_ms);
+    all.push_back(cost.leaves_ms + cost.coarse_ms);
+  }
+  const auto ratio = [](const std::vector<double>& values) {
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    return *most / *least;
+  };
+  std::printf("largest / smallest: until the leaves are published %.2f, with all coarse tiles %.2f\n", ratio(leaves), ratio(all));
+}
