@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -24,6 +25,8 @@ namespace {
 constexpr const char* kConstantsKey = "map";
 /// Fusing and encoding for viewers get ten times as much of a processor as coarse tiles.
 constexpr int kCoarseNiceness = 10;
+/// After so long without any the memory for making them is given back.
+constexpr std::chrono::seconds kCoarseRest{2};
 
 /// Bytes as a file that only this process sees.
 class MemoryFile {
@@ -336,7 +339,13 @@ void MapKeeper::make_coarse() {
   for (;;) {
     {
       std::unique_lock lock(mutex_);
-      has_coarse_work_.wait(lock, [this] { return is_ending_ || is_behind_; });
+      const auto is_called = [this] { return is_ending_ || is_behind_; };
+      if (!has_coarse_work_.wait_for(lock, kCoarseRest, is_called)) {
+        lock.unlock();
+        served_.scenes.rest();
+        lock.lock();
+        has_coarse_work_.wait(lock, is_called);
+      }
       if (is_ending_) return;
       is_behind_ = false;
     }

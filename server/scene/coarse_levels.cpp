@@ -109,12 +109,16 @@ void take_tile_of_before(MapNode& node, const MapNode& before) {
 }  // namespace
 
 CoarseWork::CoarseWork(std::shared_ptr<const MapNode> from, bool is_top, std::shared_ptr<const BorderIndex> borders,
-                       const CoarseOptions& options)
-    : from_(std::move(from)), is_top_(is_top), borders_(std::move(borders)), options_(options) {}
+                       const CoarseOptions& options, std::shared_ptr<SimplifyMemory> memory)
+    : from_(std::move(from)),
+      is_top_(is_top),
+      borders_(std::move(borders)),
+      options_(options),
+      memory_(std::move(memory)) {}
 
 void CoarseWork::run() {
   made_ = std::make_shared<MapNode>(*from_);
-  make_coarse_tile(*made_, is_top_, *borders_, options_);
+  make_coarse_tile(*made_, is_top_, *borders_, options_, *memory_);
 }
 
 CoarseOptions CoarseLevels::coarse_options(const MapNode& root, const Options& options) const {
@@ -226,7 +230,7 @@ void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapN
   for (auto level = by_level.rbegin(); level != by_level.rend(); ++level) {
     pool.for_each(level->size(), [&](std::size_t i) {
       MapNode& node = *(*level)[i];
-      make_coarse_tile(node, node.id == top->id, *borders_, coarse);
+      make_coarse_tile(node, node.id == top->id, *borders_, coarse, *memory_);
       fusion::report(progress, kTilingPhase, static_cast<double>(++made_count) / static_cast<double>(count));
     });
     for (const MapNode* node : *level) {
@@ -236,6 +240,7 @@ void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapN
       if (is_outdated) outdated_.insert(node->id);
     }
   }
+  if (outdated_.empty()) memory_->clear();
 }
 
 std::optional<CoarseWork> CoarseLevels::next(const std::shared_ptr<const MapNode>& root, const Options& options) {
@@ -246,7 +251,7 @@ std::optional<CoarseWork> CoarseLevels::next(const std::shared_ptr<const MapNode
     round_.erase(id);
     auto node = node_at(root, id);
     if (node && !node->is_leaf() && id.level >= top->id.level) {
-      return CoarseWork(node, node == top, borders_, coarse_options(*root, options));
+      return CoarseWork(node, node == top, borders_, coarse_options(*root, options), memory_);
     }
     outdated_.erase(id);
   }

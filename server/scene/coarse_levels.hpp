@@ -18,7 +18,7 @@ namespace spectra::server {
 class CoarseWork {
  public:
   CoarseWork(std::shared_ptr<const MapNode> from, bool is_top, std::shared_ptr<const BorderIndex> borders,
-             const CoarseOptions& options);
+             const CoarseOptions& options, std::shared_ptr<SimplifyMemory> memory);
 
   /// Makes the tile; from any thread, while the map goes on.
   void run();
@@ -33,6 +33,7 @@ class CoarseWork {
   bool is_top_;
   std::shared_ptr<const BorderIndex> borders_;
   CoarseOptions options_;
+  std::shared_ptr<SimplifyMemory> memory_;
 };
 
 /// Keeps the tiles above the leaves of a map that changes. Right after a change a coarse tile may still be the one of before: what has
@@ -55,6 +56,8 @@ class CoarseLevels {
   std::optional<CoarseWork> next(const std::shared_ptr<const MapNode>& root, const Options& options);
   /// The tree with the tile that was made; the same tree when that cell is not what it was any more.
   std::shared_ptr<const MapNode> taken(const std::shared_ptr<const MapNode>& root, const CoarseWork& work);
+  /// Gives back the memory that is kept for the next tile.
+  void rest() { memory_->clear(); }
 
  private:
   std::set<protocol::TileId> update_borders(const ChangedTree& changed, WorkerPool& pool);
@@ -62,6 +65,7 @@ class CoarseLevels {
   CoarseOptions coarse_options(const MapNode& root, const Options& options) const;
 
   const std::shared_ptr<BorderIndex> borders_ = std::make_shared<BorderIndex>();
+  const std::shared_ptr<SimplifyMemory> memory_ = std::make_shared<SimplifyMemory>();
   float median_celsius_ = std::numeric_limits<float>::quiet_NaN();
   double span_celsius_ = 1;
   std::uint64_t spread_vertex_count_ = 0;  ///< So many vertices the map had when the last two were found.

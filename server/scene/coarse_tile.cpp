@@ -252,7 +252,8 @@ std::vector<Vec3f> open_positions(const Tile& leaf) {
   return result;
 }
 
-void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options) {
+void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options,
+                      SimplifyMemory& memory) {
   std::vector<Child> children;
   for (const MapNode::Branch& branch : node.branches) {
     const auto& below = branch.node->tile;
@@ -279,7 +280,7 @@ void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, co
   const ThinningOptions thinning_options{.wanted_count = wanted_count, .span_celsius = options.span_celsius};
   const Surface fine(mesh.positions, mesh.triangles);
   Thinning thinning = options.is_point_cloud ? thinned_points(mesh, is_locked, thinning_options)
-                                             : thinned_surface(mesh, fine, is_locked, thinning_options);
+                                             : thinned_surface(mesh, fine, is_locked, thinning_options, memory);
   show(*tile, mesh, thinning, is_locked, options.median_celsius);
   tile->owned_count = static_cast<std::uint32_t>(tile->positions.size());
   node.samples = measure(*tile, children, mesh, fine, thinning, options);

@@ -6,6 +6,7 @@
 #include "server/scene/border_index.hpp"
 #include "server/scene/map_tree.hpp"
 #include "server/scene/scene_snapshot.hpp"
+#include "server/scene/simplify.hpp"
 
 namespace spectra::server {
 
@@ -32,7 +33,8 @@ struct CoarseOptions {
 ///
 /// geometric_error_m bounds the distance between tile and full mesh, both ways: the largest one measured against the
 /// children, with a margin, on top of the children's own. Thread-safe for different nodes while `borders` does not change.
-void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options);
+void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options,
+                      SimplifyMemory& memory);
 
 /// The positions on open edges of a leaf, as its welded surface has them.
 std::vector<fusion::Vec3f> open_positions(const Tile& leaf);

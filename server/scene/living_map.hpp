@@ -85,6 +85,8 @@ class LivingMap {
   std::optional<CoarseWork> next_coarse();
   /// The next version, with a tile that was made. The map may have changed meanwhile.
   std::shared_ptr<const SceneSnapshot> take_coarse(const CoarseWork& work, std::uint32_t revision);
+  /// Nothing more is expected for a while: gives back the memory that is kept for the next tile.
+  void rest() { coarse_.rest(); }
 
  private:
   std::shared_ptr<const SceneSnapshot> snapshot(std::uint32_t revision);

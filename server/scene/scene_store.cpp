@@ -54,6 +54,11 @@ bool SceneStore::make_coarse() {
   return true;
 }
 
+void SceneStore::rest() {
+  const std::lock_guard replacing(replace_mutex_);
+  if (map_) map_->rest();
+}
+
 void SceneStore::begin(const MapConstants& constants) {
   const std::lock_guard replacing(replace_mutex_);
   map_ = std::make_shared<LivingMap>(live_options(), constants);

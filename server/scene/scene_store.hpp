@@ -55,6 +55,8 @@ class SceneStore {
   /// Makes one of the coarse tiles that do not show yet what has changed beneath them, beside all changes, and publishes the map with
   /// it. False when there is none. One thread at a time.
   bool make_coarse();
+  /// See LivingMap::rest().
+  void rest();
 
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);

@@ -66,8 +66,7 @@ struct Quadric {
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
   Vector linear;
   double constant = 0;
-  std::array<Vector, kAttributes> gradient{};
-  std::array<double, kAttributes> offset{};
+  std::array<double, kAttributes> gradient_x{}, gradient_y{}, gradient_z{}, offset{};
   double colour_weight = 0, temperature_weight = 0;
   double area = 0;
 
@@ -86,7 +85,9 @@ struct Quadric {
   /// The square of (g p + d - attribute), times `weight`; the weights are counted by the caller.
   void add_field(std::size_t attribute, const Vector& g, double d, double weight) {
     add_plane(g, d, weight);
-    gradient[attribute] = gradient[attribute] + weight * g;
+    gradient_x[attribute] += weight * g.x;
+    gradient_y[attribute] += weight * g.y;
+    gradient_z[attribute] += weight * g.z;
     offset[attribute] += weight * d;
   }
 
@@ -100,7 +101,9 @@ struct Quadric {
     linear = linear + other.linear;
     constant += other.constant;
     for (std::size_t j = 0; j < kAttributes; ++j) {
-      gradient[j] = gradient[j] + other.gradient[j];
+      gradient_x[j] += other.gradient_x[j];
+      gradient_y[j] += other.gradient_y[j];
+      gradient_z[j] += other.gradient_z[j];
       offset[j] += other.offset[j];
     }
     colour_weight += other.colour_weight;
@@ -116,19 +119,25 @@ struct Quadric {
     const Vector& p = s.position;
     double sum = constant + 2 * dot(linear, p) + xx * p.x * p.x + yy * p.y * p.y + zz * p.z * p.z +
                  2 * (xy * p.x * p.y + xz * p.x * p.z + yz * p.y * p.z);
+    std::array<double, kAttributes> fields;
+    for (std::size_t j = 0; j < kAttributes; ++j) fields[j] = field(j, p);
     for (std::size_t j = 0; j < kAttributes; ++j) {
       // Where the point has no temperature nothing is known of its difference: the fields' own best is taken.
       const double weight = weight_of(j);
-      const double field = dot(gradient[j], p) + offset[j];
-      const double value = j != kTemperature || s.has_temperature ? s.attribute[j] : weight > 0 ? field / weight : 0;
-      sum += value * (weight * value - 2 * field);
+      const double value = j != kTemperature || s.has_temperature ? s.attribute[j]
+                           : weight > 0                           ? fields[j] / weight
+                                                                  : 0;
+      sum += value * (weight * value - 2 * fields[j]);
     }
     return sum;
   }
 
   /// The attribute that makes the sum least at a place.
-  double best(std::size_t attribute, const Vector& p) const {
-    return (dot(gradient[attribute], p) + offset[attribute]) / weight_of(attribute);
+  double best(std::size_t attribute, const Vector& p) const { return field(attribute, p) / weight_of(attribute); }
+
+  /// What the fields say of an attribute at a place, times its weight.
+  double field(std::size_t attribute, const Vector& p) const {
+    return gradient_x[attribute] * p.x + gradient_y[attribute] * p.y + gradient_z[attribute] * p.z + offset[attribute];
   }
 };
 
@@ -142,18 +151,44 @@ struct Range {
   }
 };
 
+}  // namespace
+
+struct SimplifyArrays::State {
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> head, tail, next;
+  std::vector<Sight> sights;
+  std::vector<std::array<Range, 3>> colour_range;
+  std::vector<Range> temperature_range;
+  std::vector<Quadric> quadrics;
+};
+
+namespace {
+
 class Simplifier {
  public:
-  Simplifier(const SimplifyInput& input, std::size_t wanted_count)
+  Simplifier(const SimplifyInput& input, std::size_t wanted_count, SimplifyArrays::State& arrays)
       : input_(input),
         wanted_count_(wanted_count),
-        triangles_(input.surface.triangles().begin(), input.surface.triangles().end()),
-        is_alive_(triangles_.size(), true),
-        head_(input.surface.positions().size(), kNone),
-        tail_(head_.size(), kNone),
-        next_(3 * triangles_.size(), kNone),
-        standing_(head_.size()),
-        marked_in_(head_.size()) {
+        triangles_(arrays.triangles),
+        is_alive_(input.surface.triangles().size(), true),
+        head_(arrays.head),
+        tail_(arrays.tail),
+        next_(arrays.next),
+        standing_(input.surface.positions().size()),
+        marked_in_(standing_.size()),
+        seen_in_(standing_.size()),
+        sights_(arrays.sights),
+        colour_range_(arrays.colour_range),
+        temperature_range_(arrays.temperature_range),
+        quadrics_(arrays.quadrics) {
+    triangles_.assign(input.surface.triangles().begin(), input.surface.triangles().end());
+    head_.assign(standing_.size(), kNone);
+    tail_.assign(standing_.size(), kNone);
+    next_.assign(3 * triangles_.size(), kNone);
+    sights_.clear();
+    colour_range_.clear();
+    temperature_range_.clear();
+    quadrics_.clear();
     std::iota(standing_.begin(), standing_.end(), 0u);
     for (std::uint32_t corner = 0; corner < next_.size(); ++corner) {
       link(triangles_[corner / 3][corner % 3], corner, corner);
@@ -437,20 +472,21 @@ class Simplifier {
   /// The neighbour into which a vertex is best drawn, of those into which it may be; kNone when there is none.
   Entry best_target(std::uint32_t from) {
     neighbours_.clear();
+    ++seen_mark_;
     around(from, [&](const Triangle& t) {
       for (const std::uint32_t v : t) {
-        if (v != from) neighbours_.push_back({0, v});
+        if (v == from || seen_in_[v] == seen_mark_) continue;
+        seen_in_[v] = seen_mark_;
+        neighbours_.push_back({cost(from, v), v});
       }
     });
-    std::sort(neighbours_.begin(), neighbours_.end(),
-              [](const Entry& a, const Entry& b) { return a.vertex < b.vertex; });
-    const auto last = std::unique(neighbours_.begin(), neighbours_.end(),
-                                  [](const Entry& a, const Entry& b) { return a.vertex == b.vertex; });
-    neighbours_.erase(last, neighbours_.end());
-    for (Entry& entry : neighbours_) entry.cost = cost(from, entry.vertex);
-    std::sort(neighbours_.begin(), neighbours_.end(), [](const Entry& a, const Entry& b) { return b > a; });
-    for (const Entry& entry : neighbours_) {
-      if (may_collapse(from, entry.vertex)) return entry;
+    // The first that is cheap mostly may.
+    while (!neighbours_.empty()) {
+      const auto cheapest = std::min_element(neighbours_.begin(), neighbours_.end(),
+                                             [](const Entry& a, const Entry& b) { return b > a; });
+      if (may_collapse(from, cheapest->vertex)) return *cheapest;
+      *cheapest = neighbours_.back();
+      neighbours_.pop_back();
     }
     return {0, kNone};
   }
@@ -562,28 +598,54 @@ class Simplifier {
   std::size_t wanted_count_;
   std::size_t live_count_ = 0;
   double celsius_in_metres_ = 0, level_in_metres_ = 0;
-  std::vector<Triangle> triangles_;
+  std::vector<Triangle>& triangles_;
   std::vector<bool> is_alive_;
-  std::vector<std::uint32_t> head_, tail_, next_;  ///< Corners of triangles around each vertex.
-  std::vector<std::uint32_t> standing_;            ///< For each vertex the one into which it has been drawn, or itself.
-  std::vector<std::uint32_t> marked_in_;
-  std::uint32_t mark_ = 0;
+  std::vector<std::uint32_t>&head_, &tail_, &next_;  ///< Corners of triangles around each vertex.
+  std::vector<std::uint32_t> standing_;  ///< For each vertex the one into which it has been drawn, or itself.
+  std::vector<std::uint32_t> marked_in_, seen_in_;
+  std::uint32_t mark_ = 0, seen_mark_ = 0;
   std::vector<Kind> kind_;
-  std::vector<Sight> sights_;
+  std::vector<Sight>& sights_;
   std::vector<float> celsius_;  ///< Of each vertex; a span outside of all others where it is infinite.
-  std::vector<std::array<Range, 3>> colour_range_;
-  std::vector<Range> temperature_range_;
+  std::vector<std::array<Range, 3>>& colour_range_;
+  std::vector<Range>& temperature_range_;
   std::vector<float> boost_;  ///< Per triangle: how many times its area its temperature counts.
   std::vector<std::uint32_t> apexes_;
-  std::vector<Quadric> quadrics_;
+  std::vector<Quadric>& quadrics_;
   std::vector<std::uint32_t> target_;
   std::vector<Entry> neighbours_;
 };
 
 }  // namespace
 
-Simplified simplified(const SimplifyInput& input, std::size_t wanted_count) {
-  return Simplifier(input, wanted_count).run();
+SimplifyArrays::SimplifyArrays() : state_(std::make_unique<State>()) {}
+SimplifyArrays::~SimplifyArrays() = default;
+SimplifyArrays::SimplifyArrays(SimplifyArrays&&) noexcept = default;
+SimplifyArrays& SimplifyArrays::operator=(SimplifyArrays&&) noexcept = default;
+
+SimplifyArrays SimplifyMemory::take() {
+  const std::lock_guard lock(mutex_);
+  if (free_.empty()) return {};
+  SimplifyArrays arrays = std::move(free_.back());
+  free_.pop_back();
+  return arrays;
+}
+
+void SimplifyMemory::give_back(SimplifyArrays arrays) {
+  const std::lock_guard lock(mutex_);
+  free_.push_back(std::move(arrays));
+}
+
+void SimplifyMemory::clear() {
+  const std::lock_guard lock(mutex_);
+  free_.clear();
+}
+
+Simplified simplified(const SimplifyInput& input, std::size_t wanted_count, SimplifyMemory& memory) {
+  SimplifyArrays arrays = memory.take();
+  Simplified result = Simplifier(input, wanted_count, arrays.state()).run();
+  memory.give_back(std::move(arrays));
+  return result;
 }
 
 }  // namespace spectra::server

@@ -169,13 +169,13 @@ void join_near_vertices(Simplified& mesh, const MergedTiles& merged, const std::
 }  // namespace
 
 Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std::vector<bool>& is_locked,
-                         const ThinningOptions& options) {
+                         const ThinningOptions& options, SimplifyMemory& memory) {
   Simplified simple = simplified({.surface = fine,
                                   .visible = mesh.visible,
                                   .temperature_celsius = mesh.temperature_celsius,
                                   .is_locked = is_locked,
                                   .span_celsius = options.span_celsius},
-                                 options.wanted_count);
+                                 options.wanted_count, memory);
   join_near_vertices(simple, mesh, is_locked, options);
   if (simple.triangles.empty()) simple.triangles.push_back(mesh.any_triangle);
 

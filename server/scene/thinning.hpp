@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fusion/vertex_types.hpp"
+#include "server/scene/simplify.hpp"
 #include "server/scene/surface.hpp"
 
 namespace spectra::server {
@@ -41,7 +42,7 @@ struct Thinning {
 /// About `wanted_count` vertices of a surface; `fine` is made of `mesh`. Locked ones stay, with what they show. See simplified();
 /// where loose pieces, or places where many sheets meet, stop that, vertices near each other are joined.
 Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std::vector<bool>& is_locked,
-                         const ThinningOptions& options);
+                         const ThinningOptions& options, SimplifyMemory& memory);
 
 /// At most about `wanted_count` points of a cloud, chosen so that none is far from one of them; locked ones stay. Each shows the mean of
 /// its group. A point that differs from that by a sixteenth of the span or more, the one that differs most, stands for itself.

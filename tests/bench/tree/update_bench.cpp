@@ -119,5 +119,6 @@ int main(int argc, char** argv) {
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
     return *most / *least;
   };
-  std::printf("largest / smallest: until the leaves are published %.2f, with all coarse tiles %.2f\n", ratio(leaves), ratio(all));
+  std::printf("largest / smallest: until the leaves are published %.2f, with all coarse tiles %.2f\n", ratio(leaves),
+              ratio(all));
 }

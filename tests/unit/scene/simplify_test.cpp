@@ -41,12 +41,13 @@ struct Wall {
   Simplified simplified_to(std::size_t count) const {
     const Surface surface(positions, triangles);
     const std::vector<bool> is_locked(positions.size());
+    SimplifyMemory memory;
     return simplified({.surface = surface,
                        .visible = visible,
                        .temperature_celsius = celsius,
                        .is_locked = is_locked,
                        .span_celsius = 10},
-                      count);
+                      count, memory);
   }
 
   std::uint32_t columns;
@@ -177,12 +178,13 @@ TEST(Simplified, LockedVerticesShowThemselves) {
     wall.visible[v] = {static_cast<std::uint8_t>(v % 251), 3, 7};
     wall.celsius[v] = 20 + static_cast<float>(v % 5);
   }
+  SimplifyMemory memory;
   const Simplified simple = simplified({.surface = surface,
                                         .visible = wall.visible,
                                         .temperature_celsius = wall.celsius,
                                         .is_locked = is_locked,
                                         .span_celsius = 10},
-                                       30);
+                                       30, memory);
   const auto kept = used(simple.triangles);
   for (std::uint32_t v = 0; v < is_locked.size(); v += 97) {
     EXPECT_TRUE(kept.contains(v));
@@ -225,6 +227,28 @@ TEST(HeatSpots, AreWhatStandsOutFromAllAroundIt) {
   for (const HeatSpot& spot : heat_spots(surface, wall.celsius, areas, 2, 0.01)) apexes.insert(spot.apex);
   EXPECT_EQ(apexes, (std::set{wall.at(10, 10), wall.at(40, 40), wall.at(20, 50)}));
   EXPECT_TRUE(heat_spots(surface, wall.celsius, areas, 2, 1e-5).empty()) << "all are larger";
+}
+
+TEST(Simplify, TheSameWhateverItsMemoryWasUsedFor) {
+  SimplifyMemory memory;
+  const auto run = [&](const Wall& wall, std::size_t count, SimplifyMemory& its) {
+    const Surface surface(wall.positions, wall.triangles);
+    const std::vector<bool> is_locked(wall.positions.size());
+    return simplified({.surface = surface,
+                       .visible = wall.visible,
+                       .temperature_celsius = wall.celsius,
+                       .is_locked = is_locked,
+                       .span_celsius = 10},
+                      count, its);
+  };
+  const Wall large(60, 50), small(25, 20);
+  run(large, 100, memory);
+  const Simplified again = run(small, 60, memory);
+  SimplifyMemory fresh;
+  const Simplified alone = run(small, 60, fresh);
+  EXPECT_EQ(again.triangles, alone.triangles);
+  EXPECT_EQ(again.visible, alone.visible);
+  EXPECT_EQ(again.temperature_celsius, alone.temperature_celsius);
 }
 
 }  // namespace
