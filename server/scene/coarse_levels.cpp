@@ -265,6 +265,7 @@ std::shared_ptr<const MapNode> CoarseLevels::taken(const std::shared_ptr<const M
   if (!node || !have_same_branches(*node, work.made()) || id.level < top_of(root)->id.level) return root;
   // What has changed meanwhile is shown in the next round.
   if (node == work.from()) outdated_.erase(id);
+  if (id.level > top_of(root)->id.level) outdated_.insert(parent_of(id));
   const auto copy = std::make_shared<MapNode>(*node);
   take_tile(*copy, work.made());
   return with_node(root, copy);
