@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Checks that every #include of fusion/, protocol/ and server/ is one its folder may use (layers.json)."""
+"""Checks that every #include of fusion/, protocol/ and server/, and every import of web/src, is one its folder may use (layers.json)."""
 import json
 import pathlib
+import posixpath
 import re
 import sys
 
@@ -45,6 +46,31 @@ for top in ("fusion", "protocol", "server"):
             forbidden = name.startswith(tuple(rules["forbidden"].get(folder, [])) or ("\0",))
             if not allowed or forbidden:
                 violations.append(f"{relative}:{number}: {folder} may not include {name}")
+
+# import and export ... from, import for its effect, import(), and the address of a worker.
+web_import = re.compile(
+    r"""(?:\bfrom\s*|\bimport\s*\(?\s*|\bnew\s+URL\(\s*)(?P<quote>['"])(?P<name>[^'"\n]+)(?P=quote)(?P<address>\s*,\s*import\.meta\.url)?"""
+)
+comment = re.compile(r"/\*.*?\*/|(?<![:'\"])//[^\n]*", re.DOTALL)
+for path in sorted((root / "web/src").rglob("*")):
+    if path.suffix not in (".ts", ".svelte") or path.name.endswith((".test.ts", ".d.ts")):
+        continue
+    relative = path.relative_to(root).as_posix()
+    folder = posixpath.dirname(relative)
+    checked += 1
+    if folder not in rules["web"]:
+        violations.append(f"{relative}: this folder has no row in layers.json")
+        continue
+    text = comment.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), path.read_text())
+    for match in web_import.finditer(text):
+        if match.group().startswith("new") and not match["address"]:
+            continue
+        name = match["name"]
+        if name.startswith("."):
+            name = posixpath.relpath(posixpath.normpath(posixpath.join(folder, name)), "web/src")
+        if not name.startswith(tuple(rules["web"][folder])):
+            line = text.count("\n", 0, match.start()) + 1
+            violations.append(f"{relative}:{line}: {folder} may not import {name}")
 
 print("\n".join(violations) or f"{checked} files keep to their layers")
 sys.exit(1 if violations or checked == 0 else 0)

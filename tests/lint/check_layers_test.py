@@ -24,5 +24,16 @@ assert outcome({"fusion/mesh/a.cpp": "#include <boost/asio.hpp>\n"}) == 1
 assert outcome({"protocol/a.cpp": '#include "fusion/a.hpp"\n'}) == 1
 assert outcome({"server/stream/a.cpp": "#include <boost/beast.hpp>\n"}) == 1
 assert outcome({"server/net/a.cpp": "#include <boost/beast.hpp>\n"}) == 0
+assert outcome({"web/src/draw/a.ts": "import { Mesh } from 'three';\nimport type { Vec3 } from '../protocol/messages';\n"}) == 0
+assert outcome({"web/src/draw/a.ts": "import type { Store } from '../state/store.svelte';\n"}) == 1
+assert outcome({"web/src/draw/a.ts": "import {\n  Store,\n} from '../state/store.svelte';\n"}) == 1
+assert outcome({"web/src/draw/a.ts": "// import { Store } from '../state/store.svelte';\n/* from '../ui/App.svelte' */\n"}) == 0
+assert outcome({"web/src/tiles/a.ts": "export { DoubleSide } from 'three';\n"}) == 1
+assert outcome({"web/src/state/a.ts": "const panel = () => import('../ui/Panel.svelte');\n"}) == 1
+assert outcome({"web/src/transport/a.ts": "new Worker(new URL('../decode/worker.ts', import.meta.url));\n"}) == 1
+assert outcome({"web/src/transport/a.ts": "new URL('/api', location.href);\n"}) == 0
+assert outcome({"web/src/ui/A.svelte": "<script lang=\"ts\">\n  import '../decode/pool';\n</script>\n"}) == 1
+assert outcome({"web/src/draw/a.test.ts": "import { Store } from '../state/store.svelte';\n", "fusion/a.cpp": ""}) == 0
+assert outcome({"web/src/scene/a.ts": "export const a = 1;\n"}) == 1
 assert outcome({}) == 1
-print("8 of 8 trees judged rightly")
+print("19 of 19 trees judged rightly")

@@ -35,7 +35,7 @@ class EarlyWorker {
 }
 
 const picture = new EarlyWorker(
-  () => new Worker(new URL('./scene/render_worker.ts', import.meta.url), { type: 'module', name: 'picture' }),
+  () => new Worker(new URL('./draw/render_worker.ts', import.meta.url), { type: 'module', name: 'picture' }),
 );
 const draco = new EarlyWorker(
   () => new Worker(new URL('./decode/worker.ts', import.meta.url), { type: 'module', name: 'draco' }),

@@ -15,8 +15,8 @@ import type {
   StreamStats,
   Vec3,
 } from '../protocol/messages';
-import type { UpAxis } from '../scene/first_view';
-import type { DrawnError, TileCounts } from '../scene/tile_set';
+import type { UpAxis } from '../view/first_view';
+import type { DrawnError, TileCounts } from '../tiles/tile_set';
 import type { CatalogueFailure } from '../transport/catalogue_loader';
 import type { PartFailure } from '../transport/part_loader';
 import type { LinkState } from '../transport/connection';

@@ -1,5 +1,5 @@
 /** Numbers as the instrument writes them. */
-import type { DrawnError } from '../scene/tile_set';
+import type { DrawnError } from '../tiles/tile_set';
 
 import type { Probe, Scene } from '../protocol/messages';
 

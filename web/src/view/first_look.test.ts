@@ -1,8 +1,8 @@
 import { describe, expect, it } from 'vitest';
 import type { GeometrySummary } from '../decode/messages';
 import type { Scene, Vec3 } from '../protocol/messages';
-import type { Bounds, UpAxis, View } from '../scene/first_view';
-import { decodedGeometry } from '../scene/test_tiles';
+import type { Bounds, UpAxis, View } from './first_view';
+import { decodedGeometry } from '../tiles/test_tiles';
 import { FirstLook } from './first_look';
 import { UpChoices } from './up_choices';
 

@@ -11,7 +11,7 @@ import {
   type View,
   viewDirection,
   withoutStrays,
-} from '../scene/first_view';
+} from './first_view';
 import type { UpChoices } from './up_choices';
 
 /** The part of the viewport that is needed to look at a scene. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { PerspectiveCamera, Vector3 } from '../scene/three_math';
+import { PerspectiveCamera, Vector3 } from './three_math';
 import type { Vec3 } from '../protocol/messages';
 import { directionInScene, distanceOf, lookAt, lookOf, toView, worldFromCamera } from './look';
 

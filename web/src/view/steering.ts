@@ -1,6 +1,6 @@
 import type { Vec3 } from '../protocol/messages';
-import { AimedControls } from '../scene/aimed_controls';
-import { PerspectiveCamera, Vector3 } from '../scene/three_math';
+import { AimedControls } from './aimed_controls';
+import { PerspectiveCamera, Vector3 } from './three_math';
 import { type Look, lookOf } from './look';
 
 /** What a person does to the camera: with mouse, fingers and keys. A part of its own, because nothing before the first picture needs it. */

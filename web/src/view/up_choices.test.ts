@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import type { Bounds } from '../scene/first_view';
+import type { Bounds } from './first_view';
 import { UpChoices } from './up_choices';
 
 const bounds = (size: number): Bounds => ({ min: [0, 0, 0], max: [size, size, 3] });

@@ -1,4 +1,4 @@
-import { type Bounds, UP_AXES, type UpAxis } from '../scene/first_view';
+import { type Bounds, UP_AXES, type UpAxis } from './first_view';
 
 const KEY = 'spectra.up';
 /** Scenes whose choice is remembered; the oldest is forgotten first. */

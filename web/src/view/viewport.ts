@@ -3,11 +3,11 @@ import type { CameraPose, Vec3 } from '../protocol/messages';
 import { directionInScene, distanceOf, type Look, lookAt, toView, worldFromCamera } from '../view/look';
 import type { Steering } from '../view/steering';
 import { UP, type UpAxis, type View } from './first_view';
-import type { SightWish } from './clear_sight';
-import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from './render_messages';
-import { type RenderPort, startRenderingHere, startRenderWorker } from './render_port';
+import type { SightWish } from '../draw/clear_sight';
+import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from '../draw/render_messages';
+import { type RenderPort, startRenderingHere, startRenderWorker } from '../draw/render_port';
 import { MotionPace, type Notch } from './motion_pace';
-import type { Drawable } from './tile_set';
+import type { Drawable } from '../tiles/tile_set';
 
 export const FIELD_OF_VIEW_DEG = 45;
 /** Pictures that may be on their way to the drawing side: one that it draws and one that waits. */
@@ -87,10 +87,11 @@ export class Viewport {
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewportEvents,
-    inWorker: boolean,
+    /** Draws; null: the page does it itself. */
+    worker: Worker | null,
   ) {
-    const start = inWorker ? startRenderWorker : startRenderingHere;
-    this.#port = start(canvas, (reply) => this.#replied(reply));
+    const onReply = (reply: RenderReply): void => this.#replied(reply);
+    this.#port = worker === null ? startRenderingHere(canvas, onReply) : startRenderWorker(worker, canvas, onReply);
     // Before the controls come nearer to it.
     canvas.addEventListener('wheel', this.#aimAtPointer, { capture: true, passive: true });
     canvas.addEventListener('pointerdown', this.#aimAtPointer, { capture: true, passive: true });

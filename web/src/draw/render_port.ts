@@ -1,4 +1,3 @@
-import { takePictureWorker } from '../head_start';
 import type { RenderReply, RenderRequest } from './render_messages';
 
 /** The way to the side that draws. */
@@ -8,8 +7,7 @@ export interface RenderPort {
 }
 
 /** Draws in a worker of its own. */
-export function startRenderWorker(canvas: HTMLCanvasElement, onReply: (reply: RenderReply) => void): RenderPort {
-  const worker = takePictureWorker();
+export function startRenderWorker(worker: Worker, canvas: HTMLCanvasElement, onReply: (reply: RenderReply) => void): RenderPort {
   worker.onmessage = ({ data }: MessageEvent<RenderReply>) => onReply(data);
   worker.onerror = (event) => onReply({ kind: 'failed', message: event.message || 'the drawing worker failed' });
   const offscreen = canvas.transferControlToOffscreen();

@@ -2,7 +2,7 @@ import type { DecodeJob } from '../decode/messages';
 import { type DecodePool, Superseded } from '../decode/pool';
 import { FrameKind, type TileFrame, tileKey } from '../protocol/frame';
 import type { StreamComplete } from '../protocol/messages';
-import { Acknowledger } from '../transport/acknowledger';
+import { Acknowledger } from '../decode/acknowledger';
 import { Arrivals } from './arrivals';
 import type { TileSet } from './tile_set';
 

@@ -1,0 +1,92 @@
+import { describe, expect, it } from 'vitest';
+import type { Fusion, Scene, StreamComplete } from '../protocol/messages';
+import { Progress } from './progress';
+import { Store } from './store.svelte';
+
+function setUp() {
+  const store = new Store();
+  store.fusionInForce = { method: 'blend' } as Fusion;
+  const tiles = { size: 0, current: 0, total: 0, progress: () => ({ current: tiles.current, total: tiles.total }) };
+  const clock = { now: 1000, isBusy: false };
+  const progress = new Progress(
+    store,
+    tiles,
+    () => clock.isBusy,
+    () => clock.now,
+  );
+  return { store, tiles, clock, progress };
+}
+const complete = (generation: number) => ({ generation }) as StreamComplete;
+
+describe('the progress of a picture', () => {
+  it('is behind from the first wish until all of it is there, and says what that took', () => {
+    const { store, clock, progress } = setUp();
+    store.generation = 4;
+    progress.received(700);
+    progress.begin();
+    clock.now = 1100;
+    // A second wish does not make the first one younger.
+    progress.begin();
+    expect(store.behindSince).toBe(1000);
+    progress.received(5000);
+    clock.now = 1250;
+    progress.completed(complete(4));
+    expect(store.behindSince).toBeNull();
+    expect(store.progress).toBe(1);
+    expect(store.lastUpdate).toEqual({ bytes: 5000, ms: 250 });
+    expect(store.pictureMethod).toBe('blend');
+  });
+
+  it('is not at its end while newer settings are in force or on their way', () => {
+    const { store, clock, progress } = setUp();
+    store.generation = 4;
+    progress.begin();
+    progress.completed(complete(3));
+    expect(store.behindSince).toBe(1000);
+    expect(store.complete).toEqual(complete(3));
+    clock.isBusy = true;
+    progress.completed(complete(4));
+    expect(store.behindSince).toBe(1000);
+    expect(store.pictureMethod).toBeNull();
+    clock.isBusy = false;
+    progress.completed(complete(4));
+    expect(store.behindSince).toBeNull();
+  });
+
+  it('is the share of the tiles: of all there may be before the first picture, of those that are wanted after it', () => {
+    const { store, tiles, progress } = setUp();
+    store.scene = { tile_count: 8 } as Scene;
+    progress.begin();
+    tiles.size = 2;
+    progress.tick();
+    expect(store.progress).toBe(0.25);
+    tiles.size = 12;
+    progress.tick();
+    expect(store.progress).toBe(1);
+    progress.completed(complete(0));
+    progress.begin();
+    [tiles.current, tiles.total] = [3, 4];
+    progress.tick();
+    expect(store.progress).toBe(0.75);
+    tiles.total = 0;
+    progress.tick();
+    expect(store.progress).toBe(0);
+  });
+
+  it('tells the rate of the last two seconds, and of nothing once the link is lost', () => {
+    const { store, clock, progress } = setUp();
+    progress.received(1000);
+    clock.now += 1500;
+    progress.received(3000);
+    progress.tick();
+    expect(store.rate_bytes_per_s).toBe(2000);
+    clock.now += 600;
+    progress.tick();
+    expect(store.rate_bytes_per_s).toBe(1500);
+    expect(store.received_bytes).toBe(4000);
+    progress.begin();
+    progress.disconnected();
+    expect(store.rate_bytes_per_s).toBe(0);
+    expect(store.behindSince).toBeNull();
+  });
+});

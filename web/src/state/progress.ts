@@ -1,0 +1,73 @@
+import type { StreamComplete } from '../protocol/messages';
+import type { Store } from './store.svelte';
+
+/** Over which the rate is taken. */
+const RATE_MS = 2000;
+
+/** What is asked of the tiles. */
+interface Tiles {
+  readonly size: number;
+  /** How many show the newest settings. */
+  progress(generation: number): { current: number; total: number };
+}
+
+/** How far the picture is behind what was asked for, what it cost, and what the link brings meanwhile; in the store. */
+export class Progress {
+  #bytesBefore = 0;
+  #window: { at: number; bytes: number }[] = [];
+
+  /** `isBusy`: settings are still on their way to the server. */
+  constructor(
+    private readonly store: Store,
+    private readonly tiles: Tiles,
+    private readonly isBusy: () => boolean,
+    private readonly now: () => number = () => performance.now(),
+  ) {}
+
+  /** Another picture was asked for, or announced. */
+  begin(): void {
+    if (this.store.behindSince !== null) return;
+    this.store.behindSince = this.now();
+    this.#bytesBefore = this.store.received_bytes;
+  }
+
+  received(bytes: number): void {
+    this.store.received_bytes += bytes;
+    this.#window.push({ at: this.now(), bytes });
+  }
+
+  /** All that was asked for is in the picture. */
+  completed(message: StreamComplete): void {
+    const { store } = this;
+    store.complete = message;
+    if (message.generation < store.generation || this.isBusy()) return;
+    if (store.behindSince !== null) {
+      store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: this.now() - store.behindSince };
+    }
+    store.behindSince = null;
+    store.progress = 1;
+    store.pictureMethod = store.fusionInForce?.method ?? null;
+  }
+
+  /** Nothing comes any more: there is nothing to be behind of. */
+  disconnected(): void {
+    this.store.behindSince = null;
+    this.store.rate_bytes_per_s = 0;
+  }
+
+  tick(): void {
+    const { store } = this;
+    const now = this.now();
+    this.#window = this.#window.filter(({ at }) => now - at < RATE_MS);
+    store.rate_bytes_per_s = (this.#window.reduce((sum, { bytes }) => sum + bytes, 0) / RATE_MS) * 1000;
+    if (store.behindSince !== null) store.progress = this.#share();
+  }
+
+  #share(): number {
+    const { store } = this;
+    // Before the first picture is complete nobody can say which tiles it takes; at most it is all of them.
+    if (store.complete === null) return this.tiles.size / Math.max(1, this.tiles.size, store.scene?.tile_count ?? 0);
+    const { current, total } = this.tiles.progress(store.generation);
+    return total === 0 ? 0 : current / total;
+  }
+}

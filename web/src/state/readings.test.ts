@@ -1,0 +1,148 @@
+import { readFileSync } from 'node:fs';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import type { CameraPose, Extremes, Hello, Probe, Scene, Vec3 } from '../protocol/messages';
+import { RpcError } from '../transport/connection';
+import { Readings } from './readings';
+import { Store } from './store.svelte';
+
+const golden = (name: string): unknown =>
+  (
+    JSON.parse(readFileSync(new URL(`../../../protocol/golden/messages/${name}.result.json`, import.meta.url), 'utf8')) as {
+      result: unknown;
+    }
+  ).result;
+const EXTREMES = golden('scene.extremes') as Extremes;
+const PROBE = golden('scene.probe') as Probe;
+
+const later = () => vi.advanceTimersByTimeAsync(0);
+
+function setUp() {
+  const store = new Store();
+  store.link = { phase: 'open' };
+  store.scene = { name: 'room' } as Scene;
+  store.pictureStands = true;
+  store.server = { capabilities: ['extremes_in_view'] } as unknown as Hello;
+  const asked: {
+    method: string;
+    params: object;
+    answer: (result: unknown) => Promise<void>;
+    refuse: (error: Error) => Promise<void>;
+  }[] = [];
+  const seen = { extremes: [] as (Extremes | null)[], problems: [] as unknown[], aimed: [] as Vec3[] };
+  const picture = { under: [1, 2, 3] as Vec3 | null, shift: 0 };
+  const readings = new Readings(
+    store,
+    {
+      pick: () => Promise.resolve(picture.under),
+      project: ([x, y]) => ({ x: x + picture.shift, y, depth: 1 }),
+      aimAt: (point) => seen.aimed.push(point),
+    },
+    {
+      request: (method, params) =>
+        new Promise((resolve, reject) => {
+          asked.push({
+            method,
+            params,
+            answer: async (result) => {
+              resolve(result);
+              await later();
+            },
+            refuse: async (error) => {
+              reject(error);
+              await later();
+            },
+          });
+        }),
+      onExtremes: (extremes) => seen.extremes.push(extremes),
+      onProblem: (error) => seen.problems.push(error),
+    },
+  );
+  return { store, readings, asked, seen, picture };
+}
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+describe('Readings', () => {
+  it('ask for histogram and extremes once there is a picture, and not before', async () => {
+    const { store, readings, asked, seen } = setUp();
+    store.pictureStands = false;
+    readings.askFacts();
+    readings.askHistogram();
+    await later();
+    expect(asked).toHaveLength(0);
+    await vi.advanceTimersByTimeAsync(1000);
+    store.pictureStands = true;
+    readings.askFacts();
+    await later();
+    expect(asked.map(({ method }) => method).sort()).toEqual(['scene.extremes', 'scene.histogram']);
+    for (const { method, answer } of asked) await answer(golden(method));
+    expect(store.histogram).toEqual(golden('scene.histogram'));
+    expect(store.extremes).toEqual(EXTREMES);
+    expect(seen.extremes).toEqual([EXTREMES]);
+    readings.clear();
+    expect([store.histogram, store.extremes]).toEqual([null, null]);
+    expect(seen.extremes).toEqual([EXTREMES, null]);
+  });
+
+  it('ask for the histogram of several changes once', async () => {
+    const { readings, asked } = setUp();
+    for (let i = 0; i < 5; i += 1) readings.askHistogram();
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(asked).toHaveLength(1);
+    await asked[0]!.answer(golden('scene.histogram'));
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(asked).toHaveLength(2);
+  });
+
+  it('show what is under the pointer, aim there, and forget it when the pointer has gone', async () => {
+    const { store, readings, asked, seen } = setUp();
+    readings.hover({ x: 5, y: 6 });
+    await later();
+    expect(asked[0]).toMatchObject({ method: 'scene.probe', params: { position: [1, 2, 3] } });
+    await asked[0]!.answer(PROBE);
+    expect(store.hover).toEqual({ x: 5, y: 6, probe: PROBE });
+    expect(seen.aimed).toEqual([[1, 2, 3]]);
+    await vi.advanceTimersByTimeAsync(1000);
+    readings.hover({ x: 7, y: 8 });
+    await later();
+    readings.hover(null);
+    expect(store.hover).toBeNull();
+    // An answer that comes too late is of no interest any more.
+    await asked[1]!.answer(PROBE);
+    expect(store.hover).toBeNull();
+  });
+
+  it('are pinned to their place in the scene, until a place with nothing is pinned', async () => {
+    const { store, readings, asked, picture } = setUp();
+    void readings.pin({ x: 5, y: 6 });
+    await later();
+    await asked[0]!.answer(PROBE);
+    const [x, y] = PROBE.position;
+    expect(store.pinned).toEqual({ reading: { x: 5, y: 6, probe: PROBE }, place: { x, y, depth: 1 } });
+    picture.shift = 10;
+    readings.cameraMoved();
+    expect(store.pinned?.place).toEqual({ x: x + 10, y, depth: 1 });
+    picture.under = null;
+    await readings.pin({ x: 1, y: 1 });
+    expect(store.pinned).toBeNull();
+    readings.cameraMoved();
+    expect(store.pinned).toBeNull();
+  });
+
+  it('of what is in view are asked for where the server knows them and marks are shown; a busy server marks nothing', async () => {
+    const { store, readings, asked, seen } = setUp();
+    const camera = {} as CameraPose;
+    const found = readings.extremesInView(camera, [0, 0, 1, 1]);
+    expect(asked[0]?.params).toEqual({ camera, window: [0, 0, 1, 1] });
+    await asked[0]!.answer(EXTREMES);
+    expect(await found).toEqual(EXTREMES);
+    const refused = readings.extremesInView(camera, [0, 0, 1, 1]);
+    await asked[1]!.refuse(new RpcError({ code: -32003, message: 'busy', data: { field: '', reason: 'busy' } }));
+    expect(await refused).toBeNull();
+    expect(seen.problems).toEqual([]);
+    store.marksShown = false;
+    expect(await readings.extremesInView(camera, [0, 0, 1, 1])).toBeNull();
+    expect(asked).toHaveLength(2);
+  });
+});

@@ -1,0 +1,177 @@
+import { readFileSync } from 'node:fs';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
+import { decodeServerMessage, type Hello, hello, type Scene } from '../protocol/messages';
+import { Store } from './store.svelte';
+import { Subscription } from './subscription';
+
+function greeting(name: string): Hello {
+  const text = readFileSync(new URL(`../../../protocol/golden/messages/${name}.notification.json`, import.meta.url), 'utf8');
+  const message = decodeServerMessage(text);
+  if (message.type !== 'notification') throw new Error(`${name} is no notification`);
+  return hello(message.params, 'hello');
+}
+const HELLO = greeting('hello');
+const BRIEF = greeting('hello.brief');
+const WITHOUT_SCENE = greeting('hello.no_scene');
+
+const later = () => new Promise((resolve) => setTimeout(resolve));
+
+/** A subscription, and a diary of what it does to those whom it concerns. */
+function setUp() {
+  const store = new Store();
+  const diary: string[] = [];
+  const note =
+    <Result>(what: string, result: Result) =>
+    () => {
+      diary.push(what);
+      return result;
+    };
+  const before = { fusion: null as object | null, quality: null as object | null };
+  const claims = ['0/0/0'] as never[];
+  const asked: { method: string; params: Record<string, unknown>; answer: (result: object) => Promise<void> }[] = [];
+  let settle: () => void = () => undefined;
+  const sent = { wait: false };
+  const concerned = {
+    tiles: { clear: note('tiles cleared', undefined), claims: () => claims, resume: vi.fn() },
+    intake: { beginConnection: note('intake begins', undefined) },
+    settings: {
+      greeted: () => before.fusion as never,
+      send: () => (sent.wait ? new Promise<void>((resolve) => (settle = resolve)) : Promise.resolve()),
+      busy: false,
+    },
+    quality: {
+      greeted: () => before.quality as never,
+      send: note('quality sent', Promise.resolve()),
+      askMarks: note('marks asked', undefined),
+      sceneHasStep: vi.fn(),
+    },
+    readings: {
+      beginConnection: () => undefined,
+      clear: note('readings cleared', undefined),
+      askFacts: note('facts asked', undefined),
+    },
+    progress: { begin: vi.fn() },
+    look: { sceneIs: vi.fn() },
+    catalogue: { want: vi.fn(), wantNone: vi.fn() },
+  };
+  const subscription = new Subscription(store, 'ws://robot:8080/ws?hello=brief', concerned, {
+    request: (method, params) =>
+      new Promise((resolve) => {
+        diary.push(method);
+        asked.push({
+          method,
+          params: params as Record<string, unknown>,
+          answer: async (result) => {
+            resolve(result);
+            await later();
+          },
+        });
+      }),
+    tellCamera: note('camera told', undefined),
+    invalidate: () => undefined,
+    onProblem: (error) => diary.push(String(error)),
+  });
+  return { store, subscription, concerned, diary, asked, before, sent, settle: () => settle() };
+}
+
+beforeEach(() => vi.restoreAllMocks());
+
+describe('a subscription', () => {
+  it('asks for the stream last, with what the server is able to', async () => {
+    const { store, subscription, diary, asked, concerned } = setUp();
+    subscription.greeted(HELLO);
+    await later();
+    expect(diary).toEqual(['intake begins', 'facts asked', 'camera told', 'marks asked', 'scene.subscribe']);
+    const { params } = asked[0]!;
+    expect(params['channels']).toEqual(['fused']);
+    expect(params['colour_transform']).toBe(HELLO.capabilities.includes('subtract_green') ? 'subtract_green' : undefined);
+    expect(params['resume']).toBeUndefined();
+    expect(store.scene).toEqual(HELLO.scene);
+    expect(store.methods.length).toBeGreaterThan(0);
+    expect(concerned.look.sceneIs).toHaveBeenCalledWith(HELLO.scene);
+    expect(concerned.progress.begin).toHaveBeenCalled();
+  });
+
+  it('leaves methods and palettes until the link is free, and gets them at once when it comes back', () => {
+    const { store, subscription, concerned } = setUp();
+    subscription.greeted(BRIEF);
+    expect(concerned.catalogue.want).not.toHaveBeenCalled();
+    expect(store.isLinkFree).toBe(false);
+    subscription.linkIsFree();
+    subscription.linkIsFree();
+    expect(store.isLinkFree).toBe(true);
+    expect(concerned.catalogue.want.mock.calls).toEqual([[expect.stringMatching(/^http:\/\/robot:8080\/.*catalogue/)]]);
+    subscription.greeted(BRIEF);
+    expect(concerned.catalogue.want).toHaveBeenCalledTimes(2);
+  });
+
+  it('gets everything at once where there is no scene', () => {
+    const { store, subscription, diary } = setUp();
+    subscription.greeted(WITHOUT_SCENE);
+    expect(store.isLinkFree).toBe(true);
+    expect(store.scene).toBeNull();
+    expect(diary).toContain('tiles cleared');
+    expect(diary).toContain('readings cleared');
+  });
+
+  it('claims what it holds of the session before, once that has been subscribed to', async () => {
+    const { subscription, asked, concerned } = setUp();
+    const able = { ...HELLO, capabilities: [...HELLO.capabilities, 'resume'] };
+    subscription.greeted(able);
+    await later();
+    await asked[0]!.answer({ resumed_tiles: 0 });
+    expect(concerned.tiles.resume).toHaveBeenLastCalledWith([], false);
+    subscription.greeted({ ...able, session_id: 'another' });
+    await later();
+    expect(asked[1]!.params['resume']).toEqual({ session_id: HELLO.session_id, tiles: ['0/0/0'] });
+    await asked[1]!.answer({ resumed_tiles: 1 });
+    expect(concerned.tiles.resume).toHaveBeenLastCalledWith(['0/0/0'], true);
+  });
+
+  it("asks for nothing before the user's settings are in force again, and not at all when that connection is gone", async () => {
+    const { subscription, diary, asked, before, sent, settle } = setUp();
+    subscription.greeted(HELLO);
+    await later();
+    before.fusion = { method: 'blend' };
+    sent.wait = true;
+    subscription.greeted(HELLO);
+    await later();
+    expect(asked).toHaveLength(1);
+    const settleOfSecond = settle;
+    sent.wait = false;
+    before.fusion = null;
+    before.quality = {};
+    subscription.greeted(HELLO);
+    await later();
+    expect(asked).toHaveLength(2);
+    expect(diary.indexOf('quality sent')).toBeLessThan(diary.lastIndexOf('scene.subscribe'));
+    settleOfSecond();
+    await later();
+    expect(asked).toHaveLength(2);
+  });
+
+  it('keeps tiles of the same scene on a new connection, and none of another one', () => {
+    const { subscription, diary } = setUp();
+    const cleared = () => diary.filter((what) => what === 'tiles cleared').length;
+    subscription.greeted(HELLO);
+    subscription.greeted(HELLO);
+    expect(cleared()).toBe(0);
+    subscription.greeted({ ...HELLO, scene: { ...HELLO.scene!, name: 'another' } });
+    expect(cleared()).toBe(1);
+    // A running connection says itself what goes.
+    subscription.sceneChanged({ ...HELLO.scene!, name: 'a third' } as Scene);
+    expect(cleared()).toBe(1);
+  });
+
+  it('forgets what is pinned in another scene, and not while the same one grows', () => {
+    const { store, subscription, concerned } = setUp();
+    subscription.greeted(HELLO);
+    const pinned = { reading: {} as never, place: null };
+    store.pinned = pinned;
+    subscription.sceneChanged({ ...HELLO.scene!, revision: 2, position_step_m: 0.5 } as Scene);
+    expect(store.pinned).toEqual(pinned);
+    expect(concerned.quality.sceneHasStep).toHaveBeenLastCalledWith(0.5);
+    subscription.sceneChanged({ ...HELLO.scene!, name: 'another' } as Scene);
+    expect(store.pinned).toBeNull();
+  });
+});

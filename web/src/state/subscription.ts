@@ -1,0 +1,153 @@
+import type { FrameIntake } from '../tiles/frame_intake';
+import type { TileSet } from '../tiles/tile_set';
+import type { CatalogueLoader } from '../transport/catalogue_loader';
+import { type FusionChange, type Hello, type Quality, type Scene, subscribed } from '../protocol/messages';
+import type { FirstLook } from '../view/first_look';
+import { cacheBytes } from './cache_bytes';
+import type { Progress } from './progress';
+import type { QualityWish } from './quality_wish';
+import type { Readings } from './readings';
+import type { Settings } from './settings';
+import type { Store } from './store.svelte';
+
+/** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
+const MOST_CLAIMED = 1500;
+
+/** What a connection's beginning concerns. */
+export interface Concerned {
+  tiles: Pick<TileSet, 'clear' | 'claims' | 'resume'>;
+  intake: Pick<FrameIntake, 'beginConnection'>;
+  settings: Pick<Settings, 'greeted' | 'send' | 'busy'>;
+  quality: Pick<QualityWish, 'greeted' | 'send' | 'askMarks' | 'sceneHasStep'>;
+  readings: Pick<Readings, 'beginConnection' | 'clear' | 'askFacts'>;
+  progress: Pick<Progress, 'begin'>;
+  look: Pick<FirstLook, 'sceneIs'>;
+  catalogue: Pick<CatalogueLoader, 'want' | 'wantNone'>;
+}
+
+/** What the subscription needs of the session it belongs to. */
+export interface SubscriptionSession {
+  /** Asks the server; rejects with RpcError when it refuses. */
+  request: (method: string, params: object) => Promise<unknown>;
+  /** Tells the server where the camera is. */
+  tellCamera: () => void;
+  /** There is something for the next picture. */
+  invalidate: () => void;
+  onProblem: (error: unknown) => void;
+}
+
+/** From a server's hello to its stream: what was held and wished on the connection before goes on, and the scene is what the server says. */
+export class Subscription {
+  #connectionNumber = 0;
+  /** Where methods and palettes are; null when it is known, or being asked for. */
+  #catalogueAddress: string | null = null;
+  /** Session whose server knows what the tile set claims. */
+  #claimableSession: string | null = null;
+
+  /** `url`: of the socket. */
+  constructor(
+    private readonly store: Store,
+    private readonly url: string,
+    private readonly concerned: Concerned,
+    private readonly session: SubscriptionSession,
+  ) {}
+
+  greeted(message: Hello): void {
+    const { store } = this;
+    const { settings, quality, readings, intake, progress, catalogue } = this.concerned;
+    const returning = store.scene !== undefined;
+    this.#connectionNumber += 1;
+    readings.beginConnection();
+
+    store.server = message;
+    if ('catalogue' in message) {
+      this.#catalogueAddress = new URL(message.catalogue, this.url.replace(/^ws/, 'http')).href;
+      // The first picture goes before it.
+      if (returning) this.linkIsFree();
+    } else {
+      this.#catalogueAddress = null;
+      catalogue.wantNone();
+      store.methods = message.methods;
+      store.palettes = message.palettes;
+    }
+    if (message.scene === null) this.linkIsFree();
+    const fusionBefore = settings.greeted(message.fusion, returning);
+    const qualityBefore = quality.greeted(message.quality, returning);
+    store.lostAt = null;
+    store.statuses = [];
+    store.complete = null;
+    intake.beginConnection();
+    this.#setScene(message.scene, true);
+    this.session.tellCamera();
+    progress.begin();
+    void this.#subscribe(message, fusionBefore, qualityBefore);
+    // Before the stream, which is asked for at the end of this task at the earliest.
+    quality.askMarks();
+  }
+
+  /** The server says that its scene is another one, or has changed. */
+  sceneChanged(scene: Scene | null): void {
+    this.#setScene(scene, false);
+    this.concerned.progress.begin();
+  }
+
+  /** What the first picture takes has come, or there will be none: now it is the turn of the rest. */
+  linkIsFree(): void {
+    this.store.isLinkFree = true;
+    const address = this.#catalogueAddress;
+    this.#catalogueAddress = null;
+    if (address !== null) this.concerned.catalogue.want(address);
+  }
+
+  /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */
+  async #subscribe(greeting: Hello, fusion: FusionChange | null, quality: Quality | null): Promise<void> {
+    const { settings, tiles } = this.concerned;
+    const connectionNumber = this.#connectionNumber;
+    await Promise.all([fusion && settings.send(fusion), quality && this.concerned.quality.send(quality)]);
+    if (connectionNumber !== this.#connectionNumber) return;
+    if (!settings.busy) this.store.wanted = null;
+    const session_id = this.#claimableSession;
+    const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED) : [];
+    try {
+      const answer = await this.session.request('scene.subscribe', {
+        channels: ['fused'],
+        ...(greeting.capabilities.includes('cache_bytes')
+          ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
+          : {}),
+        ...(greeting.capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
+        ...(claims.length > 0 ? { resume: { session_id, tiles: claims } } : {}),
+      });
+      if (connectionNumber !== this.#connectionNumber) return;
+      const { resumed_tiles = 0 } = subscribed(answer, 'scene.subscribe');
+      tiles.resume(claims, resumed_tiles > 0);
+      this.#claimableSession = greeting.session_id;
+      this.session.invalidate();
+    } catch (error) {
+      this.session.onProblem(error);
+    }
+  }
+
+  #setScene(next: Scene | null, fresh: boolean): void {
+    const { store } = this;
+    const { tiles, look, readings, quality } = this.concerned;
+    const before = store.scene;
+    store.scene = next;
+    if (next === null) {
+      tiles.clear();
+      look.sceneIs(null);
+      readings.clear();
+      this.session.invalidate();
+      return;
+    }
+    const same = before?.name === next.name;
+    // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
+    if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) tiles.clear();
+    look.sceneIs(next);
+    quality.sceneHasStep(next.position_step_m);
+    if (!same) {
+      store.pinned = null;
+      store.pictureMethod = null;
+    }
+    readings.askFacts();
+  }
+}
