@@ -59,6 +59,15 @@ export function addLiveTests(browser) {
     assert.match((await live.innerText()).replaceAll('\u202f', ' '), /^live, newest \d+(\.\d)? s$/);
     assert.match(await page.locator('footer').innerText(), /1 viewer/);
     await screenshot(page, 'live-whole');
+    // On a phone it takes the place of "up to date", and nothing is cut.
+    await page.setViewportSize({ width: 360, height: 740 });
+    await page.waitForFunction(() => /^live, \d/.test(document.querySelector('[data-status="age"]').textContent.trim()));
+    const ends = await page
+      .locator('footer > .item')
+      .evaluateAll((items) => items.map((item) => item.getBoundingClientRect().right));
+    assert.ok(Math.max(...ends) <= 360, `the status ends at ${Math.max(...ends)} of 360`);
+    await page.setViewportSize({ width: 1280, height: 800 });
+    await settled(page);
     // Nobody has moved the camera: all of it is in the picture, between the controls, as the first view of any scene is (it cuts the tips
     // of corners).
     assert.notDeepEqual(await page.evaluate(() => globalThis.spectra.viewport.pose.eye), small);
