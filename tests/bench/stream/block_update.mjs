@@ -1,17 +1,23 @@
 // A block of 10,000 vertices that is put again and again into a scene, while a Node viewer who sees all of it at full detail decodes:
 // how long until the changed leaves are decoded and until everything is, what is sent, and what it costs the server.
-//   node tests/bench/stream/block_update.mjs [SCENE.ply ...]     (without one: demo scenes of 100,000 and 1,000,000 vertices)
+//   node tests/bench/stream/block_update.mjs [--live] [--rounds N] [SCENE.ply ...]
+// Without a scene: demo scenes of 100,000 and 1,000,000 vertices. With --live the scene is a block of a map that began empty.
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
+import { parseArgs } from "node:util";
 import { patch } from "../../integration/node/patch.mjs";
 import { isColours, SpectraClient } from "../../integration/node/spectra_client.mjs";
 import { binary, serve } from "../../integration/node/spectra_server.mjs";
 
-const ROUNDS = Number(process.env.ROUNDS ?? 20);
+const { values: options, positionals: scenes } = parseArgs({
+  options: { live: { type: "boolean", default: false }, rounds: { type: "string", default: "20" } },
+  allowPositionals: true,
+});
+const ROUNDS = Number(options.rounds);
+// The block alone, as a file that holds what its two frames hold.
 const scratch = mkdtempSync(path.join(tmpdir(), "spectra-update-"));
-const scenes = process.argv.slice(2);
 if (scenes.length === 0) {
   for (const count of [100_000, 1_000_000]) {
     const file = path.join(scratch, `${count}.ply`);
@@ -28,7 +34,11 @@ function cpuSeconds(pid) {
 }
 
 for (const scene of scenes) {
-  const server = await serve([scene]);
+  const server = await serve(options.live ? ["--live"] : [scene]);
+  if (options.live) {
+    const response = await fetch(`${server.url}/api/v1/blocks/scene`, { method: "PUT", body: readFileSync(scene) });
+    if (!response.ok) throw new Error(await response.text());
+  }
   const client = await SpectraClient.connect(server.url);
   await client.request("scene.subscribe", { channels: ["fused"] });
   await client.notification("stream.complete", 120_000, ({ vertices }) => vertices > 0);
@@ -36,8 +46,9 @@ for (const scene of scenes) {
   const middle = bounds.min.map((low, axis) => (low + bounds.max[axis]) / 2);
   const extent = Math.max(...bounds.min.map((low, axis) => bounds.max[axis] - low));
   const times = { leaf_ms: [], all_ms: [], cpu_ms: [], bytes: [], tiles: [] };
+  let body;
   for (let round = 0; round < ROUNDS; round += 1) {
-    const body = patch(0, 0, {
+    body = patch(0, 0, {
       side: 101,
       height: round / 10,
       scale: extent / 2000,
@@ -62,11 +73,15 @@ for (const scene of scenes) {
     times.bytes.push(frames.reduce((sum, { bytes }) => sum + bytes, 0));
     times.tiles.push(new Set(frames.map(({ tile }) => tile)).size);
   }
+  const [alone, alone_file] = ["alone.ply", "alone.drc"].map((name) => path.join(scratch, name));
+  writeFileSync(alone, body);
+  execFileSync(binary, ["fuse", alone, alone_file, "--method", "histogram_distribution"], { stdio: "ignore" });
   console.log(
     `${path.basename(scene)}: ${client.hello.scene.vertex_count} vertices, ${client.hello.scene.tile_count} tiles; medians of ${ROUNDS}: ` +
       Object.entries(times)
         .map(([name, values]) => `${name} ${median(values).toFixed(0)}`)
-        .join(", "),
+        .join(", ") +
+      `; the block alone ${statSync(alone_file).size} bytes`,
   );
   await client.close();
   await server.stop();
