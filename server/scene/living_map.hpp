@@ -24,6 +24,10 @@
 
 namespace spectra::server {
 
+/// Of a map that is expected to grow. A quarter of what others have: a block that comes in makes whole leaves anew, and coarse
+/// tiles above them.
+inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 4;
+
 /// A part of the map under a name of its own; one of the same name takes its place.
 struct BlockPut {
   std::string id;

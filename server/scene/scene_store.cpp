@@ -7,8 +7,6 @@ namespace {
 
 /// A map may double the extent of its first block so often.
 constexpr int kFirstLevel = 12;
-/// A quarter of what others have: a block that comes in makes whole leaves anew, and coarse tiles above them.
-constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 4;
 
 LivingMap::Options live_options() {
   return {.levels = LevelsOfDetail::All,

@@ -1,4 +1,4 @@
-// What it costs the processor to put a block of 10,000 vertices into the middle of a demo scene, for scenes of several sizes: until its leaves
+// What it costs the processor to put a block of 10,000 vertices into the middle of a live map, a demo scene, of several sizes: until its leaves
 // are published, and until the coarse tiles above have followed.
 //   update_bench [--rounds N] [VERTICES ...]     (without: 100,000, 1,000,000 and 10,000,000; the last takes minutes)
 
@@ -65,7 +65,7 @@ struct Cost {
 
 Cost cost_of(std::uint64_t vertex_count, int rounds) {
   WorkerPool pool(2);
-  LivingMap map({.levels = LevelsOfDetail::All, .first_level = 12});
+  LivingMap map({.levels = LevelsOfDetail::All, .leaf_vertex_count = kLiveLeafVertexCount, .first_level = 12});
   std::uint32_t revision = 0;
   std::vector<BlockPut> whole(1);
   whole[0].id = "scene";
