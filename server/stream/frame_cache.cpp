@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t kEntryOverheadBytes = 400;
 constexpr std::size_t kMostIssuedRevisions = 65'536;
 constexpr std::size_t kMostPlansBeforePruning = 1024;
+/// After so many new geometries those of tiles that are gone are looked for.
+constexpr unsigned kStoredBeforePruning = 64;
 
 template <class T>
 std::string_view bytes_of(const std::vector<T>& values) {
@@ -89,11 +91,9 @@ std::shared_ptr<const EncodedTile> FrameCache::State::store_geometry(const Geome
   std::vector<std::weak_ptr<CacheWaiter>> waiters;
   {
     const std::lock_guard lock(mutex_);
-    if (issued_.size() >= kMostIssuedRevisions) {
-      std::erase_if(issued_, [](const auto& item) { return item.first.tile.expired(); });
-      // Forgetting is safe: a geometry that comes back is then sent again under a new revision.
-      if (issued_.size() >= kMostIssuedRevisions) issued_.clear();
-    }
+    if (++stored_since_pruning_ >= kStoredBeforePruning) forget_what_is_gone();
+    // Forgetting is safe: a geometry that comes back is then sent again under a new revision.
+    if (issued_.size() >= kMostIssuedRevisions) issued_.clear();
     const auto [issued, is_new] = issued_.try_emplace(key);
     if (is_new || issued->second.digest != digest) issued->second = {++last_revision_, digest};
     value->revision = issued->second.revision;
@@ -186,6 +186,19 @@ std::uint64_t FrameCache::State::hit_count() const {
 std::uint64_t FrameCache::State::miss_count() const {
   const std::lock_guard lock(mutex_);
   return miss_count_;
+}
+
+void FrameCache::State::forget_what_is_gone() {
+  stored_since_pruning_ = 0;
+  std::erase_if(issued_, [](const auto& item) { return item.first.tile.expired(); });
+  std::set<std::uint32_t> gone;
+  geometry_.evict_if([&](const GeometryKey& key, const EncodedTile& geometry) {
+    if (!key.tile.expired()) return false;
+    gone.insert(geometry.revision);
+    return true;
+  });
+  if (gone.empty()) return;
+  colours_.evict_if([&](const ColourKey& key, const std::vector<std::byte>&) { return gone.contains(key.revision); });
 }
 
 void FrameCache::State::evict_surplus() {

@@ -3,6 +3,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <list>
 #include <map>
 #include <memory>
@@ -129,11 +130,16 @@ class Shelf {
   bool empty() const { return by_use_.empty(); }
   std::size_t size_bytes() const { return size_bytes_; }
 
-  void evict_least_recent() {
-    const auto entry = by_use_.front();
-    by_use_.pop_front();
-    size_bytes_ -= entry->second.size_bytes;
-    entries_.erase(entry);
+  void evict_least_recent() { evict(by_use_.begin()); }
+
+  /// Evicts all values for which `is_useless(key, value)`.
+  template <class Predicate>
+  void evict_if(Predicate is_useless) {
+    for (auto place = by_use_.begin(); place != by_use_.end();) {
+      const auto next = std::next(place);
+      if (is_useless((*place)->first, *(*place)->second.value)) evict(place);
+      place = next;
+    }
   }
 
  private:
@@ -145,6 +151,14 @@ class Shelf {
     std::size_t size_bytes = 0;
     typename std::list<typename Entries::iterator>::iterator place;
   };
+
+  void evict(typename std::list<typename Entries::iterator>::iterator place) {
+    const auto entry = *place;
+    by_use_.erase(place);
+    size_bytes_ -= entry->second.size_bytes;
+    entries_.erase(entry);
+  }
+
   Entries entries_;
   std::list<typename Entries::iterator> by_use_;
   std::size_t size_bytes_ = 0;
@@ -192,6 +206,8 @@ struct FrameCache::State {
   };
 
   void evict_surplus();
+  /// A tile that is part of no version of a map any more is not asked for again.
+  void forget_what_is_gone();
 
   const std::size_t capacity_bytes_;
   mutable std::mutex mutex_;
@@ -203,6 +219,7 @@ struct FrameCache::State {
   std::uint32_t last_revision_;
   std::uint64_t hit_count_ = 0;
   std::uint64_t miss_count_ = 0;
+  unsigned stored_since_pruning_ = 0;
 };
 
 }  // namespace spectra::server

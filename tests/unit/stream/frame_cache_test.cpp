@@ -89,6 +89,31 @@ TEST(FrameCache, EvictsColoursBeforeGeometry) {
   EXPECT_LE(cache.size_bytes(), 100'000U);
 }
 
+TEST(FrameCache, ForgetsTilesThatAreGone) {
+  FrameCache cache(std::size_t{1} << 30);
+  auto& state = *cache.state();
+  const auto plan = std::make_shared<const PlanIdentity>();
+  const auto put = [&](const std::shared_ptr<const Tile>& tile) {
+    const GeometryKey key{Identity(tile), 0.5F, 7};
+    state.claim_geometry(key, {});
+    const std::uint32_t revision = state.store_geometry(key, encoding(1'000))->revision;
+    state.claim_colours({revision, plan, 8}, {});
+    state.store_colours({revision, plan, 8}, colours(1'000));
+    return key;
+  };
+  const std::shared_ptr<const Tile> kept = patch_tile({}, 3, 0, 20);
+  const GeometryKey key = put(kept);
+  std::size_t after_100 = 0;
+  for (int i = 0; i < 1000; ++i) {
+    put(patch_tile({}, 3, i, 20));  // A map that lives: the next version has another in its place.
+    if (i == 100) after_100 = cache.size_bytes();
+  }
+  EXPECT_LT(cache.size_bytes(), 2 * after_100);
+  const auto still = state.find_geometry(key);
+  ASSERT_NE(still, nullptr);
+  EXPECT_NE(state.find_colours({still->revision, plan, 8}), nullptr);
+}
+
 TEST(FrameCache, AGeometryThatComesBackTheSameKeepsItsRevision) {
   FrameCache cache(0);  // Nothing is ever kept.
   auto& state = *cache.state();
