@@ -1,6 +1,7 @@
 #include "server/scene/living_map.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -26,10 +27,10 @@ constexpr double kLeavesShare = 0.25;
 constexpr double kCutShare = 0.6;
 constexpr double kStepsShare = 0.9;
 
-/// Automatic values follow when a fact of the temperatures has moved by this part of their span, or so large a part of the map
-/// has changed.
+/// Automatic values follow when a fact of the temperatures has moved by this part of their span: a quantile is looked at when so
+/// large a part of the map has changed. When all of it has, they follow in any case.
 constexpr double kReferenceMove = 1.0 / 32;
-constexpr double kReferenceChange = 1.0 / 4;
+constexpr double kReferenceLook = 1.0 / 4;
 
 /// Building needs for moments several times what stays. Left alone, glibc raises the size from which it gives freed memory
 /// back to the system as blocks of that size are freed, and keeps 64 MB a thread for good.
@@ -86,6 +87,14 @@ bool differs_much(const fusion::TemperatureSummary& from, const fusion::Temperat
   return has_moved(double{from.minimum}, double{to.minimum}, span) ||
          has_moved(double{from.maximum}, double{to.maximum}, span) || has_moved(from.mean, to.mean, span) ||
          has_moved(from.sigma, to.sigma, span);
+}
+
+bool have_quantiles_moved(const fusion::Histogram& from, const fusion::Histogram& to) {
+  const double span = double{to.maximum} - double{to.minimum};
+  constexpr std::array kParts{0.005, 0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98, 0.995};
+  return std::any_of(kParts.begin(), kParts.end(), [&](double part) {
+    return has_moved(fusion::histogram_quantile(from, part), fusion::histogram_quantile(to, part), span);
+  });
 }
 
 }  // namespace
@@ -153,7 +162,7 @@ std::shared_ptr<const SceneSnapshot> LivingMap::snapshot(std::uint32_t revision)
   auto made = snapshot_of(version(revision));
   if (made->reference_temperature() != reference_) {
     reference_ = made->reference_temperature();
-    changed_vertex_count_ = 0;
+    changed_vertex_count_ = looked_at_vertex_count_ = 0;
   }
   return made;
 }
@@ -213,11 +222,17 @@ MapVersion LivingMap::version(std::uint32_t revision) {
     for (const auto& leaf : version.leaves) fusion::add_to_histogram(owned_temperature(*leaf->tile), *percentiles_);
   }
   version.percentiles = *percentiles_;
-  const bool is_reference_good =
-      reference_ && !differs_much(reference_->summary, version.summary) &&
-      static_cast<double>(changed_vertex_count_) < kReferenceChange * static_cast<double>(facts.vertex_count);
-  if (is_reference_good) version.reference = reference_;
+  if (is_reference_good(version)) version.reference = reference_;
   return version;
+}
+
+bool LivingMap::is_reference_good(const MapVersion& version) {
+  if (!reference_ || differs_much(reference_->summary, version.summary)) return false;
+  const auto vertex_count = static_cast<double>(version.facts.vertex_count);
+  if (static_cast<double>(changed_vertex_count_) >= vertex_count) return false;
+  if (static_cast<double>(looked_at_vertex_count_) < kReferenceLook * vertex_count) return true;
+  looked_at_vertex_count_ = 0;
+  return !have_quantiles_moved(reference_->histogram(fusion::kPercentileBins), version.percentiles);
 }
 
 std::vector<fusion::Note> LivingMap::notes() const {
@@ -341,7 +356,10 @@ void LivingMap::take(ChangedTree changed, WorkerPool& pool, const fusion::Progre
       if (node->is_leaf()) fusion::add_to_histogram(owned_temperature(*node->tile), *percentiles_);
     }
   }
-  for (const auto& leaf : changed.dropped_leaves) changed_vertex_count_ += leaf->tile->owned_count;
+  for (const auto& leaf : changed.dropped_leaves) {
+    changed_vertex_count_ += leaf->tile->owned_count;
+    looked_at_vertex_count_ += leaf->tile->owned_count;
+  }
   if (options_.levels == LevelsOfDetail::All) {
     const auto coarse_progress = [&](std::string_view phase, double share) {
       fusion::report(progress, phase, kLeavesShare + (1 - kLeavesShare) * share);

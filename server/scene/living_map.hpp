@@ -95,6 +95,8 @@ class LivingMap {
  private:
   std::shared_ptr<const SceneSnapshot> snapshot(std::uint32_t revision);
   MapVersion version(std::uint32_t revision);
+  /// Automatic values found with the reference are still what this version would ask for, nearly.
+  bool is_reference_good(const MapVersion& version);
   std::vector<fusion::Note> notes() const;
   void put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress);
   void change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
@@ -118,7 +120,8 @@ class LivingMap {
   // Of the last version.
   std::optional<fusion::Histogram> percentiles_;
   std::shared_ptr<const fusion::SceneTemperature> reference_;
-  std::uint64_t changed_vertex_count_ = 0;  ///< Since the reference was taken.
+  std::uint64_t changed_vertex_count_ = 0;    ///< Since the reference was taken.
+  std::uint64_t looked_at_vertex_count_ = 0;  ///< Changed since its quantiles were looked at.
 };
 
 }  // namespace spectra::server

@@ -179,12 +179,26 @@ TEST_F(LivingMapTest, AutomaticValuesFollowWhenTheyHaveMovedFarEnough) {
   const auto hotter = apply(put("b3", terrain(3, 39 * 3, 20)));
   EXPECT_NE(hotter->reference_temperature(), first->reference_temperature());
   EXPECT_EQ(hotter->reference_temperature()->summary.maximum, hotter->temperature().summary.maximum);
-  // A little of everything is a lot.
+  // What is put again as it was moves nothing, until all of it was.
   auto last = hotter;
-  for (std::uint32_t i = 4; i < 7; ++i) {
-    last = apply(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
-  }
+  const auto put_again = [&](std::uint32_t i) {
+    last = apply(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i), i == 3 ? 20.0F : 0.0F)));
+  };
+  for (std::uint32_t i = 0; i < 5; ++i) put_again(i);
+  EXPECT_EQ(last->reference_temperature(), hotter->reference_temperature());
+  for (std::uint32_t i = 0; i < 10; ++i) put_again(i);
   EXPECT_NE(last->reference_temperature(), hotter->reference_temperature());
+  // Where most lie moves while mean and extremes hardly do.
+  const auto before = last;
+  const auto squeezed = [](std::uint32_t i) {
+    MultispectralMesh mesh = terrain(i, 39.0F * static_cast<float>(i));
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+      mesh.temperature_celsius()[v] = v % 2 == 0 ? 18.0F : 22.0F;
+    }
+    return mesh;
+  };
+  for (std::uint32_t i = 0; i < 3; ++i) last = apply(put("b" + std::to_string(i), squeezed(i)));
+  EXPECT_NE(last->reference_temperature(), before->reference_temperature());
 }
 
 TEST_F(LivingMapTest, RefusesWhatCannotBeOneMap) {
