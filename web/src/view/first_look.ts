@@ -122,7 +122,8 @@ export class FirstLook {
   }
 
   #follow(): void {
-    const points = this.#pointsOf(this.#coarsest());
+    // The coarsest may be those of before: they do not come again as long as finer ones are drawn in their place.
+    const points = this.#pointsOf(this.#geometries());
     if (this.#decided === null || this.#view === null || points.length === 0) return;
     const { facing } = this.#decided;
     const [before, next] = [this.#view, this.#fitted(points, viewDirection(facing, this.#up))];
