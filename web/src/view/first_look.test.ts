@@ -200,6 +200,20 @@ describe('FirstLook', () => {
     expect(distance()).toBeGreaterThan(50 * first);
   });
 
+  it('follows what finer tiles show where the coarsest is that of before', () => {
+    const { look, tiles, seen, distance } = setUp();
+    tiles.push(tile(grid(2)));
+    look.sceneIs(scene({ live: true, bounds: { min: [0, 0, 0], max: [2, 2, 0] } }));
+    look.pictureChanged();
+    const { views } = seen;
+    const first = distance();
+    tiles.push(tile(grid(20))); // finer than the first
+    look.sceneIs(scene({ live: true, bounds: { min: [0, 0, 0], max: [20, 20, 0] } }));
+    look.pictureChanged();
+    expect(seen.views).toBe(views + 1);
+    expect(distance()).toBeGreaterThan(5 * first);
+  });
+
   it('leaves a scene that is not live where it was decided, whatever comes', () => {
     const { look, tiles, seen } = setUp();
     look.sceneIs(scene());
