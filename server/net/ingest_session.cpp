@@ -58,8 +58,8 @@ asio::awaitable<void> IngestSession::run(UpgradeRequest request) {
   }));
   ws_.read_message_max(0);  // a message is read in parts, for which there is room
   ws_.auto_fragment(false);
-  ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
-    if (kind == websocket::frame_type::pong) is_pinging_ = false;
+  ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
+    if (kind == websocket::frame_type::pong) pings_.answered({payload.data(), payload.size()}, Clock::now());
   });
 
   const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
@@ -277,7 +277,6 @@ asio::awaitable<void> IngestSession::mind_deadlines() {
   std::uint64_t read_bytes = 0;
   auto last_write_progress = Clock::now();
   auto last_reading = Clock::now();
-  auto last_ping = Clock::now();
   while (!is_ended_) {
     minder_timer_.expires_after(limits.tick);
     co_await minder_timer_.async_wait(kAwait);
@@ -296,17 +295,18 @@ asio::awaitable<void> IngestSession::mind_deadlines() {
       end(true, "a message of it stands still");
     } else if (now >= close_deadline_) {
       end(false, "the close was not finished in time");
-    } else if (!closing_ && !is_pinging_ && now - last_ping >= limits.ping_interval) {
-      last_ping = now;
-      is_pinging_ = true;
-      asio::co_spawn(ws_.get_executor(), ping(), asio::detached);
+    } else if (closing_) {
+      continue;
+    } else if (auto payload = pings_.next(now, limits.ping_interval)) {
+      asio::co_spawn(ws_.get_executor(), ping(std::move(*payload)), asio::detached);
     }
   }
 }
 
-asio::awaitable<void> IngestSession::ping() {
+asio::awaitable<void> IngestSession::ping(std::string payload) {
   const auto self = shared_from_this();
-  co_await ws_.async_ping({}, kAwait);
+  co_await ws_.async_ping(websocket::ping_data(payload), kAwait);
+  pings_.written();
 }
 
 void IngestSession::close(std::uint16_t code, std::string_view reason) {

@@ -15,6 +15,7 @@
 #include "server/net/block_change.hpp"
 #include "server/net/block_room.hpp"
 #include "server/net/connection_stream.hpp"
+#include "server/net/ping_watch.hpp"
 #include "server/net/server_context.hpp"
 
 namespace spectra::server {
@@ -66,7 +67,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   boost::asio::awaitable<void> write_answers();
   boost::asio::awaitable<bool> write(std::string text);
   boost::asio::awaitable<void> mind_deadlines();
-  boost::asio::awaitable<void> ping();
+  boost::asio::awaitable<void> ping(std::string payload);
   protocol::IngestCredit credit() const;
   std::string text_of(const Answer& answer);
   void close(std::uint16_t code, std::string_view reason);
@@ -85,7 +86,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   bool is_stopping_ = false;
   bool is_ended_ = false;
   bool is_writing_ = false;
-  bool is_pinging_ = false;
+  PingWatch pings_{Clock::now()};
   bool is_within_message_ = false;
   bool is_waiting_for_room_ = false;
   Clock::time_point last_payload_;

@@ -48,10 +48,10 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   }));
   ws_.read_message_max(limits.message_size_bytes);
   ws_.auto_fragment(false);
-  ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
-    if (kind == websocket::frame_type::pong && is_pinging_) {
-      is_pinging_ = false;
-      round_trip_ms_ = std::chrono::duration<double, std::milli>(Clock::now() - ping_sent_).count();
+  ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
+    if (kind != websocket::frame_type::pong) return;
+    if (const auto round_trip = pings_.answered({payload.data(), payload.size()}, Clock::now())) {
+      round_trip_ms_ = std::chrono::duration<double, std::milli>(*round_trip).count();
     }
   });
 
@@ -155,7 +155,6 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
   auto last_write_progress = Clock::now();
   auto last_reading = Clock::now();
   auto last_move = Clock::now();
-  auto last_ping = Clock::now();
   while (!is_ended_) {
     minder_timer_.expires_after(limits.tick);
     co_await minder_timer_.async_wait(kAwait);
@@ -167,7 +166,7 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
       written_bytes = counted.written_bytes();
       last_write_progress = now;
     }
-    if (!is_pinging_) last_reading = now;
+    if (!pings_.is_out()) last_reading = now;
     if (counted.read_bytes() + counted.written_bytes() != moved_bytes) {
       moved_bytes = counted.read_bytes() + counted.written_bytes();
       last_move = now;
@@ -182,19 +181,17 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
       end(false, "the close was not finished in time");
     } else if (!closing_) {
       client_->ticked();
-      if (!is_pinging_ && now - last_ping >= limits.ping_interval) {
-        last_ping = now;
-        is_pinging_ = true;
-        asio::co_spawn(ws_.get_executor(), ping(), asio::detached);
+      if (auto payload = pings_.next(now, limits.ping_interval)) {
+        asio::co_spawn(ws_.get_executor(), ping(std::move(*payload)), asio::detached);
       }
     }
   }
 }
 
-asio::awaitable<void> WebSocketSession::ping() {
+asio::awaitable<void> WebSocketSession::ping(std::string payload) {
   const auto self = shared_from_this();
-  ping_sent_ = Clock::now();
-  co_await ws_.async_ping({}, kAwait);
+  co_await ws_.async_ping(websocket::ping_data(payload), kAwait);
+  pings_.written();
 }
 
 void WebSocketSession::post(std::function<void()> job) {

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "server/net/connection_stream.hpp"
+#include "server/net/ping_watch.hpp"
 #include "server/net/server_context.hpp"
 #include "server/net/token_bucket.hpp"
 
@@ -47,7 +48,7 @@ class WebSocketSession final : public ViewerPeer,
   boost::asio::awaitable<void> read_messages();
   boost::asio::awaitable<void> write_messages();
   boost::asio::awaitable<void> mind_deadlines();
-  boost::asio::awaitable<void> ping();
+  boost::asio::awaitable<void> ping(std::string payload);
   template <class Buffers>
   boost::asio::awaitable<bool> write(Buffers buffers, bool is_text);
   void close(boost::beast::websocket::close_reason reason);
@@ -67,11 +68,10 @@ class WebSocketSession final : public ViewerPeer,
   bool is_open_ = false;
   bool is_ended_ = false;
   bool is_writing_ = false;
-  bool is_pinging_ = false;
   bool may_have_frame_ = false;
   std::optional<boost::beast::websocket::close_reason> closing_;
   Clock::time_point close_deadline_ = Clock::time_point::max();
-  Clock::time_point ping_sent_;
+  PingWatch pings_{Clock::now()};
   double round_trip_ms_ = 0;
 };
 

@@ -287,6 +287,44 @@ TEST_F(WebSocketTest, CutsAViewerThatTalksAndIsOwedLittleButNeverReads) {
   EXPECT_EQ(server_->metrics().viewers_cut, 1U);
 }
 
+TEST_F(WebSocketTest, PongsThatNobodyAskedForKeepNobody) {
+  auto options = quick_options();
+  options.limits.ping_interval = milliseconds(50);
+  options.limits.pong_timeout = milliseconds(250);
+  start(std::move(options));
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open());
+  const auto begin = std::chrono::steady_clock::now();
+  while (record_.closed == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(10)) {
+    viewer.client().send_some(masked_frame(10, ""));
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  EXPECT_EQ(record_.closed, 1);
+  EXPECT_EQ(server_->metrics().viewers_cut, 1U);
+}
+
+// He is owed more than the kernels hold, so that a ping waits behind it for as long as he does not read.
+TEST_F(WebSocketTest, StopsBesideAPingThatCannotBeWritten) {
+  auto options = quick_options();
+  options.limits.ping_interval = milliseconds(30);
+  options.limits.pong_timeout = std::chrono::seconds(30);
+  options.limits.write_timeout = std::chrono::seconds(30);
+  start(std::move(options));
+  record_.frames_left = 40;
+  record_.frame_size_bytes = 1'000'000;
+  RawWebSocket viewer(port());
+  ASSERT_TRUE(viewer.is_open());
+  for (int i = 0; i < 50; ++i) {
+    viewer.client().send_some(masked_frame(10, ""));
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  ASSERT_EQ(record_.closed, 0);
+  const auto begin = std::chrono::steady_clock::now();
+  server_->stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  EXPECT_EQ(record_.closed, 1);
+}
+
 TEST_F(WebSocketTest, KeepsAViewerThatReadsSlowlyAndSaysNothing) {
   auto options = quick_options();
   options.limits.write_timeout = milliseconds(800);
