@@ -80,6 +80,12 @@ bool is_loopback(const asio::ip::address& address) {
          asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6()).is_loopback();
 }
 
+/// None, or chunked alone.
+bool is_transfer_coding_known(const http::fields& headers) {
+  const auto count = headers.count(http::field::transfer_encoding);
+  return count == 0 || (count == 1 && beast::iequals(headers[http::field::transfer_encoding], "chunked"));
+}
+
 /// PUT or DELETE of a block of the map.
 bool is_block_change(const http::request<http::string_body>& request) {
   return (request.method() == http::verb::put || request.method() == http::verb::delete_) &&
@@ -171,6 +177,8 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   const bool is_change = is_block_change(parser.get());
   const std::size_t largest_body = is_change ? limits.block_size_bytes : limits.body_size_bytes;
   if (!error) {
+    // A body whose end others see elsewhere would let requests be smuggled in.
+    if (!is_transfer_coding_known(parser.get())) error = http::error::bad_transfer_encoding;
     if (parser.content_length().value_or(0) > largest_body) error = http::error::body_limit;
     parser.body_limit(largest_body);
   }
@@ -223,35 +231,11 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   auto target = *parsed_target(view(request.target()));
 
   if (target.path == "/ws") {
-    auto refused = upgrade_refusal_of(request, "spectra.v1");
-    if (!refused && !hello_form_of(target)) refused = text_reply(400, "hello in the query must be full or brief\n");
-    if (refused) {
-      context_.metrics.requests_refused += 1;
-      co_return co_await write(*refused, request.version(), is_head, false);
-    }
-    const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *hello_form_of(target));
-    context_.remove(this);
-    co_await session->run(request);
+    co_await serve_viewer(std::move(request), target);
     co_return false;
   }
   if (target.path == "/ingest" && context_.blocks) {
-    const SenderPlace place(context_);
-    auto refused = upgrade_refusal_of(request, protocol::kIngestProtocol);
-    if (!refused && !is_from_here_) {
-      refused = text_reply(403, "the map is changed from the robot's own machine alone\n");
-    }
-    if (!refused && place.count() > static_cast<std::int64_t>(context_.options.limits.ingest_sessions)) {
-      refused = text_reply(503, "too many senders of blocks are connected already: " +
-                                    std::to_string(context_.options.limits.ingest_sessions) + " may be\n");
-      refused->headers.emplace_back("Retry-After", "1");
-    }
-    if (refused) {
-      context_.metrics.requests_refused += 1;
-      co_return co_await write(*refused, request.version(), is_head, false);
-    }
-    const auto session = std::make_shared<IngestSession>(std::move(stream_), context_);
-    context_.remove(this);
-    co_await session->run(request);
+    co_await serve_sender(std::move(request));
     co_return false;
   }
 
@@ -259,6 +243,45 @@ asio::awaitable<bool> HttpConnection::serve_one() {
                             joined(request, http::field::accept_encoding)};
   const HttpReply reply = co_await answer(checked);
   co_return co_await write(reply, request.version(), is_head, request.keep_alive() && !is_stopping_);
+}
+
+asio::awaitable<void> HttpConnection::serve_viewer(Request request, const RequestTarget& target) {
+  const auto form = hello_form_of(target);
+  auto refused = upgrade_refusal_of(request, "spectra.v1");
+  if (!refused && !form) refused = text_reply(400, "hello in the query must be full or brief\n");
+  if (refused) {
+    co_await refuse_upgrade(request, *refused);
+    co_return;
+  }
+  const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *form);
+  context_.remove(this);
+  co_await session->run(std::move(request));
+}
+
+asio::awaitable<void> HttpConnection::serve_sender(Request request) {
+  const SenderPlace place(context_);
+  const std::size_t most = context_.options.limits.ingest_sessions;
+  auto refused = upgrade_refusal_of(request, protocol::kIngestProtocol);
+  if (!refused && !is_from_here_) {
+    refused = text_reply(403, "the map is changed from the robot's own machine alone\n");
+  }
+  if (!refused && place.count() > static_cast<std::int64_t>(most)) {
+    refused =
+        text_reply(503, "too many senders of blocks are connected already: " + std::to_string(most) + " may be\n");
+    refused->headers.emplace_back("Retry-After", "1");
+  }
+  if (refused) {
+    co_await refuse_upgrade(request, *refused);
+    co_return;
+  }
+  const auto session = std::make_shared<IngestSession>(std::move(stream_), context_);
+  context_.remove(this);
+  co_await session->run(std::move(request));
+}
+
+asio::awaitable<void> HttpConnection::refuse_upgrade(const Request& request, const HttpReply& reply) {
+  context_.metrics.requests_refused += 1;
+  co_await write(reply, request.version(), request.method() == http::verb::head, false);
 }
 
 asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_block_body(

@@ -31,6 +31,10 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
   boost::asio::awaitable<bool> serve_one();
+  /// The connection becomes a session, or the upgrade is refused; it ends in any case.
+  boost::asio::awaitable<void> serve_viewer(Request request, const RequestTarget& target);
+  boost::asio::awaitable<void> serve_sender(Request request);
+  boost::asio::awaitable<void> refuse_upgrade(const Request& request, const HttpReply& reply);
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
   /// The rest of a request whose header was read and is good.

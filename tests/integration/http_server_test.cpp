@@ -237,6 +237,20 @@ TEST_F(HttpServerTest, RefusesABigHeader) {
   EXPECT_EQ(status_of(response), 431);
 }
 
+TEST_F(HttpServerTest, RefusesTransferCodingsThatOthersMayReadOtherwise) {
+  const std::string smuggled = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  for (const std::string coding :
+       {"Transfer-Encoding: xchunked", "Transfer-Encoding: chunked, identity", "Transfer-Encoding: identity",
+        "Transfer-Encoding: identity\r\nTransfer-Encoding: chunked"}) {
+    for (const std::string request : {"GET / HTTP/1.1", "PUT /api/v1/blocks/a HTTP/1.1"}) {
+      const auto response =
+          http_exchange(server_->port(), request + "\r\nHost: localhost\r\n" + coding + "\r\n\r\n" + smuggled);
+      EXPECT_EQ(status_of(response), 400) << request << ' ' << coding;
+      EXPECT_EQ(response.find("HTTP/1.1 200"), std::string::npos) << "nothing after it is a request";
+    }
+  }
+}
+
 TEST_F(HttpServerTest, RefusesABigBody) {
   const auto response =
       http_exchange(server_->port(), "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2000000\r\n\r\nx");
