@@ -5,7 +5,6 @@
 // simplifier is several times faster on that).
 
 #include <meshoptimizer.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
@@ -27,12 +26,14 @@
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/view_selection.hpp"
 #include "server/stream/viewer_stream.hpp"
+#include "tests/bench/processor_time.hpp"
 #include "tests/unit/scene/generated_scene.hpp"
 
 namespace {
 
 using namespace spectra;
 using namespace spectra::server;
+using bench::cpu_ms;
 
 struct Options {
   std::string path;
@@ -46,15 +47,6 @@ struct Options {
 struct Times {
   double wall_ms = 0, cpu_ms = 0;
 };
-
-double cpu_ms() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto ms = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_usec) / 1e3;
-  };
-  return ms(usage.ru_utime) + ms(usage.ru_stime);
-}
 
 template <class Work>
 Times timed(Work work) {

@@ -2,8 +2,6 @@
 // are published, and until the coarse tiles above have followed.
 //   update_bench [--rounds N] [VERTICES ...]     (without: 100,000, 1,000,000 and 10,000,000; the last takes minutes)
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,20 +12,13 @@
 
 #include "fusion/mesh/demo_scene.hpp"
 #include "server/scene/living_map.hpp"
+#include "tests/bench/processor_time.hpp"
 
 namespace {
 
 using namespace spectra;
 using namespace spectra::server;
-
-double cpu_ms() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto ms = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_usec) / 1e3;
-  };
-  return ms(usage.ru_utime) + ms(usage.ru_stime);
-}
+using bench::cpu_ms;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
