@@ -190,7 +190,7 @@ std::optional<std::string> MapKeeper::restore() {
     if (!problem && !visited) problem = visited.error().message;
     if (problem) return problem;
   }
-  served_.scenes.change(std::move(change), served_.pool);
+  change_map(std::move(change));
   if (const auto constants = served_.scenes.constants()) origin = constants->origin;
   const std::lock_guard lock(mutex_);
   entries_ = std::move(entries);
@@ -469,12 +469,7 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
                 put->scene.notes};
     wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at});
   }
-  served_.scenes.change(std::move(wanted), served_.pool);
-  {
-    const std::lock_guard lock(mutex_);
-    is_behind_ = true;
-  }
-  has_coarse_work_.notify_one();
+  change_map(std::move(wanted));
   keep_constants();
   for (std::size_t i = 0; i < batch.size(); ++i) {
     {
@@ -488,6 +483,15 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
     if (auto* put = std::get_if<Put>(&batch[i])) put->done(std::move(taken[i]));
     if (auto* gone = std::get_if<Remove>(&batch[i])) gone->done(revisions[i]);
   }
+}
+
+void MapKeeper::change_map(MapChange change) {
+  served_.scenes.change(std::move(change), served_.pool);
+  {
+    const std::lock_guard lock(mutex_);
+    is_behind_ = true;
+  }
+  has_coarse_work_.notify_one();
 }
 
 void MapKeeper::keep_constants() {

@@ -128,6 +128,8 @@ class MapKeeper {
   void take(std::vector<Change> batch);
   std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
+  /// Publishes the map with a change; its coarse tiles follow.
+  void change_map(MapChange change);
   void keep_constants();
   static void refuse(Change& change, const BlockRefusal& refusal);
   static const std::string& id_of(const Change& change);
@@ -150,7 +152,7 @@ class MapKeeper {
   std::uint64_t last_revision_ = 0;
 
   std::condition_variable has_coarse_work_;
-  bool is_behind_ = false;  ///< Coarse tiles are to be made.
+  bool is_behind_ = false;  ///< Coarse tiles may have to be made.
 
   // Last: they use the others.
   std::thread writer_;

@@ -178,6 +178,7 @@ void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapN
   const std::shared_ptr<const MapNode>& root = changed.root;
   if (!root) {
     outdated_.clear();
+    round_.clear();
     return;
   }
   if (has_new_spread(root)) collect_inner(root, wanted);

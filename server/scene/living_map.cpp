@@ -379,8 +379,9 @@ std::optional<CoarseWork> LivingMap::next_coarse() {
 }
 
 std::shared_ptr<const SceneSnapshot> LivingMap::take_coarse(const CoarseWork& work, std::uint32_t revision) {
+  const auto before = root_;
   if (root_) root_ = coarse_.taken(root_, work);
-  return snapshot(revision);
+  return root_ == before ? nullptr : snapshot(revision);
 }
 
 }  // namespace spectra::server

@@ -87,7 +87,7 @@ class LivingMap {
   bool is_behind() const;
   /// The next of them, to be run and taken; nothing when the map is complete.
   std::optional<CoarseWork> next_coarse();
-  /// The next version, with a tile that was made. The map may have changed meanwhile.
+  /// The next version, with a tile that was made. Null when the map has changed meanwhile so that it has no place.
   std::shared_ptr<const SceneSnapshot> take_coarse(const CoarseWork& work, std::uint32_t revision);
   /// Nothing more is expected for a while: gives back the memory that is kept for the next tile.
   void rest() { coarse_.rest(); }

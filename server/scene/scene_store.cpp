@@ -53,7 +53,8 @@ bool SceneStore::make_coarse() {
   if (!work) return false;
   work->run();
   const std::lock_guard replacing(replace_mutex_);
-  if (map == map_) publish(map_->take_coarse(*work, current()->revision() + 1), {});
+  if (map != map_) return true;
+  if (auto next = map_->take_coarse(*work, current()->revision() + 1)) publish(std::move(next), {});
   return true;
 }
 

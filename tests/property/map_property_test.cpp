@@ -217,14 +217,14 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
       auto work = map.next_coarse();
       if (!work) break;
       work->run();
-      scene = map.take_coarse(*work, ++revision);
+      if (auto next = map.take_coarse(*work, ++revision)) scene = std::move(next);
       expect_all_are_there(*scene);
     }
     if (!map.is_behind()) expect_promises(*scene);
   }
   while (auto work = map.next_coarse()) {
     work->run();
-    scene = map.take_coarse(*work, ++revision);
+    if (auto next = map.take_coarse(*work, ++revision)) scene = std::move(next);
   }
   expect_promises(*scene);
   if (!map.constants()) return;

@@ -5,6 +5,9 @@
 #include <condition_variable>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <future>
+#include <thread>
 
 #include "server/app/block_options.hpp"
 
@@ -136,6 +139,33 @@ TEST_F(MapKeeperTest, WhatBlocksShareIsTheSameWhenAllComeAtOnceIntoAnEmptyMap) {
     ASSERT_EQ(left.size(), 81U);
     for (std::size_t row = 0; row < 9; ++row) EXPECT_EQ(left[9 * row + 8], right[9 * row]) << i;
   }
+}
+
+// Killed before the constants of its map were stored: the first block decides them again, and the others come to a map that is there.
+TEST(MapKeeper, MakesTheCoarseTilesOfWhatItRestores) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "spectra-map-keeper";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  auto store = store::BlockStore::open((folder / "map.sqlite").string(), {}).value();
+  for (const std::string id : {"a", "b", "c"}) {
+    const auto ply = std::make_shared<const std::string>(square(120, id == "a" ? 0 : id == "b" ? 119 : 238));
+    std::promise<bool> is_stored;
+    store->put({{id, std::nullopt, std::nullopt, "", 120 * 120, 2 * 119 * 119, {}}, ply},
+               [&](const store::StoreResult<store::Revision>& outcome) { is_stored.set_value(outcome.has_value()); });
+    ASSERT_TRUE(is_stored.get_future().get());
+  }
+  ServedScene served{2, 1 << 20};
+  MapKeeper map(served, std::move(store));
+  ASSERT_EQ(map.restore(), std::nullopt);
+  // Tiles of the first block meet those of the second now, and are made again.
+  const auto restored = served.scenes.current();
+  for (int i = 0; i < 1000 && served.scenes.current() == restored; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_NE(served.scenes.current(), restored);
+  map.end();
+  served.pool.stop();
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
