@@ -1,5 +1,5 @@
-// What it costs the processor to put a block of 10,000 vertices into the middle of a live map, a demo scene, of several sizes: until its leaves
-// are published, and until the coarse tiles above have followed.
+// What it costs the processor to put a block of 10,000 vertices into the middle of a live map, as dense as what is there: until
+// its leaves are published, and until the coarse tiles above have followed. The maps are demo scenes of several sizes.
 //   update_bench [--rounds N] [VERTICES ...]     (without: 100,000, 1,000,000 and 10,000,000; the last takes minutes)
 
 #include <algorithm>
@@ -62,11 +62,13 @@ Cost cost_of(std::uint64_t vertex_count, int rounds) {
   whole[0].id = "scene";
   whole[0].scene.mesh = fusion::demo_scene({.vertex_count = vertex_count});
   map.apply({.put = std::move(whole), .removed = {}}, ++revision, pool);
+  // As dense as the scene, whose vertices are about 12 m / sqrt(their number) apart.
+  const float extent = 100 * 12 / std::sqrt(static_cast<float>(vertex_count));
   std::vector<double> leaves, coarse;
   std::size_t tile_count = 0, coarse_count = 0;
   for (int round = 0; round < rounds; ++round) {
     std::vector<BlockPut> block;
-    block.push_back(patch({0, 1.2F, 0.5F}, 0.3F, 24 + static_cast<float>(round % 5)));
+    block.push_back(patch({0, 1.2F, 0.5F}, extent, 24 + static_cast<float>(round % 5)));
     const double before = cpu_ms();
     tile_count = map.apply({.put = std::move(block), .removed = {}}, ++revision, pool)->tiles().size();
     const double between = cpu_ms();
