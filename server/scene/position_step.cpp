@@ -263,20 +263,41 @@ struct Ends {
 struct PositionSteps::Neighbourhood {
   std::array<float, 3> corner{};
   std::vector<std::uint32_t> points;
+  std::vector<std::uint32_t> changed;  ///< Those of `points` that were rounded anew in the last round.
   std::vector<std::array<float, 3>> place, rounded;
-  std::vector<Ends> ends;       ///< Of each alone.
-  std::vector<float> distance;  ///< To a vertex of the cell, squared.
+  std::vector<float> xs, ys, zs;  ///< Of `place`.
+  std::vector<Ends> ends;         ///< Of each alone.
+  std::vector<float> distance;    ///< To a vertex of the cell, squared.
   std::vector<std::uint32_t> near, ball;
   std::vector<float> near_distance;
+  std::vector<std::uint32_t> ring;
 
   void resize(std::size_t count) {
     place.resize(count);
     rounded.resize(count);
+    for (auto* axis : {&xs, &ys, &zs}) axis->resize(count);
     ends.resize(count);
     distance.resize(count);
     near.resize(count);
     ball.resize(count);
     near_distance.resize(count);
+    ring.resize(count);
+  }
+
+  /// Fills in `distance`.
+  void measure_from(const std::array<float, 3>& center) {
+    const std::size_t count = distance.size();
+    for (std::size_t n = 0; n < count; ++n) {
+      const float x = xs[n] - center[0], y = ys[n] - center[1], z = zs[n] - center[2];
+      distance[n] = x * x + y * y + z * z;
+    }
+  }
+
+  /// Squared.
+  float distance_from(const std::array<float, 3>& center, std::size_t n) const {
+    const std::array<float, 3>& p = place[n];
+    const float x = p[0] - center[0], y = p[1] - center[1], z = p[2] - center[2];
+    return x * x + y * y + z * z;
   }
 
   /// Puts those within a radius (squared) into `near`; returns how many.
@@ -287,6 +308,20 @@ struct PositionSteps::Neighbourhood {
       kept += distance[n] <= radius ? 1u : 0u;
     }
     return kept;
+  }
+
+  /// Of the first `near_count` of `near`: in which ring around a ball each is; in it is 0, and beyond the last ring the last.
+  void find_rings(std::size_t near_count, float radius, float width) {
+    for (std::size_t n = 0; n < near_count; ++n) near_distance[n] = distance[near[n]];
+    for (std::size_t n = 0; n < near_count; ++n) {
+      const float beyond = (near_distance[n] - radius) / width;
+      // Where floats end it is no number.
+      const float at_most = beyond < kRings ? beyond : kRings;
+      const float at_least = at_most > 0 ? at_most : 0;
+      const auto below = static_cast<std::int32_t>(at_least);
+      const std::int32_t above = below + (static_cast<float>(below) < at_least ? 1 : 0);
+      ring[n] = near_distance[n] <= radius ? 0u : static_cast<std::uint32_t>(above);
+    }
   }
 
   /// Of the first `near_count` of `near` (at least `count`): a radius that has `count` of them, or more where several are equally far.
@@ -634,25 +669,23 @@ void PositionSteps::keep_sides(WorkerPool& pool) {
       break;
     }
   }
-  std::vector<std::uint8_t> is_changed(cells_.size(), 1);
-  for (int round = 0; round < kRounds; ++round) {
-    std::vector<StepHalvings> wanted = halvings_;
+  SidesRound round{.is_changed = std::vector<std::uint8_t>(points_.size(), 1),
+                   .radius = std::vector<float>(points_.size()),
+                   .wanted = halvings_};
+  for (int i = 0; i < kRounds; ++i) {
+    round.is_first = i == 0;
     pool.for_each((thin.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
       Neighbourhood around;
-      for (std::size_t i = chunk * kChunk; i < std::min(thin.size(), (chunk + 1) * kChunk); ++i) {
-        keep_sides_in(cells_[thin[i]], is_changed, around, wanted);
+      for (std::size_t t = chunk * kChunk; t < std::min(thin.size(), (chunk + 1) * kChunk); ++t) {
+        keep_sides_in(cells_[thin[t]], around, round);
       }
     });
-    for (std::size_t c = 0; c < cells_.size(); ++c) {
-      const auto begin = static_cast<std::ptrdiff_t>(cells_[c].begin), end = static_cast<std::ptrdiff_t>(cells_[c].end);
-      is_changed[c] = std::equal(halvings_.begin() + begin, halvings_.begin() + end, wanted.begin() + begin) ? 0 : 1;
-    }
-    halvings_ = std::move(wanted);
+    for (std::size_t p = 0; p < points_.size(); ++p) round.is_changed[p] = halvings_[p] == round.wanted[p] ? 0 : 1;
+    halvings_ = round.wanted;
   }
 }
 
-void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t> is_changed, Neighbourhood& around,
-                                  std::vector<StepHalvings>& wanted) {
+void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round) {
   const auto step_m = static_cast<double>(largest_step_m_);
   const double reach = longest_side(cell.bounds) * kBallReach;
   around.corner = coordinates(cell.bounds.min);
@@ -662,12 +695,14 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
     to[axis] = double{coordinates(cell.bounds.max)[axis]} + reach;
   }
   around.points.clear();
-  bool is_any_changed = false;
+  around.changed.clear();
   for_each_cell(from, to, [&](const Cell& other) {
-    is_any_changed = is_any_changed || is_changed[static_cast<std::size_t>(&other - cells_.data())] != 0;
-    for (std::uint32_t i = other.begin; i < other.end; ++i) around.points.push_back(i);
+    for (std::uint32_t i = other.begin; i < other.end; ++i) {
+      if (round.is_changed[i] != 0) around.changed.push_back(static_cast<std::uint32_t>(around.points.size()));
+      around.points.push_back(i);
+    }
   });
-  if (!is_any_changed) return;
+  if (around.changed.empty()) return;
   const std::size_t count = around.points.size();
   around.resize(count);
   std::array<double, kMostHalvings + 1> steps_m{};
@@ -682,6 +717,9 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
           static_cast<float>(std::floor(double{p[axis]} / step + 0.5) * step - double{around.corner[axis]});
     }
     around.ends[n] = Ends(around.place[n], around.rounded[n]);
+    around.xs[n] = around.place[n][0];
+    around.ys[n] = around.place[n][1];
+    around.zs[n] = around.place[n][2];
   }
   constexpr float kEverywhere = std::numeric_limits<float>::infinity();
   float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
@@ -689,31 +727,28 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
     std::array<float, 3> center = coordinates(points_[seed].position);
     for (std::size_t axis = 0; axis < 3; ++axis)
       center[axis] = static_cast<float>(double{center[axis]} - double{around.corner[axis]});
-    for (std::size_t n = 0; n < count; ++n) {
-      const std::array<float, 3>& p = around.place[n];
-      const float x = p[0] - center[0], y = p[1] - center[1], z = p[2] - center[2];
-      around.distance[n] = x * x + y * y + z * z;
-    }
     if (count < kFewestOfBall) break;
-    // Among few, if it is about as large as the one before.
-    std::size_t near_count = around.gather(radius * 1.5F);
-    if (near_count < kFewestOfBall) near_count = around.gather(kEverywhere);
-    radius = around.radius_of(kFewestOfBall, near_count);
-    near_count = around.gather(radius * kLargestBall);
+    if (!round.is_first) {
+      radius = round.radius[seed];
+      // Where nothing has changed since it was looked at nothing else would come of it.
+      const bool is_any_near = std::any_of(around.changed.begin(), around.changed.end(), [&](std::uint32_t n) {
+        return around.distance_from(center, n) <= radius * kLargestBall;
+      });
+      if (!is_any_near) continue;
+    }
+    around.measure_from(center);
+    if (round.is_first) {
+      // Among few, if it is about as large as the one before.
+      std::size_t few_count = around.gather(radius * 1.5F);
+      if (few_count < kFewestOfBall) few_count = around.gather(kEverywhere);
+      radius = round.radius[seed] = around.radius_of(kFewestOfBall, few_count);
+    }
+    const std::size_t near_count = around.gather(radius * kLargestBall);
     // What each ring between a ball and the next larger one adds to it.
     const float ring_width = radius * (kLargestBall - 1) / kRings;
+    around.find_rings(near_count, radius, ring_width);
     std::array<Ends, kRings + 1> rings;
-    for (std::size_t n = 0; n < near_count; ++n) {
-      const std::uint32_t point = around.near[n];
-      const float beyond = (around.distance[point] - radius) / ring_width;
-      std::size_t ring = 0;
-      if (!(around.distance[point] <= radius)) {
-        // Where floats end it is no number.
-        ring = beyond < kRings ? static_cast<std::size_t>(beyond) : kRings;
-        if (static_cast<float>(ring) < beyond && ring < kRings) ++ring;
-      }
-      rings[ring].join(around.ends[point]);
-    }
+    for (std::size_t n = 0; n < near_count; ++n) rings[around.ring[n]].join(around.ends[around.near[n]]);
     Ends ball;
     for (std::size_t ring = 0; ring <= kRings; ++ring) {
       ball.join(rings[ring]);
@@ -721,10 +756,10 @@ void PositionSteps::keep_sides_in(const Cell& cell, std::span<const std::uint8_t
       const float ball_radius = radius + static_cast<float>(ring) * ring_width;
       std::size_t kept = 0;
       for (std::size_t n = 0; n < near_count; ++n) {
-        const std::uint32_t point = around.near[n];
-        if (around.distance[point] <= ball_radius) around.ball[kept++] = point;
+        around.ball[kept] = around.near[n];
+        kept += around.near_distance[n] <= ball_radius ? 1u : 0u;
       }
-      keep_sides_of(around, std::span(around.ball).first(kept), wanted);
+      keep_sides_of(around, std::span(around.ball).first(kept), round.wanted);
     }
   }
 }

@@ -58,6 +58,13 @@ class PositionSteps {
   };
   struct Branch;
   struct Neighbourhood;
+  /// One look at all balls, at the halvings of the round before.
+  struct SidesRound {
+    bool is_first = true;
+    std::vector<std::uint8_t> is_changed;  ///< Per point: its halvings are not those of the round before that.
+    std::vector<float> radius;         ///< Per point: of the smallest ball around it (squared); since the first round.
+    std::vector<StepHalvings> wanted;  ///< Per point: of the next round.
+  };
   static constexpr std::uint8_t kNoAxis = 3;
 
   void gather(std::span<const std::shared_ptr<Tile>> leaves);
@@ -67,8 +74,7 @@ class PositionSteps {
   void ask_neighbours(WorkerPool& pool);
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
   void keep_sides(WorkerPool& pool);
-  void keep_sides_in(const Cell& cell, std::span<const std::uint8_t> is_changed, Neighbourhood& around,
-                     std::vector<StepHalvings>& wanted);
+  void keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round);
   void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
                      std::vector<StepHalvings>& wanted);
   /// So that the ball ends at `least` to `most` beyond where it does.
