@@ -8,6 +8,7 @@
 
 #include "server/app/block_options.hpp"
 #include "server/app/fused_file.hpp"
+#include "server/store/time_text.hpp"
 
 namespace spectra::server {
 namespace {
@@ -34,8 +35,27 @@ nlohmann::json json_of(const BlockEntry& entry) {
   return json;
 }
 
+BlockRefusal no_time(const std::string& text) {
+  return {400, "bad_request", "at", "at=" + text + " is no time",
+          "2026-01-31T12:34:56Z (or +01:00 for Z), or Unix seconds"};
+}
+
 BlockRefusal no_name() {
   return {400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"};
+}
+
+HttpReply ply_of(const fusion::MultispectralMesh& mesh, const ExportSlots::Slot& slot) {
+  SceneFileOptions options;
+  options.format = SceneFileFormat::Ply;
+  const std::vector<fusion::Rgb8> visible(mesh.visible().begin(), mesh.visible().end());
+  auto file = scene_file(mesh, visible, options);
+  if (!file) return refused({500, "not_written", "", file.error().message, ""});
+  struct Body {
+    ExportSlots::Slot slot;
+    std::string bytes;
+  };
+  const auto body = std::make_shared<Body>(Body{slot, std::move(file.value().bytes)});
+  return {200, std::string(content_type_of(SceneFileFormat::Ply)), {body, &body->bytes}, {}};
 }
 
 }  // namespace
@@ -48,9 +68,15 @@ void BlockApi::handle(const HttpRequest& request, const std::function<void(HttpR
   if (path == kBlocksPath) {
     std::string after;
     std::size_t limit = kBlocksOfPage;
+    std::optional<store::StoreTime> at;
     for (const auto& [name, value] : request.target.query) {
       if (name == "after") {
         after = value;
+        continue;
+      }
+      if (name == "at") {
+        at = store::time_of(value);
+        if (!at) return reply(refused(no_time(value)));
         continue;
       }
       const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), limit);
@@ -58,20 +84,27 @@ void BlockApi::handle(const HttpRequest& request, const std::function<void(HttpR
                             limit > 0 && limit <= kBlocksOfPage;
       if (!is_limit) {
         return reply(refused({400, "bad_request", name, name + "=" + value + " is not understood",
-                              "after=ID, limit=1.." + std::to_string(kBlocksOfPage)}));
+                              "after=ID, at=TIME, limit=1.." + std::to_string(kBlocksOfPage)}));
       }
     }
-    const auto page = map_.page(after, limit);
+    MapKeeper::Page page;
+    if (at) {
+      auto past = map_.page_at(*at, after, limit);
+      if (const auto* refusal = std::get_if<BlockRefusal>(&past)) return reply(refused(*refusal));
+      page = std::get<MapKeeper::Page>(std::move(past));
+    } else {
+      page = map_.page(after, limit);
+    }
     nlohmann::json blocks = nlohmann::json::array();
-    for (const BlockEntry& entry : page) blocks.push_back(json_of(entry));
+    for (const BlockEntry& entry : page.blocks) blocks.push_back(json_of(entry));
     nlohmann::json next = nullptr;
-    if (page.size() == limit && !map_.page(page.back().id, 1).empty()) next = page.back().id;
+    if (page.has_more) next = page.blocks.back().id;
     return reply(text_reply(200, text_of({{"blocks", blocks}, {"next", next}}), "application/json"));
   }
   const std::string id = path.substr(kBlocksPath.size() + 1);
   if (!store::is_block_id(id)) return reply(refused(no_name()));
   if (request.method == HttpMethod::Put) return put(id, request, reply);
-  if (request.method == HttpMethod::Get) return give(id, reply);
+  if (request.method == HttpMethod::Get) return give(id, request.target.query, reply);
   map_.remove(id, [reply](const std::variant<store::Revision, BlockRefusal>& outcome) {
     const auto* refusal = std::get_if<BlockRefusal>(&outcome);
     reply(refusal != nullptr ? refused(*refusal) : text_reply(200, "{}\n", "application/json"));
@@ -129,29 +162,33 @@ void BlockApi::change(BlockChange change, std::function<void(BlockOutcome)> done
       MapKeeper::WhenFull::Take);
 }
 
-void BlockApi::give(const std::string& id, const std::function<void(HttpReply)>& reply) {
+void BlockApi::give(const std::string& id, const std::vector<std::pair<std::string, std::string>>& query,
+                    const std::function<void(HttpReply)>& reply) {
+  std::optional<store::StoreTime> at;
+  for (const auto& [name, value] : query) {
+    if (name != "at") {
+      return reply(refused({400, "bad_request", name, name + "=" + value + " is not understood", "at=TIME"}));
+    }
+    at = store::time_of(value);
+    if (!at) return reply(refused(no_time(value)));
+  }
   const BlockRefusal unknown{404, "not_found", "id", "there is no block \"" + id + "\"", ""};
-  if (!map_.has(id)) return reply(refused(unknown));
+  if (!at && !map_.has(id)) return reply(refused(unknown));
   const ExportSlots::Slot slot = exports_.take();
   if (!slot) {
     return reply(
         refused({503, "busy", "", "too many files are being made", std::to_string(ExportSlots::kMost) + " at a time"}));
   }
+  if (at) {
+    return map_.read_at(*at, id, [slot, reply](const std::variant<fusion::LoadedScene, BlockRefusal>& outcome) {
+      if (const auto* refusal = std::get_if<BlockRefusal>(&outcome)) return reply(refused(*refusal));
+      reply(ply_of(std::get<fusion::LoadedScene>(outcome).mesh, slot));
+    });
+  }
   served_.pool.post(
       [slot, scene = served_.scenes.current(), id, unknown, reply] {
         const auto mesh = scene->block_mesh(id);
-        if (!mesh) return reply(refused(unknown));
-        SceneFileOptions options;
-        options.format = SceneFileFormat::Ply;
-        const std::vector<fusion::Rgb8> visible(mesh->visible().begin(), mesh->visible().end());
-        auto file = scene_file(*mesh, visible, options);
-        if (!file) return reply(refused({500, "not_written", "", file.error().message, ""}));
-        struct Body {
-          ExportSlots::Slot slot;
-          std::string bytes;
-        };
-        const auto body = std::make_shared<Body>(Body{slot, std::move(file.value().bytes)});
-        reply(HttpReply{200, std::string(content_type_of(SceneFileFormat::Ply)), {body, &body->bytes}, {}});
+        reply(mesh ? ply_of(*mesh, slot) : refused(unknown));
       },
       kExportPriority);
 }

@@ -2,6 +2,8 @@
 
 #include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "server/app/export_slots.hpp"
 #include "server/app/map_keeper.hpp"
@@ -25,7 +27,8 @@ class BlockApi {
 
  private:
   void put(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply);
-  void give(const std::string& id, const std::function<void(HttpReply)>& reply);
+  void give(const std::string& id, const std::vector<std::pair<std::string, std::string>>& query,
+            const std::function<void(HttpReply)>& reply);
 
   ServedScene& served_;
   MapKeeper& map_;

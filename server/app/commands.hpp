@@ -9,6 +9,7 @@
 #include "fusion/mesh/read_options.hpp"
 #include "protocol/draco_file.hpp"
 #include "server/app/settings_text.hpp"
+#include "server/store/block_store.hpp"
 
 namespace spectra::server {
 
@@ -20,8 +21,10 @@ inline constexpr int kWrongUsage = 2;
 struct ServeOptions {
   std::optional<std::filesystem::path> scene;  ///< Absent: the demo scene.
   std::optional<std::filesystem::path> thermal;
-  bool is_live = false;                        ///< Begins with an empty map.
-  std::optional<std::filesystem::path> store;  ///< Keeps the blocks of a live map.
+  bool is_live = false;                                               ///< Begins with an empty map.
+  std::optional<std::filesystem::path> store;                         ///< Keeps the blocks of a live map.
+  std::uint64_t history_bytes = store::StoreOptions{}.history_bytes;  ///< Of the store.
+  std::optional<store::StoreTime> at;  ///< The map of the store is shown as it was then, and takes no blocks.
   std::string listen = "127.0.0.1:8080";
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> web;

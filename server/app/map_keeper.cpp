@@ -18,6 +18,7 @@
 #include "fusion/mesh/ply_reader.hpp"
 #include "fusion/mesh/scene_survey.hpp"
 #include "server/app/block_options.hpp"
+#include "server/store/time_text.hpp"
 
 namespace spectra::server {
 namespace {
@@ -76,6 +77,26 @@ fusion::Result<fusion::LoadedScene> loaded(const IncomingBlock& block, const std
                          error.field.empty() || error.field == name ? "body" : error.field);
 }
 
+/// A block of the store, as loaded().
+fusion::Result<fusion::LoadedScene> read_stored(const store::StoredBlock& stored,
+                                                const std::optional<fusion::Vec3d>& origin) {
+  const store::BlockDescription& told = stored.facts.description;
+  BOOST_OUTCOME_TRY(auto block, incoming_block(told.id, told.read_options));
+  block.ply = stored.ply;
+  return loaded(block, origin);
+}
+
+BlockEntry entry_of(const store::BlockFacts& facts) {
+  const store::BlockDescription& told = facts.description;
+  return {told.id,
+          facts.revision,
+          told.observed_at,
+          told.vertex_count,
+          told.triangle_count,
+          told.bounds,
+          store::to_hex(facts.sha256)};
+}
+
 store::BlockBounds bounds_of_mesh(const fusion::MultispectralMesh& mesh) {
   store::BlockBounds bounds;
   if (mesh.positions().empty()) return bounds;
@@ -94,6 +115,10 @@ BlockRefusal busy(std::string reason, std::string limits = "") {
   return {503, "busy", "", std::move(reason), std::move(limits)};
 }
 
+BlockRefusal no_history() {
+  return {409, "no_history", "at", "the map's past is kept nowhere; serve it with --store FILE", ""};
+}
+
 BlockRefusal refusal_of(const store::StoreError& error) {
   using store::StoreErrorCode;
   switch (error.code) {
@@ -105,6 +130,11 @@ BlockRefusal refusal_of(const store::StoreError& error) {
       return {400, "bad_request", "", error.message, ""};
     case StoreErrorCode::Busy:
       return busy(error.message);
+    case StoreErrorCode::HistoryGone:
+      return {410, "history_gone", "at", error.message, ""};
+    case StoreErrorCode::Damaged:
+    case StoreErrorCode::IoError:
+      return {500, "not_read", "", error.message, ""};
     default:
       return {507, "not_stored", "", error.message, ""};
   }
@@ -134,8 +164,11 @@ std::optional<MapConstants> constants_of(const std::string& text) {
 
 }  // namespace
 
-MapKeeper::MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store)
-    : served_(served), store_(std::move(store)), writer_([this] { run(); }), coarse_maker_([this] { make_coarse(); }) {}
+MapKeeper::MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store,
+                     const std::optional<store::StoreTime>& at)
+    : served_(served), store_(std::move(store)), at_(at), writer_([this] { run(); }), coarse_maker_([this] {
+        make_coarse();
+      }) {}
 
 MapKeeper::~MapKeeper() {
   end();
@@ -162,29 +195,22 @@ std::optional<std::string> MapKeeper::restore() {
   std::map<std::string, BlockEntry, std::less<>> entries;
   std::optional<fusion::Vec3d> origin;
   if (store_) {
+    std::optional<MapConstants> constants;
     if (const auto text = store_->constant(kConstantsKey)) {
-      const auto constants = constants_of(*text);
+      constants = constants_of(*text);
       if (!constants) return "the store's constants of the map cannot be read";
-      served_.scenes.begin(*constants);
       origin = constants->origin;
     }
-    const auto visited = store_->visit(std::nullopt, [&](store::StoredBlock stored) {
-      const store::BlockDescription& told = stored.facts.description;
-      auto block = incoming_block(told.id, told.read_options);
-      if (block) block.value().ply = stored.ply;
-      auto scene = block ? loaded(block.value(), origin) : fusion::Result<fusion::LoadedScene>(block.error());
+    served_.scenes.begin(constants, at_ ? std::optional("map of " + store::utc_text(*at_)) : std::nullopt);
+    const auto visited = store_->visit(at_, [&](const store::StoredBlock& stored) {
+      auto scene = read_stored(stored, origin);
+      const BlockEntry entry = entry_of(stored.facts);
       if (!scene) {
-        problem = "block " + told.id + ": " + scene.error().message;
+        problem = "block " + entry.id + ": " + scene.error().message;
         return false;
       }
-      entries[told.id] = {told.id,
-                          stored.facts.revision,
-                          told.observed_at,
-                          told.vertex_count,
-                          told.triangle_count,
-                          told.bounds,
-                          store::to_hex(stored.facts.sha256)};
-      change.put.push_back({told.id, std::move(scene).value(), told.observed_at});
+      entries[entry.id] = entry;
+      change.put.push_back({entry.id, std::move(scene).value(), entry.observed_at});
       return true;
     });
     if (!problem && !visited) problem = visited.error().message;
@@ -240,7 +266,12 @@ void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
   {
     const std::lock_guard lock(mutex_);
     waiting_bytes_ += bytes;
-    if (!is_open_ || is_ending_) {
+    if (at_) {
+      refusal = {
+          409, "as_it_was", "",
+          "the map is shown as it was at " + store::utc_text(*at_) + "; it changes where it is served without --at",
+          ""};
+    } else if (!is_open_ || is_ending_) {
       refusal = busy("the map is not open yet, or not any more");
     } else if (when_full == WhenFull::Refuse && waiting_bytes_ > kWaitingBytes) {
       refusal = busy("too many bytes of blocks are waiting", std::to_string(kWaitingBytes) + " bytes");
@@ -507,13 +538,50 @@ void MapKeeper::keep_constants() {
   });
 }
 
-std::vector<BlockEntry> MapKeeper::page(std::string_view after, std::size_t limit) const {
+MapKeeper::Page MapKeeper::page(std::string_view after, std::size_t limit) const {
   const std::lock_guard lock(mutex_);
-  std::vector<BlockEntry> page;
-  for (auto entry = entries_.upper_bound(after); entry != entries_.end() && page.size() < limit; ++entry) {
-    page.push_back(entry->second);
-  }
+  Page page;
+  auto entry = entries_.upper_bound(after);
+  for (; entry != entries_.end() && page.blocks.size() < limit; ++entry) page.blocks.push_back(entry->second);
+  page.has_more = entry != entries_.end();
   return page;
+}
+
+std::variant<MapKeeper::Page, BlockRefusal> MapKeeper::page_at(store::StoreTime time, std::string_view after,
+                                                               std::size_t limit) const {
+  if (!store_) return no_history();
+  const auto page = store_->page_at(time, after, limit);
+  if (!page) return refusal_of(page.error());
+  Page past{{}, page.value().next.has_value()};
+  for (const store::BlockFacts& facts : page.value().blocks) past.blocks.push_back(entry_of(facts));
+  return past;
+}
+
+void MapKeeper::read_at(store::StoreTime time, const std::string& id, PastDone done) const {
+  if (!store_) return done(no_history());
+  const auto facts = store_->find_at(time, id);
+  if (!facts) return done(refusal_of(facts.error()));
+  if (!facts.value()) {
+    return done(
+        BlockRefusal{404, "not_found", "id", "there was no block \"" + id + "\" at " + store::utc_text(time), ""});
+  }
+  std::optional<fusion::Vec3d> origin;
+  {
+    const std::lock_guard lock(mutex_);
+    origin = origin_;
+  }
+  store_->read(facts.value()->revision,
+               [&pool = served_.pool, origin, done = std::move(done)](store::StoreResult<store::StoredBlock> outcome) {
+                 if (!outcome) return done(refusal_of(outcome.error()));
+                 // The store's thread waits for nobody.
+                 pool.post(
+                     [stored = std::move(outcome).value(), origin, done] {
+                       auto scene = read_stored(stored, origin);
+                       if (!scene) return done(BlockRefusal{500, "not_read", "", scene.error().message, ""});
+                       done(std::move(scene).value());
+                     },
+                     kExportPriority);
+               });
 }
 
 bool MapKeeper::has(const std::string& id) const {

@@ -58,8 +58,10 @@ class MapKeeper {
     Take,    ///< For callers who bound themselves what they hand over.
   };
 
-  /// `store` may be null: then the map is gone with the program.
-  MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store);
+  /// `store` may be null: then the map is gone with the program. With a time the map is that of the store as it was then, and every
+  /// change is refused (409, as_it_was).
+  MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> store,
+            const std::optional<store::StoreTime>& at = std::nullopt);
   ~MapKeeper();  ///< As end().
   MapKeeper(const MapKeeper&) = delete;
   MapKeeper& operator=(const MapKeeper&) = delete;
@@ -77,9 +79,21 @@ class MapKeeper {
   void put(IncomingBlock block, PutDone done, WhenFull when_full = WhenFull::Refuse);
   void remove(std::string id, RemoveDone done, WhenFull when_full = WhenFull::Refuse);
 
-  /// In order of id, those after `after`, at most `limit`.
-  std::vector<BlockEntry> page(std::string_view after, std::size_t limit) const;
+  /// Blocks in order of id, and whether there are more behind them.
+  struct Page {
+    std::vector<BlockEntry> blocks;
+    bool has_more = false;
+  };
+  /// Those after `after`, at most `limit`.
+  Page page(std::string_view after, std::size_t limit) const;
   bool has(const std::string& id) const;
+
+  /// The same as it was at a time. Refused where there is no store (409, no_history) and where the time is no longer kept (410,
+  /// history_gone).
+  std::variant<Page, BlockRefusal> page_at(store::StoreTime time, std::string_view after, std::size_t limit) const;
+  /// One of them, read from the store: `done` is called once, in another thread. Refused in the same way.
+  using PastDone = std::function<void(std::variant<fusion::LoadedScene, BlockRefusal>)>;
+  void read_at(store::StoreTime time, const std::string& id, PastDone done) const;
 
   /// Bytes of blocks that may wait at a time.
   static constexpr std::size_t kWaitingBytes = 256u << 20;
@@ -137,6 +151,7 @@ class MapKeeper {
 
   ServedScene& served_;
   const std::unique_ptr<store::BlockStore> store_;
+  const std::optional<store::StoreTime> at_;
 
   mutable std::mutex mutex_;
   std::condition_variable has_work_;

@@ -13,6 +13,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/version.hpp"
+#include "server/store/time_text.hpp"
 
 namespace spectra::server {
 namespace {
@@ -64,6 +65,20 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
       ->add_option("--store", options.store, "The file that keeps the blocks of a live map; made when it is not there")
       ->excludes(scene)
       ->excludes("--demo");
+  command
+      ->add_option("--history", options.history_bytes,
+                   "Bytes that earlier revisions of blocks may take in the store, such as 500MB")
+      ->transform(CLI::AsSizeValue(false))
+      ->needs("--store")
+      ->default_str("1GB");
+  const auto set_time = [&options](const std::string& text) {
+    options.at = store::time_of(text);
+    if (!options.at)
+      throw CLI::ValidationError("--at " + text, "2026-01-31T12:34:56Z (or +01:00 for Z) or Unix seconds are wanted");
+  };
+  command->add_option_function<std::string>("--at", set_time, "Show the map of the store as it was at a time")
+      ->needs("--store")
+      ->excludes("--live");
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
   add_reading(*command, options.read);

@@ -69,7 +69,7 @@ class SceneLoader {
               if (const auto problem = map.restore()) throw std::runtime_error(*problem);
               served.progress.set(std::nullopt);
               const auto scene = served.scenes.current();
-              spdlog::info("serving a live map: {} vertices, {} triangles", scene->vertex_count(),
+              spdlog::info("serving the {}: {} vertices, {} triangles", scene->name(), scene->vertex_count(),
                            scene->triangle_count());
             } else {
               load(options, served);
@@ -151,11 +151,14 @@ int run_serve(const ServeOptions& options) {
       std::make_unique<ServedScene>(options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
   std::unique_ptr<store::BlockStore> store;
   if (options.store) {
-    auto opened = store::BlockStore::open(options.store->string(), {});
+    store::StoreOptions keeping;
+    keeping.history_bytes = options.history_bytes;
+    keeping.is_read_only = options.at.has_value();
+    auto opened = store::BlockStore::open(options.store->string(), keeping);
     if (!opened) return fail(kJobFailed, opened.error().message);
     store = std::move(opened).value();
   }
-  MapKeeper map(*served, std::move(store));
+  MapKeeper map(*served, std::move(store), options.at);
   HttpApi api(*served, map);
   std::unique_ptr<HttpServer> server;
   try {

@@ -187,7 +187,7 @@ MapVersion LivingMap::version(std::uint32_t revision) {
     facts.up = first->second->facts.up;
     facts.is_metric = first->second->facts.is_metric;
   }
-  if (options_.is_live) facts.name = "live map";
+  if (!options_.name.empty()) facts.name = options_.name;
   if (blocks_.size() == 1) facts.left_out = blocks_.begin()->second->facts.left_out;
   std::vector<Vec3f> core;
   for (const auto& [id, block] : blocks_) {

@@ -65,7 +65,8 @@ class LivingMap {
     std::uint32_t leaf_vertex_count = kLeafVertexCount;
     /// The level of the tile that the first block just fills: how often the map may double its extent.
     int first_level = 0;
-    bool is_live = false;  ///< Begins empty, and is expected to grow.
+    bool is_live = false;   ///< Begins empty, and is expected to grow.
+    std::string name = {};  ///< Of the scene; empty: that of the first block.
   };
 
   explicit LivingMap(const Options& options, const std::optional<MapConstants>& constants = std::nullopt);

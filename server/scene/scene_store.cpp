@@ -12,7 +12,8 @@ LivingMap::Options live_options() {
   return {.levels = LevelsOfDetail::All,
           .leaf_vertex_count = kLiveLeafVertexCount,
           .first_level = kFirstLevel,
-          .is_live = true};
+          .is_live = true,
+          .name = "live map"};
 }
 
 }  // namespace
@@ -63,9 +64,14 @@ void SceneStore::rest() {
   if (map_) map_->rest();
 }
 
-void SceneStore::begin(const MapConstants& constants) {
+void SceneStore::begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name) {
+  LivingMap::Options options = live_options();
+  if (past_name) {
+    options.is_live = false;
+    options.name = *past_name;
+  }
   const std::lock_guard replacing(replace_mutex_);
-  map_ = std::make_shared<LivingMap>(live_options(), constants);
+  map_ = std::make_shared<LivingMap>(options, constants);
 }
 
 std::optional<MapConstants> SceneStore::constants() const {

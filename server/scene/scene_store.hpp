@@ -61,8 +61,9 @@ class SceneStore {
   /// `listener` is called with every scene that becomes current from now on; it should only post to its own thread.
   [[nodiscard]] Subscription subscribe(Listener listener);
 
-  /// Begins an empty map with these constants; what is served stays until the first change().
-  void begin(const MapConstants& constants);
+  /// Begins an empty map; what is served stays until the first change(). Constants as LivingMap; a map with a name is one of the past,
+  /// which does not grow.
+  void begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name = std::nullopt);
   /// Of the map, once it had a block.
   std::optional<MapConstants> constants() const;
   /// See LivingMap::refusal_of().

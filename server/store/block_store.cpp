@@ -335,6 +335,13 @@ std::optional<BlockFacts> BlockStore::find(std::string_view id) const {
   return facts == nullptr ? std::nullopt : std::optional(*facts);
 }
 
+StoreResult<std::optional<BlockFacts>> BlockStore::find_at(StoreTime time, std::string_view id) const {
+  const std::lock_guard lock(state_->mutex);
+  BOOST_OUTCOME_TRY(const Revision revision, state_->catalogue.revision_at(time));
+  const BlockFacts* facts = state_->catalogue.find(id, revision);
+  return facts == nullptr ? std::nullopt : std::optional(*facts);
+}
+
 void BlockStore::read(Revision revision, ReadDone on_done) {
   {
     const std::lock_guard lock(state_->mutex);

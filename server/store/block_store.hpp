@@ -75,6 +75,8 @@ class BlockStore {
   StoreResult<BlockPage> page_at(StoreTime time, std::string_view after, std::size_t limit) const;
   /// The facts of the block as it is now.
   std::optional<BlockFacts> find(std::string_view id) const;
+  /// The same as it was at a time; nothing when it was not in the map. HistoryGone when that is no longer known.
+  StoreResult<std::optional<BlockFacts>> find_at(StoreTime time, std::string_view id) const;
 
   /// The bytes of a block as listed. NotFound when this revision is no longer kept; Damaged when they are not what was put.
   void read(Revision revision, ReadDone on_done);

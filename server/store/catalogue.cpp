@@ -118,16 +118,13 @@ BlockPage Catalogue::page(Revision at, std::string_view after, std::size_t limit
   BlockPage page;
   limit = std::max<std::size_t>(limit, 1);
   for (auto timeline = timelines_.upper_bound(after); timeline != timelines_.end(); ++timeline) {
-    const auto& revisions = timeline->second;
-    const auto beyond = std::upper_bound(revisions.begin(), revisions.end(), at);
-    if (beyond == revisions.begin()) continue;
-    const Change& change = changes_.at(*std::prev(beyond));
-    if (change.is_removal) continue;
+    const BlockFacts* facts = newest_of(timeline->second, at);
+    if (facts == nullptr) continue;
     if (page.blocks.size() == limit) {
       page.next = page.blocks.back().description.id;
       break;
     }
-    page.blocks.push_back(change.facts);
+    page.blocks.push_back(*facts);
   }
   return page;
 }
@@ -143,6 +140,18 @@ StoreResult<Revision> Catalogue::revision_at(StoreTime time) const {
                                                     "; what was before is no longer kept (--history BYTES keeps more)");
   }
   return revision;
+}
+
+const BlockFacts* Catalogue::newest_of(const std::vector<Revision>& timeline, Revision at) const {
+  const auto beyond = std::upper_bound(timeline.begin(), timeline.end(), at);
+  if (beyond == timeline.begin()) return nullptr;
+  const Change& change = changes_.at(*std::prev(beyond));
+  return change.is_removal ? nullptr : &change.facts;
+}
+
+const BlockFacts* Catalogue::find(std::string_view id, Revision at) const {
+  const auto timeline = timelines_.find(id);
+  return timeline == timelines_.end() ? nullptr : newest_of(timeline->second, at);
 }
 
 const BlockFacts* Catalogue::find(Revision revision) const {

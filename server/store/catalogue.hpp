@@ -66,6 +66,8 @@ class Catalogue {
   const BlockFacts* find(Revision revision) const;
   /// The facts of a block that is in the map now, or null.
   const BlockFacts* find(std::string_view id) const;
+  /// The same as it was at revision `at`.
+  const BlockFacts* find(std::string_view id, Revision at) const;
 
   Revision last_revision() const { return last_revision_; }
   Revision history_floor() const { return history_floor_; }
@@ -78,6 +80,8 @@ class Catalogue {
 
  private:
   const Change* newest(std::string_view id) const;
+  /// Of a block's revisions: what was in the map at `at`, or null.
+  const BlockFacts* newest_of(const std::vector<Revision>& timeline, Revision at) const;
   /// What becomes history when `next` follows `before` (null: nothing does) at the same id.
   template <class Pasts>
   static void append_past(Pasts& past, const Change* before, const Change& next);

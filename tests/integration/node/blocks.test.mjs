@@ -166,3 +166,93 @@ test("with a store the map is there again after the server was killed", async ()
   assert.ok(revision > Math.max(...before.blocks.blocks.map((block) => block.revision)), "revisions rise");
   await server.stop();
 });
+
+test("with a store the map can be asked for and served as it was", async () => {
+  const store = path.join(scratch, "past.sqlite");
+  let server = await serve(["--live", "--store", store]);
+  const moments = [];
+  const wait = () => new Promise((resolve) => setTimeout(resolve, 20));
+  const moment = async () => {
+    await wait();
+    moments.push(Date.now() / 1000);
+    await wait();
+  };
+  await moment(); // 0: nothing
+  const cold = patch(0, 0, { celsius: 20 });
+  await put(server, "a", cold, "?observed_at=1000");
+  await moment(); // 1: a, cold
+  await put(server, "a", patch(0, 0, { celsius: 30 }), "?observed_at=2000");
+  await put(server, "b", patch(1, 0));
+  await moment(); // 2: a, warm, and b
+  await ask(server, "DELETE", "a");
+  await moment(); // 3: b
+
+  const names = async (at) => (await list(server, `?at=${at}`)).blocks.map(({ id, observed_at }) => [id, observed_at]);
+  const [nothing, first, both, last] = moments;
+  assert.deepEqual(await names(nothing), []);
+  assert.deepEqual(await names(first), [["a", 1000]]);
+  assert.deepEqual(await names(both), [["a", 2000], ["b", null]]);
+  assert.deepEqual(await names(last), [["b", null]]);
+  assert.deepEqual(await names(new Date(first * 1000).toISOString()), [["a", 1000]]);
+  const page = await list(server, `?at=${both}&limit=1`);
+  assert.equal(page.next, "a");
+  const rest = await list(server, `?at=${both}&limit=1&after=a`);
+  assert.deepEqual([rest.blocks.map(({ id }) => id), rest.next], [["b"], null]);
+
+  const block_at = async (id, at) => {
+    const reply = await fetch(`${server.url}/api/v1/blocks/${id}?at=${at}`);
+    if (!reply.ok) return { status: reply.status, ...(await reply.json()).error };
+    const file = path.join(scratch, "past.ply");
+    writeFileSync(file, Buffer.from(await reply.arrayBuffer()));
+    return readPly(file);
+  };
+  assert.ok(Math.max(...(await block_at("a", first)).temperature) < 25);
+  assert.ok(Math.min(...(await block_at("a", both)).temperature) > 25);
+  const { x, y } = await block_at("a", first);
+  writeFileSync(path.join(scratch, "cold.ply"), cold);
+  const given = readPly(path.join(scratch, "cold.ply"));
+  assert.deepEqual([x, y], [given.x, given.y]);
+  for (const [id, at, status, code, field] of [
+    ["b", first, 404, "not_found", "id"],
+    ["a", last, 404, "not_found", "id"],
+    ["a", "yesterday", 400, "bad_request", "at"],
+  ]) {
+    const refusal = await block_at(id, at);
+    assert.deepEqual([refusal.status, refusal.code, refusal.field], [status, code, field], `${id} at ${at}`);
+  }
+  assert.equal((await ask(server, "GET", "b", { query: "?when=1" })).answer.error.field, "when");
+  await server.stop();
+
+  server = await serve(["--store", store, "--at", String(first)]);
+  const scene = await sceneOf(server);
+  assert.deepEqual([scene.live, scene.vertex_count, scene.observed], [false, 101 * 101, { oldest: 1000, newest: 1000 }]);
+  assert.match(scene.name, /^map of 20/);
+  const client = await SpectraClient.connect(server.url);
+  await client.request("scene.subscribe", { channels: ["fused"] });
+  await shows(client, scene.revision);
+  assert.equal(client.drawnTiles().reduce((sum, { frame }) => sum + frame.vertexCount, 0) >= 101 * 101, true);
+  await client.close();
+  for (const [method, body] of [["PUT", cold], ["DELETE", undefined]]) {
+    const { status, answer } = await ask(server, method, "a", { body });
+    assert.deepEqual([status, answer.error.code], [409, "as_it_was"]);
+    assert.match(answer.error.reason, /without --at/);
+  }
+  assert.deepEqual((await list(server)).blocks.map(({ id }) => id), ["a"]);
+  assert.deepEqual(await names(both), [["a", 2000], ["b", null]], "it still knows what came later");
+  await server.stop();
+
+  // The map of now is what it was, and a small history forgets.
+  server = await serve(["--store", store, "--history", "1KB"]);
+  assert.deepEqual((await list(server)).blocks.map(({ id }) => id), ["b"]);
+  await put(server, "b", patch(1, 0, { celsius: 25 }));
+  const gone = await fetch(`${server.url}/api/v1/blocks?at=${first}`);
+  const { error } = await gone.json();
+  assert.deepEqual([gone.status, error.code, error.field], [410, "history_gone", "at"]);
+  assert.match(error.reason, /reaches back to .*--history/);
+  await server.stop();
+
+  server = await serve(["--live"]);
+  const without = await fetch(`${server.url}/api/v1/blocks?at=${first}`);
+  assert.deepEqual([without.status, (await without.json()).error.code], [409, "no_history"]);
+  await server.stop();
+});

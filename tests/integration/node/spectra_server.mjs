@@ -1,11 +1,16 @@
 // Starts the built program for a test and stops it afterwards.
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync } from "node:fs";
+import { after } from "node:test";
 import { fileURLToPath } from "node:url";
 
 export const binary =
   process.env.SPECTRA_BIN ?? fileURLToPath(new URL("../../../build/release/bin/spectra", import.meta.url));
 if (!existsSync(binary)) throw new Error(`${binary} is not built; set SPECTRA_BIN`);
+
+// A test that fails before it stops its server neither waits for it nor leaves it behind.
+const running = new Set();
+if (process.env.NODE_TEST_CONTEXT) after(() => running.forEach((server) => server.kill("SIGKILL")));
 
 /** Runs a command of the program to its end. */
 export function run(...args) {
@@ -31,6 +36,8 @@ export async function serve(args, { ready = true } = {}) {
     });
     exited.then((code) => reject(new Error(`spectra serve: exit ${code}: ${errors}`)));
   });
+  running.add(process_);
+  exited.then(() => running.delete(process_));
   const stop = async () => {
     process_.kill("SIGTERM");
     return exited;
