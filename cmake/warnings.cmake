@@ -10,3 +10,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # g++ 12 reports these two inside libstdc++ and Boost where nothing is wrong.
   target_compile_options(spectra_warnings INTERFACE -Wno-null-dereference -Wno-restrict)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  # It counts double{value}, which says what it does, too.
+  target_compile_options(spectra_warnings INTERFACE -Wno-double-promotion)
+endif()

@@ -16,6 +16,11 @@ build_packages=(
   prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev zlib1g-dev
   libsqlite3-dev libssl-dev
 )
+# The compiler of the fusion library for the browser. Without it the browser leaves fusing to the robot, so that these are
+# installed where they can simply be added, and else are left out.
+module_packages=(
+  clang-14 lld-14 wasi-libc libc++-14-dev-wasm32 libc++abi-14-dev-wasm32 libclang-rt-14-dev-wasm32
+)
 test_packages=(
   libgtest-dev libgmock-dev librapidcheck-dev
   clang-format-14 chromium fonts-dejavu-core python3 git
@@ -31,6 +36,10 @@ esac
 
 say() { echo "dependencies: $*" >&2; }
 stop() { say "$*"; say "nothing was changed"; exit 1; }
+leave_out_module() {
+  say "${module_missing[*]} cannot be installed here ($*): the browser leaves fusing to the robot"
+  module_missing=()
+}
 
 # A Node.js that is already there is kept when it is new enough; otherwise Debian's (18.19) is installed.
 node_is_usable() {
@@ -39,12 +48,19 @@ node_is_usable() {
 }
 node_is_usable || packages+=(nodejs npm)
 
-installed=" $(dpkg-query -W -f '${db:Status-Status}:${Package} ' "${packages[@]}" 2>/dev/null || true) "
+installed=" $(dpkg-query -W -f '${db:Status-Status}:${Package} ' "${packages[@]}" "${module_packages[@]}" 2>/dev/null || true) "
+is_installed() { [[ $installed == *" installed:$1 "* ]]; }
 missing=()
 for package in "${packages[@]}"; do
-  [[ $installed == *" installed:$package "* || -e $beside/.complete/$package ]] || missing+=("$package")
+  is_installed "$package" || [ -e "$beside/.complete/$package" ] || missing+=("$package")
 done
-[ ${#missing[@]} -eq 0 ] && exit 0
+# Asked for once: a machine that cannot have them is not asked again at every start.
+module_refused=$beside/.module_refused
+module_missing=()
+if [ ! -e "$module_refused" ]; then
+  for package in "${module_packages[@]}"; do is_installed "$package" || module_missing+=("$package"); done
+fi
+[ ${#missing[@]} -eq 0 ] && [ ${#module_missing[@]} -eq 0 ] && exit 0
 
 install_options=(-y --no-install-recommends -o APT::Get::AutomaticRemove=false -o DPkg::Lock::Timeout=120)
 
@@ -85,6 +101,10 @@ unpack() {
 }
 
 as_root=()
+if [ ${#missing[@]} -eq 0 ] && [ "$(id -u)" -ne 0 ] && ! sudo -n true 2>/dev/null; then
+  leave_out_module "an administrator can run: apt-get install --no-remove ${module_missing[*]}"
+  exit 0
+fi
 if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null || stop "run as root or install sudo; missing: ${missing[*]}"
   as_root=(sudo)
@@ -112,11 +132,22 @@ sort_out() {
     sort_out "${@:half + 1}"
   fi
 }
-sort_out "${missing[@]}"
+[ ${#missing[@]} -eq 0 ] || sort_out "${missing[@]}"
 # What goes piece by piece need not go together.
 if $is_split && [ ${#plain[@]} -gt 0 ]; then
   harm=$(harm_of "${plain[@]}")
   [ -z "$harm" ] || stop "${plain[*]} cannot be added to this machine: $harm"
+fi
+
+if [ ${#module_missing[@]} -gt 0 ]; then
+  harm=$(harm_of "${plain[@]}" "${module_missing[@]}")
+  if [ -z "$harm" ]; then
+    plain+=("${module_missing[@]}")
+  else
+    leave_out_module "$harm"
+    mkdir -p "$beside"
+    : > "$module_refused"
+  fi
 fi
 
 if [ ${#conflicting[@]} -gt 0 ]; then

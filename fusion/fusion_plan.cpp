@@ -77,7 +77,7 @@ void FusionPlan::fuse(std::span<const float> temperature_celsius, std::span<cons
 
 void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept {
   if (!marking_kernel_) {
-    std::ranges::fill(marked, std::uint8_t{0});
+    std::fill(marked.begin(), marked.end(), std::uint8_t{0});
     return;
   }
   constexpr std::size_t kBlock = 1024;
@@ -85,7 +85,7 @@ void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<std:
   for (std::size_t begin = 0; begin < temperature_celsius.size(); begin += kBlock) {
     const std::size_t size = std::min(kBlock, temperature_celsius.size() - begin);
     const std::span<Rgb8> block = std::span(colours).first(size);
-    std::ranges::fill(block, kUnmarked);
+    std::fill(block.begin(), block.end(), kUnmarked);
     marking_kernel_->fuse(temperature_celsius.subspan(begin, size), block, block);
     for (std::size_t i = 0; i < size; ++i) marked[begin + i] = block[i] == kUnmarked ? 0 : 1;
   }

@@ -1,8 +1,9 @@
 #include "fusion/parameter.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <optional>
 
 namespace spectra::fusion {
@@ -12,9 +13,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The shortest text that reads back as the same number.
 std::string shown(double value) {
-  char buffer[32];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value);
-  return {buffer, end.ptr};
+  char buffer[40];
+  for (int digits = 1; digits <= 17; ++digits) {
+    std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
+    if (std::strtod(buffer, nullptr) == value) break;
+  }
+  return buffer;
 }
 
 std::string shown(const ParameterValue& value) {
@@ -137,32 +141,6 @@ Result<ParameterValue> validated(const Parameter& parameter, const ParameterValu
       break;
   }
   return refused(ErrorCode::WrongType, parameter, shown(value));
-}
-
-Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text) {
-  const std::string given = "'" + std::string(text) + "'";
-  if (allows_automatic(parameter) && (text == "null" || text == "auto")) return ParameterValue{Automatic{}};
-  switch (parameter.kind) {
-    case ParameterKind::Toggle:
-      if (text == "true" || text == "1" || text == "on" || text == "yes") return ParameterValue{true};
-      if (text == "false" || text == "0" || text == "off" || text == "no") return ParameterValue{false};
-      return refused(ErrorCode::WrongType, parameter, given);
-    case ParameterKind::Choice:
-      return validated(parameter, ParameterValue{std::string(text)});
-    case ParameterKind::Temperature:
-    case ParameterKind::Number:
-    case ParameterKind::Integer:
-      break;
-  }
-  std::string_view digits = text;
-  if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
-  double number = 0;
-  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  if (status == std::errc::result_out_of_range) return refused(ErrorCode::OutOfRange, parameter, given);
-  if (status != std::errc{} || end != digits.data() + digits.size()) {
-    return refused(ErrorCode::WrongType, parameter, given);
-  }
-  return validated(parameter, ParameterValue{number});
 }
 
 }  // namespace spectra::fusion

@@ -54,11 +54,11 @@ struct FusionSettings {
 
 /// A partial change; what is absent stays. Parameters merge; a new method starts at its defaults.
 struct FusionChange {
-  std::optional<std::string> method;
-  ParameterValues params;
-  std::optional<std::string> palette;
-  std::optional<RangeSetting> range;
-  std::optional<MissingDisplay> missing;
+  std::optional<std::string> method = {};
+  ParameterValues params = {};
+  std::optional<std::string> palette = {};
+  std::optional<RangeSetting> range = {};
+  std::optional<MissingDisplay> missing = {};
 };
 
 /// thermal_visible_blend at its defaults, palette iron, automatic range, missing shown as visible: what a file is fused

@@ -16,6 +16,7 @@
 
 #include "fusion/methods/vertex_lanes.hpp"
 #include "fusion/statistics/histogram_bins-inl.hpp"
+#include "fusion/wasm_lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace spectra::fusion::HWY_NAMESPACE {
@@ -310,25 +311,35 @@ HWY_INLINE bool none_missing(const float* temperature, std::size_t count) {
 #if HWY_TARGET == HWY_SCALAR
 struct PaddedColours {};
 #else
-/// Colours of a group between memory, 3 bytes a vertex, and its registers.
-class PaddedColours {
- public:
-  PaddedColours() {
+/// Where lanes and bytes of a group of colours go between memory, 3 bytes a vertex, and its registers.
+struct ColourMoves {
+  static constexpr std::uint8_t kNone = 0x80;
+  alignas(64) std::int32_t apart[kLanes] = {};
+  alignas(64) std::int32_t together[kLanes] = {};
+  alignas(64) std::uint8_t channel[kRegisters][4 * kLanes] = {};
+  alignas(64) std::uint8_t without_pad[4 * kLanes] = {};
+
+  constexpr ColourMoves() {
     for (std::size_t e = 0; e < kLanes; ++e) {
       const std::size_t block = e / 4;
       const std::size_t within = e % 4;
-      apart_[e] = static_cast<std::int32_t>(within < 3 ? 3 * block + within : 0);
-      together_[e] = static_cast<std::int32_t>(e < 3 * (kLanes / 4) ? e / 3 * 4 + e % 3 : 0);
+      apart[e] = static_cast<std::int32_t>(within < 3 ? 3 * block + within : 0);
+      together[e] = static_cast<std::int32_t>(e < 3 * (kLanes / 4) ? e / 3 * 4 + e % 3 : 0);
       for (std::size_t c = 0; c < 4; ++c) {  // Byte c of lane e.
         for (std::size_t j = 0; j < kRegisters; ++j) {
-          channel_[j][4 * e + c] = static_cast<std::uint8_t>(c == 0 && within < 3 ? 3 * j + within : kNone);
+          channel[j][4 * e + c] = static_cast<std::uint8_t>(c == 0 && within < 3 ? 3 * j + within : kNone);
         }
         const std::size_t to = 4 * within + c;
-        without_pad_[4 * e + c] = static_cast<std::uint8_t>(to < 12 ? 4 * (to % 3) + to / 3 : kNone);
+        without_pad[4 * e + c] = static_cast<std::uint8_t>(to < 12 ? 4 * (to % 3) + to / 3 : kNone);
       }
     }
   }
+};
+inline constexpr ColourMoves kColourMoves;
 
+/// Colours of a group between memory and its registers.
+class PaddedColours {
+ public:
   /// Four vertices to a block, 12 bytes of it.
   HWY_INLINE hn::Vec<ByteTag> load(const std::uint8_t* from) const {
     const ByteTag d;
@@ -336,12 +347,13 @@ class PaddedColours {
     const hn::Half<decltype(half)> quarter;
     const auto near = hn::LoadU(half, from);
     const auto far = hn::ZeroExtendVector(half, hn::LoadU(quarter, from + 2 * kLanes));
-    return moved(hn::Combine(d, far, near), apart_);
+    return moved(hn::Combine(d, far, near), kColourMoves.apart);
   }
 
-  /// Register j of what load() gave.
-  HWY_INLINE Floats channels(hn::Vec<ByteTag> loaded, std::size_t j) const {
-    const auto bytes = hn::TableLookupBytesOr0(loaded, hn::Load(ByteTag(), channel_[j]));
+  /// Register `kRegister` of what load() gave.
+  template <int kRegister>
+  HWY_INLINE Floats channels(hn::Vec<ByteTag> loaded) const {
+    const auto bytes = hn::TableLookupBytesOr0(loaded, hn::Load(ByteTag(), kColourMoves.channel[kRegister]));
     return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), bytes));
   }
 
@@ -354,23 +366,18 @@ class PaddedColours {
     const auto even = hn::Xor(level[0], hn::ShiftLeft<16>(level[2]));
     const auto odd = hn::Xor(hn::ShiftLeft<8>(level[1]), hn::ShiftLeft<24>(level[3]));
     const auto bytes = hn::BitCast(d, hn::Xor(hn::Xor(even, odd), hn::Set(BitsTag(), kAbove)));
-    const auto packed = moved(hn::TableLookupBytesOr0(bytes, hn::Load(d, without_pad_)), together_);
+    const auto packed =
+        moved(hn::TableLookupBytesOr0(bytes, hn::Load(d, kColourMoves.without_pad)), kColourMoves.together);
     hn::StoreU(hn::LowerHalf(half, packed), half, to);
     hn::StoreU(hn::LowerHalf(quarter, hn::UpperHalf(half, packed)), quarter, to + 2 * kLanes);
   }
 
  private:
-  static constexpr std::uint8_t kNone = 0x80;
-
   static HWY_INLINE hn::Vec<ByteTag> moved(hn::Vec<ByteTag> bytes, const std::int32_t* lane) {
+    if (kLanes == 4) return bytes;  // Of one block everything is where it belongs.
     const IntTag d;
     return hn::BitCast(ByteTag(), hn::TableLookupLanes(hn::BitCast(d, bytes), hn::SetTableIndices(d, lane)));
   }
-
-  alignas(64) std::int32_t apart_[kLanes];
-  alignas(64) std::int32_t together_[kLanes];
-  alignas(64) std::uint8_t channel_[kRegisters][4 * kLanes];
-  alignas(64) std::uint8_t without_pad_[4 * kLanes];
 };
 #endif
 
@@ -401,7 +408,7 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
     Floats present = all(1);
     if constexpr (kSomeMissing) present = hn::IfThenZeroElse(hn::IsNaN(hn::LoadU(d, temperature + i)), present);
     const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) HWY_ATTR {
-      const Floats v = padded.channels(loaded, kRegister);
+      const Floats v = padded.template channels<kRegister>(loaded);
       const Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
       if constexpr (!kSomeMissing) return levels(f);
       return levels(hn::IfThenElse(hn::Gt(spread<kRegister>(present), all(0)), f, missing ? fixed : v));

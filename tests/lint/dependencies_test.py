@@ -69,8 +69,11 @@ class Dependencies(unittest.TestCase):
         self.fake("node", "#!/bin/sh\necho true\n")
         self.fake("npm", "#!/bin/sh\n")
         self.fake("id", "#!/bin/sh\necho 0\n")
-        everything = SCRIPT.read_text().split("build_packages=(")[1].split(")")[0].split()
+        listed = lambda name: SCRIPT.read_text().split(f"\n{name}_packages=(")[1].split(")")[0].split()
+        self.module = listed("module")
+        everything = listed("build") + self.module
         self.assertIn("libboost1.81-dev", everything)
+        self.assertIn("wasi-libc", everything)
         self.set_installed(everything)
 
     def fake(self, name, text):
@@ -213,6 +216,36 @@ class Dependencies(unittest.TestCase):
         self.fake("sudo", '#!/bin/sh\nshift\nexec "$@"\n')
         self.assertEqual(self.run_script(), 0, self.told)
         self.assertEqual(self.changes, ["install libfmt-dev --no-remove"])
+
+    def test_the_compiler_of_the_module_comes_along(self):
+        self.lack("libfmt-dev", *self.module)
+        self.assertEqual(self.run_script(), 0, self.told)
+        self.assertEqual(self.changes, [f"install {' '.join(sorted(['libfmt-dev', *self.module]))} --no-remove"])
+
+    def test_goes_on_without_the_module_where_its_compiler_would_do_harm_and_asks_once(self):
+        self.lack("libfmt-dev", "lld-14", "wasi-libc")
+        self.conflict("lld-14", "Remv lld-16 [16.0.6]\n")
+        self.assertEqual(self.run_script(), 0, self.told)
+        self.assertEqual(self.changes, ["install libfmt-dev --no-remove"])
+        for text in ("lld-14 wasi-libc cannot be installed here", "remove lld-16", "leaves fusing to the robot"):
+            self.assertIn(text, self.told)
+        self.assertEqual(self.run_script(), 0, self.told)
+        self.assertEqual((self.calls, self.told), ([], ""))
+
+    def test_goes_on_without_the_module_where_apt_does_not_know_it(self):
+        self.lack("wasi-libc")
+        self.conflict("wasi-libc", "E: Unable to locate package wasi-libc\n")
+        self.assertEqual(self.run_script(), 0, self.told)
+        self.assertEqual(self.changes, [])
+        self.assertIn("Unable to locate package wasi-libc", self.told)
+
+    def test_goes_on_without_the_module_where_nobody_is_root(self):
+        self.lack("wasi-libc")
+        self.fake("id", "#!/bin/sh\necho 1000\n")
+        self.fake("sudo", "#!/bin/sh\nexit 1\n")
+        self.assertEqual(self.run_script(), 0, self.told)
+        self.assertEqual(self.calls, [])
+        self.assertIn("apt-get install --no-remove wasi-libc", self.told)
 
     def test_keeps_a_node_that_is_new_enough_and_adds_one_where_there_is_none(self):
         self.fake("node", "#!/bin/sh\necho false\n")
