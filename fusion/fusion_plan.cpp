@@ -60,6 +60,8 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
   const MethodContext context{plan.range_minimum_, plan.range_maximum_, scene, palette, settings.missing};
   PreparedMethod prepared = method->prepare(in_force, context);
   plan.kernel_ = std::move(prepared.kernel);
+  plan.change_scale_ = prepared.change_scale;
+  plan.compares_with_baseline_ = method->compares_with_baseline;
   if (method->highlights) {
     const MethodContext telling{plan.range_minimum_, plan.range_maximum_, scene, telling_palette(), std::nullopt};
     plan.marking_kernel_ = method->prepare(in_force, telling).kernel;
@@ -70,12 +72,12 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
   return plan;
 }
 
-void FusionPlan::fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
-                      std::span<Rgb8> fused) const noexcept {
-  kernel_->fuse(temperature_celsius, visible, fused);
+void FusionPlan::fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept {
+  kernel_->fuse(vertices, fused);
 }
 
-void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept {
+void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<const float> baseline_celsius,
+                      std::span<std::uint8_t> marked) const noexcept {
   if (!marking_kernel_) {
     std::fill(marked.begin(), marked.end(), std::uint8_t{0});
     return;
@@ -86,7 +88,9 @@ void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<std:
     const std::size_t size = std::min(kBlock, temperature_celsius.size() - begin);
     const std::span<Rgb8> block = std::span(colours).first(size);
     std::fill(block.begin(), block.end(), kUnmarked);
-    marking_kernel_->fuse(temperature_celsius.subspan(begin, size), block, block);
+    VertexValues vertices{temperature_celsius.subspan(begin, size), block};
+    if (!baseline_celsius.empty()) vertices.baseline_celsius = baseline_celsius.subspan(begin, size);
+    marking_kernel_->fuse(vertices, block);
     for (std::size_t i = 0; i < size; ++i) marked[begin + i] = block[i] == kUnmarked ? 0 : 1;
   }
 }

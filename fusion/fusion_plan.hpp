@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,6 +21,12 @@ struct TemperatureInterval {
   double high = 0;
 };
 
+/// The changes of temperature, kelvin, that stand at the two ends of the palette.
+struct ChangeScale {
+  double minimum = 0;
+  double maximum = 0;
+};
+
 class Kernel;
 
 /// Settings made ready for one scene: everything that does not depend on the vertex is computed once. Immutable and
@@ -34,14 +41,22 @@ class FusionPlan {
   static Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene,
                                     const PaletteTable& palette);
 
-  /// Fused colours of vertices; all three spans have the same length. Total: no input makes undefined behaviour.
-  /// The answer for a vertex depends on that vertex alone, so any split and any thread count give the same bytes.
+  /// Fused colours of vertices; all spans that are there have the same length. Total: no input makes undefined
+  /// behaviour. The answer for a vertex depends on that vertex alone, so any split and any thread count give the same
+  /// bytes. Freshness is applied as it stands, whatever the settings say of age: only the caller knows the time.
+  void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept;
+
+  /// The same of vertices without a baseline, all fresh.
   void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
-            std::span<Rgb8> fused) const noexcept;
+            std::span<Rgb8> fused) const noexcept {
+    fuse(VertexValues{temperature_celsius, visible}, fused);
+  }
 
   /// Writes 1 where the method highlights a temperature so that it can be seen at all, else 0: of one visible colour that no
-  /// highlight resembles, it makes another. All 0 for a method that treats all temperatures alike.
-  void mark(std::span<const float> temperature_celsius, std::span<std::uint8_t> marked) const noexcept;
+  /// highlight resembles, it makes another. All 0 for a method that treats all temperatures alike. `baseline_celsius`
+  /// may be empty: no vertex has any.
+  void mark(std::span<const float> temperature_celsius, std::span<const float> baseline_celsius,
+            std::span<std::uint8_t> marked) const noexcept;
 
   /// The method highlights some temperatures: mark() may write 1.
   bool highlights() const { return marking_kernel_ != nullptr; }
@@ -56,8 +71,15 @@ class FusionPlan {
   const ParameterValues& params_in_force() const { return *params_in_force_; }
 
   /// The temperatures that the method shows otherwise than by the visible colour, ascending and disjoint, within the
-  /// data's extremes; empty for a method that treats all temperatures alike.
+  /// data's extremes; empty for a method that treats all temperatures alike, and for one that compares with the
+  /// baseline: what that shows is no interval of temperatures.
   const std::vector<TemperatureInterval>& highlighted() const { return *highlighted_; }
+
+  /// The temperatures are compared with the vertices' baseline.
+  bool compares_with_baseline() const { return compares_with_baseline_; }
+
+  /// What the palette stands for where that is changes of temperature; nothing where it is the active range.
+  const std::optional<ChangeScale>& change_scale() const { return change_scale_; }
 
  private:
   FusionPlan() = default;
@@ -69,6 +91,8 @@ class FusionPlan {
   std::shared_ptr<const std::vector<TemperatureInterval>> highlighted_;
   double range_minimum_ = 0;
   double range_maximum_ = 0;
+  std::optional<ChangeScale> change_scale_;
+  bool compares_with_baseline_ = false;
 };
 
 }  // namespace spectra::fusion

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,9 @@ class Kernel {
   Kernel& operator=(const Kernel&) = delete;
   virtual ~Kernel() = default;
 
-  /// Writes one fused colour per vertex; the three spans have the same length. Total: any bit pattern is allowed as
-  /// a temperature.
-  virtual void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
-                    std::span<Rgb8> fused) const noexcept = 0;
+  /// Writes one fused colour per vertex, faded by its freshness; the spans that are there have the same length. Total:
+  /// any bit pattern is allowed as a temperature.
+  virtual void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept = 0;
 };
 
 /// What a method may know when it is made ready for a scene.
@@ -37,6 +37,7 @@ struct MethodContext {
 struct PreparedMethod {
   std::shared_ptr<const Kernel> kernel;
   std::vector<TemperatureInterval> highlighted;  ///< As FusionPlan::highlighted().
+  std::optional<ChangeScale> change_scale = {};  ///< As FusionPlan::change_scale().
 };
 
 /// A fusion method as the rest of Spectra sees it. The id and the parameter names are wire and command line names.
@@ -49,10 +50,16 @@ struct Method {
   bool uses_palette = true;
   /// The method gives lightness to the visible picture, so that a palette which is not fusion_safe loses temperature.
   bool wants_fusion_safe_palette = false;
+  /// The palette shows changes in both directions, so that one which is not diverging does not tell them apart.
+  bool wants_diverging_palette = false;
+  /// The method compares temperatures with the vertices' baseline; where there is none it has nothing to show. What it
+  /// highlights is then no matter of the temperature alone.
+  bool compares_with_baseline = false;
 
   // What a method promises; the property tests hold it to its word.
 
-  /// Some temperatures are shown otherwise than by the visible colour, and FusionPlan::highlighted() says which.
+  /// Some temperatures are shown otherwise than by the visible colour, and FusionPlan::highlighted() says which (unless
+  /// it compares_with_baseline).
   bool highlights = false;
   /// With `invert` what is highlighted is exactly what is not without it, except what stands on a threshold.
   bool invert_complements = false;

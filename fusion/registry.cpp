@@ -14,7 +14,8 @@
   METHOD(intensity_hue)                \
   METHOD(inverse_intensity_hue)        \
   METHOD(histogram_bin)                \
-  METHOD(histogram_distribution)
+  METHOD(histogram_distribution)       \
+  METHOD(thermal_change)
 
 namespace spectra::fusion {
 namespace methods {

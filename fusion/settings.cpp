@@ -73,6 +73,12 @@ Result<RangeSetting> validated(const RangeSetting& range) {
   return RangeSetting{};
 }
 
+std::string seconds_text(double seconds) {
+  char buffer[40];
+  std::snprintf(buffer, sizeof buffer, "%.0f", seconds);
+  return buffer;
+}
+
 /// A double in hexadecimal: exact and short.
 std::string exact(double value) {
   char buffer[40];
@@ -144,6 +150,18 @@ Result<FusionSettings> with_change(const FusionSettings& settings, const FusionC
     BOOST_OUTCOME_TRY(changed.range, validated(*change.range));
   }
   if (change.missing) changed.missing = *change.missing;
+  if (change.age.mode) changed.age.mode = *change.age.mode;
+  if (change.age.half_life_s) {
+    // Written so that not-a-number is refused.
+    if (!(*change.age.half_life_s >= kShortestHalfLifeSeconds && *change.age.half_life_s <= kLongestHalfLifeSeconds)) {
+      return failure(ErrorCode::OutOfRange,
+                     "age.half_life_s is a time in seconds and must be of at least " +
+                         seconds_text(kShortestHalfLifeSeconds) + " and of at most " +
+                         seconds_text(kLongestHalfLifeSeconds),
+                     "age.half_life_s");
+    }
+    changed.age.half_life_s = *change.age.half_life_s;
+  }
   return changed;
 }
 
@@ -171,6 +189,7 @@ std::string cache_key(const FusionSettings& settings) {
   } else {
     key += "visible";
   }
+  if (settings.age.mode == AgeMode::Fade) key += ";half_life=" + exact(settings.age.half_life_s);
   return key;
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "fusion/age.hpp"
 #include "fusion/error.hpp"
 #include "fusion/parameter.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
@@ -49,7 +50,14 @@ struct FusionSettings {
   std::string palette;
   RangeSetting range;
   MissingDisplay missing;
+  AgeSetting age;  ///< Of no meaning where no vertex has a time, as in a file.
   friend bool operator==(const FusionSettings&, const FusionSettings&) = default;
+};
+
+/// A partial change of AgeSetting; what is absent stays.
+struct AgeChange {
+  std::optional<AgeMode> mode;
+  std::optional<double> half_life_s;
 };
 
 /// A partial change; what is absent stays. Parameters merge; a new method starts at its defaults.
@@ -59,6 +67,7 @@ struct FusionChange {
   std::optional<std::string> palette = {};
   std::optional<RangeSetting> range = {};
   std::optional<MissingDisplay> missing = {};
+  AgeChange age = {};
 };
 
 /// thermal_visible_blend at its defaults, palette iron, automatic range, missing shown as visible: what a file is fused

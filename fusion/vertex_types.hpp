@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace spectra::fusion {
 
@@ -23,6 +25,21 @@ static_assert(sizeof(Vec3f) == 12);
 struct Vec3d {
   double x = 0, y = 0, z = 0;
   friend bool operator==(const Vec3d&, const Vec3d&) = default;
+};
+
+/// What is known of the vertices that are fused: one value per vertex in each span.
+struct VertexValues {
+  std::span<const float> temperature_celsius;
+  std::span<const Rgb8> visible;
+  std::span<const float> baseline_celsius = {};  ///< What the temperature is compared with; empty = no vertex has any.
+  std::span<const std::uint8_t> freshness = {};  ///< In eighths, 0..8, see AgeSteps; empty = 8 for every vertex.
+
+  /// Those of `count` vertices from `first` on.
+  VertexValues subspan(std::size_t first, std::size_t count) const {
+    return {temperature_celsius.subspan(first, count), visible.subspan(first, count),
+            baseline_celsius.empty() ? baseline_celsius : baseline_celsius.subspan(first, count),
+            freshness.empty() ? freshness : freshness.subspan(first, count)};
+  }
 };
 
 /// Three vertex indices, counter-clockwise as in the input.

@@ -34,7 +34,7 @@ PaletteTable drawn(std::initializer_list<ControlPoint> points) {
 }
 
 Palette palette(std::string id, std::string label, const PaletteTable& table) {
-  return {std::move(id), std::move(label), carries_hue_alone(table), table};
+  return {std::move(id), std::move(label), carries_hue_alone(table), is_diverging(table), table};
 }
 
 std::vector<Palette> make_palettes() {
@@ -97,6 +97,22 @@ std::vector<Palette> make_palettes() {
                                 {0.82, {255, 90, 0}},
                                 {0.92, {200, 0, 60}},
                                 {1.00, {255, 255, 255}}})));
+  list.push_back(palette("blue_red", "Blue to red",
+                         drawn({{0.00, {12, 40, 140}},
+                                {0.25, {66, 134, 224}},
+                                {0.42, {184, 206, 232}},
+                                {0.50, {232, 230, 228}},
+                                {0.58, {238, 200, 182}},
+                                {0.75, {224, 92, 66}},
+                                {1.00, {128, 8, 30}}})));
+  list.push_back(palette("cyan_amber", "Cyan to amber, dark middle",
+                         drawn({{0.00, {120, 250, 255}},
+                                {0.25, {20, 160, 200}},
+                                {0.42, {40, 80, 96}},
+                                {0.50, {46, 46, 48}},
+                                {0.58, {104, 68, 34}},
+                                {0.75, {214, 128, 16}},
+                                {1.00, {255, 226, 96}}})));
   list.push_back(palette("inferno", "Inferno", kInfernoTable));
   list.push_back(palette("magma", "Magma", kMagmaTable));
   list.push_back(palette("plasma", "Plasma", kPlasmaTable));
@@ -121,7 +137,27 @@ double hue_degrees(const std::array<double, 3>& colour, double chroma) {
   return 60 * sextant;
 }
 
+double chroma_of(const std::array<double, 3>& colour) {
+  const auto [smallest, largest] = std::minmax_element(colour.begin(), colour.end());
+  return (*largest - *smallest) / 255;
+}
+
+double hue_apart(double a, double b) {
+  return std::abs(std::remainder(a - b, 360.0));
+}
+
 }  // namespace
+
+bool is_diverging(const PaletteTable& table) {
+  if (chroma_of(table[127]) > 0.1 || chroma_of(table[128]) > 0.1) return false;
+  const auto hue_of = [&](std::size_t row) { return hue_degrees(table[row], 255 * chroma_of(table[row])); };
+  for (std::size_t row = 0; row < table.size() / 3; ++row) {
+    for (const std::size_t here : {row, 255 - row}) {
+      if (chroma_of(table[here]) < 0.25 || hue_apart(hue_of(here), hue_of(here == row ? 0 : 255)) > 60) return false;
+    }
+  }
+  return hue_apart(hue_of(0), hue_of(255)) >= 90;
+}
 
 bool carries_hue_alone(const PaletteTable& table) {
   double previous_hue = 0;

@@ -12,10 +12,12 @@ using PaletteTable = std::array<std::array<double, 3>, 256>;
 
 /// A palette. fusion_safe: it carries temperature by hue alone, so that intensity_hue may give lightness to the visible
 /// picture; see carries_hue_alone.
+/// diverging: it tells two directions from a neutral middle; see is_diverging.
 struct Palette {
   std::string id;
   std::string label;
   bool fusion_safe = false;
+  bool diverging = false;
   PaletteTable table{};
 };
 
@@ -23,6 +25,11 @@ struct Palette {
 /// 0.25 in every row. Hue is that of HSV, the one intensity_hue keeps: it turns one way from row to row without a halt,
 /// and by less than the full circle, so that no hue is used twice.
 bool carries_hue_alone(const PaletteTable& table);
+
+/// The rule behind diverging. Chroma and hue are those above: at most 0.1 in the two rows of the middle, at least 0.25 in every
+/// row of the outer thirds, in each of the two of hues within 60 degrees of its end, and the two ends at least 90 degrees
+/// apart, so that warmer is never taken for colder.
+bool is_diverging(const PaletteTable& table);
 
 /// All palettes, in the order a person should see them; at least 15.
 std::span<const Palette> all_palettes();

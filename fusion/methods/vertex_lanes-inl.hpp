@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "fusion/methods/vertex_lanes.hpp"
 #include "fusion/statistics/histogram_bins-inl.hpp"
@@ -59,6 +60,11 @@ HWY_INLINE Colours mixed(Floats weight, const Colours& over, const Colours& unde
   return {hn::Add(hn::Mul(weight, over.r), hn::Mul(rest, under.r)),
           hn::Add(hn::Mul(weight, over.g), hn::Mul(rest, under.g)),
           hn::Add(hn::Mul(weight, over.b), hn::Mul(rest, under.b))};
+}
+
+/// The luma of a colour.
+HWY_INLINE Floats luma(Floats r, Floats g, Floats b) {
+  return hn::Add(hn::Add(hn::Mul(r, all(0.299F)), hn::Mul(g, all(0.587F))), hn::Mul(b, all(0.114F)));
 }
 
 HWY_INLINE Doubles on_ramp(const Ramp& ramp, Doubles temperature) {
@@ -192,6 +198,17 @@ class ThermalColours {
   alignas(64) float part_[kBlock];
 };
 
+/// A block of vertices; `count` is a multiple of the lanes of a byte register and at most kBlock.
+struct Block {
+  const float* temperature;
+  const float* baseline;  ///< nullptr: none.
+  const std::uint8_t* visible;
+  std::uint8_t* fused;
+  std::size_t count;
+  const MissingDisplay& missing;
+  const float* freshness;  ///< In 0..1, aligned; nullptr: 1 for every vertex.
+};
+
 /// The same weight for every vertex.
 class ConstantWeight {
  public:
@@ -248,11 +265,15 @@ HWY_INLINE hn::Vec<BitsTag> levels(Floats value) {
 }
 constexpr std::uint32_t kAboveLevel = 0x4B400000;  // The bits of kWholeFloat.
 
-/// Fuses `count` vertices, a multiple of the lanes of a byte register and at most kBlock.
 /// shade(Vertices, their values) -> Colours.
-template <class Stage, class Shade>
-HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
-                           std::size_t count, const MissingDisplay& missing, Stage& stage, const Shade& shade) {
+template <bool kFade, class Stage, class Shade>
+HWY_INLINE void fuse_block(const Block& block, Stage& stage, const Shade& shade) {
+  const float* const temperature = block.temperature;
+  const std::uint8_t* const visible = block.visible;
+  std::uint8_t* const fused = block.fused;
+  const std::size_t count = block.count;
+  const MissingDisplay& missing = block.missing;
+  [[maybe_unused]] const float* const freshness = block.freshness;
   const FloatTag d;
   const IntTag di;
   const hn::Rebind<std::uint8_t, FloatTag> quarter;
@@ -272,13 +293,20 @@ HWY_INLINE void fuse_block(const float* temperature, const std::uint8_t* visible
     const auto plane = [&](const std::uint8_t* from)
                            HWY_ATTR { return hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(quarter, from + i))); };
     const Vertices vertices{hn::LoadU(d, temperature + i), {plane(r), plane(g), plane(b)}};
-    const Colours colours = shade(vertices, stage.values(i));
+    const Colours shaded = shade(vertices, stage.values(i));
     Colours without = vertices.visible;
     if (missing) without = {all(missing->r), all(missing->g), all(missing->b)};
     const auto missing_here = hn::IsNaN(vertices.temperature);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.r, colours.r))), quarter, r + i);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.g, colours.g))), quarter, g + i);
-    hn::Store(hn::TruncateTo(quarter, levels(hn::IfThenElse(missing_here, without.b, colours.b))), quarter, b + i);
+    Colours colours{hn::IfThenElse(missing_here, without.r, shaded.r),
+                    hn::IfThenElse(missing_here, without.g, shaded.g),
+                    hn::IfThenElse(missing_here, without.b, shaded.b)};
+    if constexpr (kFade) {
+      const Floats grey = luma(colours.r, colours.g, colours.b);
+      colours = mixed(hn::Load(d, freshness + i), colours, {grey, grey, grey});
+    }
+    hn::Store(hn::TruncateTo(quarter, levels(colours.r)), quarter, r + i);
+    hn::Store(hn::TruncateTo(quarter, levels(colours.g)), quarter, g + i);
+    hn::Store(hn::TruncateTo(quarter, levels(colours.b)), quarter, b + i);
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(bytes)) {
     hn::StoreInterleaved3(hn::Load(bytes, r + i), hn::Load(bytes, g + i), hn::Load(bytes, b + i), bytes, fused + 3 * i);
@@ -381,24 +409,39 @@ class PaddedColours {
 };
 #endif
 
+/// weight * palette + (1 - weight) * visible; exactly one of them where the weight is 0 or 1.
+struct Mix {
+  HWY_INLINE Floats operator()(Floats weight, Floats palette, Floats visible) const {
+    return hn::Add(hn::Mul(weight, palette), hn::Mul(hn::Sub(all(1), weight), visible));
+  }
+};
+
 /// combine(weight, palette channel, visible channel) for every channel of a block.
-template <bool kSomeMissing, class Weight, class Combine>
+template <bool kSomeMissing, bool kFade, class Weight, class Combine>
 HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weight, const Combine& combine,
-                              [[maybe_unused]] const PaddedColours& padded, const float* temperature,
-                              const std::uint8_t* visible, std::uint8_t* fused, std::size_t count,
-                              const MissingDisplay& missing) {
+                              [[maybe_unused]] const PaddedColours& padded, const Block& block) {
   const FloatTag d;
+  const float* const temperature = block.temperature;
+  const std::uint8_t* const visible = block.visible;
+  std::uint8_t* const fused = block.fused;
+  const std::size_t count = block.count;
+  const MissingDisplay& missing = block.missing;
+  [[maybe_unused]] const float* const freshness = block.freshness;
 #if HWY_TARGET == HWY_SCALAR
-  for (std::size_t i = 0; i < 3 * count; ++i) {
-    const std::size_t vertex = i / 3;
-    const Floats v = all(visible[i]);
-    Floats f = combine(weight.values(vertex), all(thermal.channel(vertex, i % 3)), v);
-    if (kSomeMissing && hn::AllTrue(d, hn::IsNaN(hn::LoadU(d, temperature + vertex)))) {
-      const std::uint8_t fixed[3] = {missing ? missing->r : visible[i], missing ? missing->g : visible[i],
-                                     missing ? missing->b : visible[i]};
-      f = all(fixed[i % 3]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool missing_here = kSomeMissing && hn::AllTrue(d, hn::IsNaN(hn::LoadU(d, temperature + i)));
+    const Rgb8 fixed = missing.value_or(Rgb8{visible[3 * i], visible[3 * i + 1], visible[3 * i + 2]});
+    const std::uint8_t without[3] = {fixed.r, fixed.g, fixed.b};
+    Floats f[3];
+    for (std::size_t c = 0; c < 3; ++c) {
+      f[c] = missing_here ? all(without[c])
+                          : combine(weight.values(i), all(thermal.channel(i, c)), all(visible[3 * i + c]));
     }
-    fused[i] = static_cast<std::uint8_t>(hn::GetLane(levels(f)) & 0xFF);
+    const Floats grey = luma(f[0], f[1], f[2]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (kFade) f[c] = Mix()(hn::Load(d, freshness + i), f[c], grey);
+      fused[3 * i + c] = static_cast<std::uint8_t>(hn::GetLane(levels(f[c])) & 0xFF);
+    }
   }
 #else
   const Floats fixed = repeated(missing.value_or(Rgb8{}));
@@ -407,11 +450,19 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
     const Floats weights = weight.values(i);
     Floats present = all(1);
     if constexpr (kSomeMissing) present = hn::IfThenZeroElse(hn::IsNaN(hn::LoadU(d, temperature + i)), present);
+    Floats fresh = all(1);
+    if constexpr (kFade) fresh = hn::Load(d, freshness + i);
     const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) HWY_ATTR {
       const Floats v = padded.template channels<kRegister>(loaded);
-      const Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
-      if constexpr (!kSomeMissing) return levels(f);
-      return levels(hn::IfThenElse(hn::Gt(spread<kRegister>(present), all(0)), f, missing ? fixed : v));
+      Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
+      if constexpr (kSomeMissing) {
+        f = hn::IfThenElse(hn::Gt(spread<kRegister>(present), all(0)), f, missing ? fixed : v);
+      }
+      if constexpr (kFade) {
+        const Floats grey = luma(hn::Broadcast<0>(f), hn::Broadcast<1>(f), hn::Broadcast<2>(f));
+        f = Mix()(spread<kRegister>(fresh), f, grey);
+      }
+      return levels(f);
     };
     padded.store({level(std::integral_constant<int, 0>()), level(std::integral_constant<int, 1>()),
                   level(std::integral_constant<int, 2>()), level(std::integral_constant<int, 3>())},
@@ -420,64 +471,94 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
 #endif
 }
 
-/// weight * palette + (1 - weight) * visible; exactly one of them where the weight is 0 or 1.
-struct Mix {
-  HWY_INLINE Floats operator()(Floats weight, Floats palette, Floats visible) const {
-    return hn::Add(hn::Mul(weight, palette), hn::Mul(hn::Sub(all(1), weight), visible));
-  }
+/// The same with what is faded, which is rare: apart, so that the loops without stay as they are.
+template <class Weight, class Combine>
+HWY_NOINLINE void combine_faded(const ThermalColours& thermal, const Weight& weight, const Combine& combine,
+                                const PaddedColours& padded, const Block& block) {
+  combine_block<true, true>(thermal, weight, combine, padded, block);
+}
+
+/// What the palette shows of a vertex: its temperature.
+struct OwnTemperature {
+  HWY_INLINE const float* prepare(const Block& block) { return block.temperature; }
 };
 
-/// Fuses a block with its palette colours. Where `Weight` has nothing to show the palette is left alone.
-template <class Weight, class Combine>
+/// Fuses a block with its palette colours. Where `Weight` has nothing to show the palette is left alone. `Shown` gives what
+/// stands in place of the temperature for palette and weight; no value of it is missing unless the temperature is.
+template <class Shown, class Weight, class Combine>
 struct ThermalBlock {
   ThermalColours thermal;
+  Shown shown;
   Weight weight;
   Combine combine;
   PaddedColours padded = {};
 
-  HWY_INLINE void operator()(const float* temperature, const std::uint8_t* visible, std::uint8_t* fused,
-                             std::size_t count, const MissingDisplay& missing) {
-    const bool complete = none_missing(temperature, count);
-    if (!weight.prepare(temperature, visible, count) && (complete || !missing)) {
-      if (fused != visible) std::memcpy(fused, visible, 3 * count);
+  HWY_INLINE void operator()(const Block& block) {
+    const bool complete = none_missing(block.temperature, block.count);
+    const float* value = shown.prepare(block);
+    if (!weight.prepare(value, block.visible, block.count) && (complete || !block.missing) && !block.freshness) {
+      if (block.fused != block.visible) std::memcpy(block.fused, block.visible, 3 * block.count);
       return;
     }
-    thermal.prepare(temperature, count);
-    if (complete) {
-      combine_block<false>(thermal, weight, combine, padded, temperature, visible, fused, count, missing);
+    thermal.prepare(value, block.count);
+    if (block.freshness) {
+      combine_faded(thermal, weight, combine, padded, block);
+    } else if (complete) {
+      combine_block<false, false>(thermal, weight, combine, padded, block);
     } else {
-      combine_block<true>(thermal, weight, combine, padded, temperature, visible, fused, count, missing);
+      combine_block<true, false>(thermal, weight, combine, padded, block);
     }
   }
 };
 
-/// Fuses all vertices of a span block by block. Every vertex goes through the same arithmetic wherever it stands.
-/// block(temperature, visible, fused, count, missing); count is a multiple of the lanes of a byte register.
-template <class Block>
-HWY_INLINE void for_each_block(const VertexSpan& span, Block& block) {
+/// Freshness of vertices as weights: eighths of `count` vertices, 1 for those that fill up the block. False when every
+/// one is fresh.
+HWY_INLINE bool freshness_weights(const std::uint8_t* eighths, std::size_t count, float* weight) {
+  std::uint8_t all_of_them = 8;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    const std::uint8_t here = i < count ? std::min<std::uint8_t>(eighths[i], 8) : std::uint8_t{8};
+    all_of_them = std::min(all_of_them, here);
+    weight[i] = static_cast<float>(here) / 8;
+  }
+  return all_of_them < 8;
+}
+
+/// Fuses all vertices of a span block by block: fuse(Block). Every vertex goes through the same arithmetic wherever it
+/// stands.
+template <class Fuse>
+HWY_INLINE void for_each_block(const VertexSpan& span, Fuse& fuse) {
+  alignas(64) float weights[kBlock];
+  const auto freshness_from = [&](std::size_t begin, std::size_t count) -> const float* {
+    if (!span.freshness || !freshness_weights(span.freshness + begin, count, weights)) return nullptr;
+    return weights;
+  };
   std::size_t begin = 0;
   for (; begin + kBlock <= span.count; begin += kBlock) {
-    block(span.temperature_celsius + begin, span.visible + 3 * begin, span.fused + 3 * begin, kBlock, span.missing);
+    fuse(Block{span.temperature_celsius + begin, span.baseline_celsius ? span.baseline_celsius + begin : nullptr,
+               span.visible + 3 * begin, span.fused + 3 * begin, kBlock, span.missing, freshness_from(begin, kBlock)});
   }
   const std::size_t rest = span.count - begin;
   if (rest == 0) return;
   const std::size_t lanes = hn::Lanes(hn::ScalableTag<std::uint8_t>());
   const std::size_t padded = (rest + lanes - 1) / lanes * lanes;
   alignas(64) float temperature[kBlock] = {};
+  alignas(64) float baseline[kBlock] = {};
   alignas(64) std::uint8_t colours[3 * kBlock] = {};
   std::memcpy(temperature, span.temperature_celsius + begin, rest * sizeof(float));
+  if (span.baseline_celsius) std::memcpy(baseline, span.baseline_celsius + begin, rest * sizeof(float));
   std::memcpy(colours, span.visible + 3 * begin, 3 * rest);
-  const std::uint8_t* visible = colours;
-  block(temperature, visible, colours, padded, span.missing);
+  fuse(Block{temperature, span.baseline_celsius ? baseline : nullptr, colours, colours, padded, span.missing,
+             freshness_from(begin, rest)});
   std::memcpy(span.fused + 3 * begin, colours, 3 * rest);
 }
 
-/// Fuses with the palette: combine(weight, palette channel, visible channel) for every channel.
-template <class Weight, class Combine>
+/// Fuses with the palette: combine(weight, palette channel, visible channel) for every channel. What the palette shows
+/// and what the weight is given is the temperature, or what `Shown` makes of a vertex.
+template <class Shown = OwnTemperature, class Weight, class Combine>
 HWY_INLINE void fuse_thermal(const VertexSpan& span, const ThermalTable& table, const Weight& weight,
-                             const Combine& combine) {
-  ThermalBlock<Weight, Combine> block{ThermalColours(table), weight, combine};
-  for_each_block(span, block);
+                             const Combine& combine, const Shown& shown = {}) {
+  ThermalBlock<Shown, Weight, Combine> fuse{ThermalColours(table), shown, weight, combine};
+  for_each_block(span, fuse);
 }
 
 /// Fuses without the palette: shade(Vertices, value) -> Colours, with a value per vertex from
@@ -485,10 +566,14 @@ HWY_INLINE void fuse_thermal(const VertexSpan& span, const ThermalTable& table, 
 template <class Value, class Shade>
 HWY_INLINE void fuse_shaded(const VertexSpan& span, const Value& value, const Shade& shade) {
   ValueStage stage(value);
-  const auto block = [&](const float* temperature, const std::uint8_t* visible, std::uint8_t* fused, std::size_t count,
-                         const MissingDisplay& missing)
-                         HWY_ATTR { fuse_block(temperature, visible, fused, count, missing, stage, shade); };
-  for_each_block(span, block);
+  const auto fuse = [&](const Block& block) HWY_ATTR {
+    if (block.freshness) {
+      fuse_block<true>(block, stage, shade);
+    } else {
+      fuse_block<false>(block, stage, shade);
+    }
+  };
+  for_each_block(span, fuse);
 }
 
 }  // namespace spectra::fusion::HWY_NAMESPACE

@@ -19,11 +19,11 @@ Ramp Ramp::between(double from, double to, double top, double degenerate) {
   return {inside, to > from ? 1e300 : -1e300, top * std::clamp(part, 0.0, 1.0), top};
 }
 
-ThermalTable::ThermalTable(const MethodContext& context)
-    : position(Ramp::between(context.range_minimum, context.range_maximum, 255, 127.5)) {
+ThermalTable::ThermalTable(const PaletteTable& palette, double range_minimum, double range_maximum)
+    : position(Ramp::between(range_minimum, range_maximum, 255, 127.5)) {
   // A table of the caller's may hold anything; what is not a number counts as 0.
   const auto channel = [&](std::size_t row, std::size_t index) {
-    const double value = context.palette[row][index];
+    const double value = palette[row][index];
     return value > 0 ? std::min(value, 255.0) : 0.0;
   };
   double steepest = 0;
@@ -36,8 +36,8 @@ ThermalTable::ThermalTable(const MethodContext& context)
       steepest = std::max(steepest, std::abs(step));
     }
   }
-  const double low = context.range_minimum;
-  const double span = context.range_maximum - low;
+  const double low = range_minimum;
+  const double span = range_maximum - low;
   single_precision = steepest <= 12 && span > 1e-30 && span < 1e30 && std::abs(low) < 1e6 * span;
   if (!single_precision) return;
   origin = as_stored(low);

@@ -27,7 +27,9 @@ struct Ramp {
 
 /// The palette over the active range, laid out for the kernels.
 struct ThermalTable {
-  explicit ThermalTable(const MethodContext& context);
+  explicit ThermalTable(const MethodContext& context)
+      : ThermalTable(context.palette, context.range_minimum, context.range_maximum) {}
+  ThermalTable(const PaletteTable& palette, double range_minimum, double range_maximum);
 
   Ramp position;  ///< T to 0..255.
   /// Whether the position may be computed as (T - origin - origin_rest) * slope in float32: its error of at most 6.1e-5
@@ -50,9 +52,11 @@ float as_stored(double temperature_celsius);
 float largest_at_most(double value);
 float smallest_at_least(double value);
 
-/// The vertices that a kernel is given; colours are interleaved bytes r, g, b.
+/// The vertices that a kernel is given; colours are interleaved bytes r, g, b. No baseline and no freshness: nullptr.
 struct VertexSpan {
   const float* temperature_celsius = nullptr;
+  const float* baseline_celsius = nullptr;
+  const std::uint8_t* freshness = nullptr;
   const std::uint8_t* visible = nullptr;
   std::uint8_t* fused = nullptr;
   std::size_t count = 0;
@@ -65,10 +69,11 @@ class LaneKernel final : public Kernel {
  public:
   LaneKernel(const Fuse& fuse, const MissingDisplay& missing) : fuse_(fuse), missing_(missing) {}
 
-  void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
-            std::span<Rgb8> fused) const noexcept override {
+  void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept override {
     if (fused.empty()) return;
-    fuse_(VertexSpan{temperature_celsius.data(), &visible.data()->r, &fused.data()->r, fused.size(), missing_});
+    const auto start = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
+    fuse_(VertexSpan{vertices.temperature_celsius.data(), start(vertices.baseline_celsius), start(vertices.freshness),
+                     &vertices.visible.data()->r, &fused.data()->r, fused.size(), missing_});
   }
 
  private:

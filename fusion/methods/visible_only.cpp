@@ -6,7 +6,29 @@
 // Missing temperature: the visible colour always; a fixed colour for missing temperature is not applied, because
 // temperature plays no part in this picture.
 
-#include <algorithm>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fusion/methods/visible_only.cpp"
+#include <hwy/foreach_target.h>  // compiles this file once per instruction set
+
+#include "fusion/methods/vertex_lanes-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace spectra::fusion::HWY_NAMESPACE {
+
+void fuse_visible(const VertexSpan& span) {
+  if (!span.freshness) {
+    if (span.fused != span.visible) std::memcpy(span.fused, span.visible, 3 * span.count);
+    return;
+  }
+  fuse_shaded(
+      span, [](Doubles temperature) HWY_ATTR { return temperature; },
+      [](const Vertices& vertices, Floats) HWY_ATTR { return vertices.visible; });
+}
+
+}  // namespace spectra::fusion::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 
 #include "fusion/parameter_schema.hpp"
 
@@ -15,15 +37,12 @@ namespace {
 
 struct VisibleOnly {};
 
-class Copy final : public Kernel {
- public:
-  void fuse(std::span<const float>, std::span<const Rgb8> visible, std::span<Rgb8> fused) const noexcept override {
-    std::copy(visible.begin(), visible.end(), fused.begin());
-  }
-};
+HWY_EXPORT(fuse_visible);
 
-PreparedMethod prepare(const VisibleOnly&, const MethodContext&) {
-  return {std::make_shared<Copy>(), {}};
+PreparedMethod prepare(const VisibleOnly&, const MethodContext& context) {
+  const MethodContext without_marks{context.range_minimum, context.range_maximum, context.scene, context.palette,
+                                    std::nullopt};
+  return {lane_kernel(without_marks, [](const VertexSpan& span) { HWY_DYNAMIC_DISPATCH(fuse_visible)(span); }), {}};
 }
 
 }  // namespace
@@ -39,3 +58,5 @@ Method visible_only() {
 }
 
 }  // namespace spectra::fusion::methods
+
+#endif  // HWY_ONCE

@@ -96,6 +96,8 @@ static void describe(auto& fields, Is<MethodDescription> auto& message) {
   fields.field("needs_temperature", message.needs_temperature);
   fields.field("uses_palette", message.uses_palette);
   fields.field("wants_fusion_safe_palette", message.wants_fusion_safe_palette);
+  fields.optional("wants_diverging_palette", message.wants_diverging_palette);
+  fields.optional("compares_with_baseline", message.compares_with_baseline);
   fields.field("params", message.params);
 }
 
@@ -103,6 +105,7 @@ static void describe(auto& fields, Is<PaletteDescription> auto& message) {
   fields.field("id", message.id);
   fields.field("label", message.label);
   fields.field("fusion_safe", message.fusion_safe);
+  fields.optional("diverging", message.diverging);
   fields.field("colours", message.colours);
   fields.require("colours",
                  message.colours.size() == 256 &&
@@ -134,6 +137,12 @@ static void describe(auto& fields, Is<RangeChange> auto& message) {
   fields.require("max", !is_manual || message.min <= message.max, "a number not below min");
 }
 
+static void describe(auto& fields, Is<ChangeScale> auto& message) {
+  fields.field("min", message.min);
+  fields.field("max", message.max);
+  fields.require("max", message.min < message.max, "a number above min");
+}
+
 static void describe(auto& fields, Is<FusionState> auto& message) {
   fields.field("method", message.method);
   fields.field("params", message.params);
@@ -142,6 +151,7 @@ static void describe(auto& fields, Is<FusionState> auto& message) {
   fields.field("range", message.range);
   fields.field("missing", message.missing);
   fields.require("missing", is_missing_display(message.missing), kMissingDisplay);
+  fields.optional("change_scale", message.change_scale);
 }
 
 static void describe(auto& fields, Is<FusionChange> auto& message) {
@@ -163,6 +173,7 @@ template struct Wire<MethodDescription>;
 template struct Wire<PaletteDescription>;
 template struct Wire<FusionRange>;
 template struct Wire<RangeChange>;
+template struct Wire<ChangeScale>;
 template struct Wire<FusionState>;
 template struct Wire<FusionChange>;
 template struct Wire<FusionReply>;

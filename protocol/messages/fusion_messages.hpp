@@ -43,6 +43,8 @@ struct MethodDescription {
   bool needs_temperature = true;
   bool uses_palette = true;
   bool wants_fusion_safe_palette = false;  ///< A palette that is not fusion_safe loses temperature with this method.
+  std::optional<bool> wants_diverging_palette;  ///< One that is not diverging does not tell warmer from colder with it.
+  std::optional<bool> compares_with_baseline;   ///< It shows how temperatures differ from the baseline. Absent: no.
   std::vector<ParameterDescription> params;
 };
 
@@ -51,6 +53,7 @@ struct PaletteDescription {
   std::string id;
   std::string label;
   bool fusion_safe = false;
+  std::optional<bool> diverging;  ///< Tells two directions from a neutral middle. Absent: no.
   std::vector<std::array<double, 3>> colours;
 };
 
@@ -74,6 +77,12 @@ struct RangeChange {
   std::optional<double> high;
 };
 
+/// The changes of temperature at the ends of the palette, kelvin; min < max.
+struct ChangeScale {
+  double min = 0;
+  double max = 0;
+};
+
 /// FUSION: the settings in force.
 struct FusionState {
   std::string method;
@@ -81,7 +90,8 @@ struct FusionState {
   ParameterValues params_in_force;  ///< Automatic values as numbers; null when the scene has no temperature.
   std::string palette;
   FusionRange range;
-  std::string missing = "visible";  ///< "visible" or "#rrggbb".
+  std::string missing = "visible";          ///< "visible" or "#rrggbb".
+  std::optional<ChangeScale> change_scale;  ///< What the palette stands for where that is not the range.
 };
 
 /// Params of fusion.set; what is absent stays. Names and bounds of `params` are the server's to check.
@@ -113,6 +123,7 @@ extern template struct Wire<MethodDescription>;
 extern template struct Wire<PaletteDescription>;
 extern template struct Wire<FusionRange>;
 extern template struct Wire<RangeChange>;
+extern template struct Wire<ChangeScale>;
 extern template struct Wire<FusionState>;
 extern template struct Wire<FusionChange>;
 extern template struct Wire<FusionReply>;

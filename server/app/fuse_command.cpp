@@ -105,6 +105,11 @@ int run_fuse(const FuseOptions& options) {
          (settings.value().missing ? "all is written in the colour for missing ones"
                                    : "the visible colours are written"));
   }
+  if (fusion::find_method(settings.value().method)->compares_with_baseline) {
+    warn(options.input.string() +
+         " has no baseline, which a file cannot hold: the visible colours are written. A map that is fed with blocks "
+         "(spectra serve --live) remembers what was there before");
+  }
   return kDone;
 }
 

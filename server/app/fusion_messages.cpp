@@ -128,6 +128,11 @@ protocol::ParameterDescription to_message(const fusion::Parameter& parameter) {
   return message;
 }
 
+/// What is left out where it is false.
+std::optional<bool> if_true(bool value) {
+  return value ? std::optional(true) : std::nullopt;
+}
+
 protocol::Vector3 to_message(const fusion::Vec3f& v) {
   return {double{v.x}, double{v.y}, double{v.z}};
 }
@@ -154,13 +159,19 @@ protocol::MethodDescription to_message(const fusion::Method& method) {
                                       method.needs_temperature,
                                       method.uses_palette,
                                       method.wants_fusion_safe_palette,
+                                      if_true(method.wants_diverging_palette),
+                                      if_true(method.compares_with_baseline),
                                       {}};
   for (const auto& parameter : method.parameters) message.params.push_back(to_message(parameter));
   return message;
 }
 
 protocol::PaletteDescription to_message(const fusion::Palette& palette) {
-  return {palette.id, palette.label, palette.fusion_safe, {palette.table.begin(), palette.table.end()}};
+  return {palette.id,
+          palette.label,
+          palette.fusion_safe,
+          if_true(palette.diverging),
+          {palette.table.begin(), palette.table.end()}};
 }
 
 std::vector<protocol::MethodDescription> method_messages() {
@@ -192,6 +203,7 @@ protocol::FusionState to_message(const fusion::FusionPlan& plan, const fusion::T
     message.range.low = settings.range.low_percent;
     message.range.high = settings.range.high_percent;
   }
+  if (const auto& scale = plan.change_scale()) message.change_scale = {scale->minimum, scale->maximum};
   for (const auto& [name, value] : settings.params) {
     if (!scene.has_temperature() && std::holds_alternative<fusion::Automatic>(value)) {
       message.params_in_force.insert_or_assign(name, nullptr);
@@ -231,6 +243,12 @@ std::optional<std::string> palette_warning(const fusion::Method& method, const f
   if (!method.wants_fusion_safe_palette || palette == nullptr || palette->fusion_safe) return std::nullopt;
   return "The palette " + palette->label + " does not carry temperature by hue alone, so " + method.label +
          " hides part of it; choose one that is marked as safe.";
+}
+
+std::optional<std::string> direction_warning(const fusion::Method& method, const fusion::Palette* palette) {
+  if (!method.wants_diverging_palette || palette == nullptr || palette->diverging) return std::nullopt;
+  return "The palette " + palette->label + " has no neutral middle, so " + method.label +
+         " does not tell warmer from colder at a glance; choose one that is marked as diverging.";
 }
 
 protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary) {

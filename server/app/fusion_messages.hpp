@@ -37,6 +37,8 @@ protocol::Result<fusion::FusionChange> from_message(const protocol::FusionChange
 
 /// Why a palette suits a method badly, in words that say what to do; nothing where it does not.
 std::optional<std::string> palette_warning(const fusion::Method& method, const fusion::Palette* palette);
+/// The same of one that does not tell two directions apart.
+std::optional<std::string> direction_warning(const fusion::Method& method, const fusion::Palette* palette);
 
 /// InvalidParams with the field of the error; `is_known_method` tells a parameter's name from the other fields.
 protocol::RpcError to_rpc_error(const fusion::Error& error);

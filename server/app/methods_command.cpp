@@ -54,9 +54,9 @@ int run_methods(bool as_json) {
   }
   fmt::print("\nPalettes:");
   for (const auto& palette : fusion::all_palettes()) {
-    fmt::print(" {}{}", palette.id, palette.fusion_safe ? "*" : "");
+    fmt::print(" {}{}{}", palette.id, palette.fusion_safe ? "*" : "", palette.diverging ? "+" : "");
   }
-  fmt::print("\n(* carries temperature by hue alone: for intensity_hue)\n");
+  fmt::print("\n(* carries temperature by hue alone: for intensity_hue; + is neutral in the middle: for changes)\n");
   return kDone;
 }
 

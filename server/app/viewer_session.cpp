@@ -482,6 +482,8 @@ void ViewerSession::set_plan(fusion::FusionPlan plan) {
                  : std::nullopt);
   set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
              palette_warning(*method, fusion::find_palette(settings.palette)));
+  set_status("palette_not_diverging", protocol::StatusLevel::Warning,
+             direction_warning(*method, fusion::find_palette(settings.palette)));
 }
 
 protocol::FusionReply ViewerSession::fusion_reply() const {

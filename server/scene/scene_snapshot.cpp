@@ -107,7 +107,7 @@ class SurfaceShare {
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
       const Tile& leaf = *leaves_[i]->tile;
       marked.resize(leaf.temperature_celsius.size());
-      plan.mark(leaf.temperature_celsius, marked);
+      plan.mark(leaf.temperature_celsius, {}, marked);
       for (std::size_t v = 0; v < leaf.owned_count; ++v) marked_count += marked[v];
       count += leaf.owned_count;
       if (total_area_ > 0) {

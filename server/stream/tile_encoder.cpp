@@ -39,7 +39,7 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
   std::vector<std::uint8_t> marks;
   if (has_marks) {
     std::vector<std::uint8_t> marked(temperature.size());
-    plan.mark(temperature, marked);
+    plan.mark(temperature, {}, marked);
     for (const std::uint32_t input : geometry.input_of_decoded) marks.push_back(marked[input]);
   }
   BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));

@@ -18,6 +18,8 @@ namespace {
 using test::Case;
 using test::FusionReference;
 
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
 /// Every property holds for every registered method.
 class EveryMethod : public testing::TestWithParam<const Method*> {};
 
@@ -56,10 +58,16 @@ FusionReference reference_of(const Case& one, const FusionPlan& plan) {
   return {settings, one.palette, one.facts().summary, one.temperature};
 }
 
-std::vector<Rgb8> fused(const FusionPlan& plan, std::span<const float> temperature, std::span<const Rgb8> visible) {
-  std::vector<Rgb8> result(temperature.size());
-  plan.fuse(temperature, visible, result);
+std::vector<Rgb8> fused(const FusionPlan& plan, const VertexValues& vertices) {
+  std::vector<Rgb8> result(vertices.visible.size());
+  plan.fuse(vertices, result);
   return result;
+}
+
+FusionReference::Colour exact_of(const FusionReference& reference, const Case& one, std::size_t i) {
+  return reference.fused(one.temperature[i], one.visible[i],
+                         one.baseline.empty() ? std::numeric_limits<float>::quiet_NaN() : one.baseline[i],
+                         one.freshness.empty() ? std::uint8_t{8} : one.freshness[i]);
 }
 
 std::array<std::uint8_t, 3> channels(Rgb8 colour) {
@@ -71,10 +79,10 @@ TEST_P(EveryMethod, EqualsTheExactAnswer) {
     const Case one = *test::cases(*GetParam());
     const auto plan = plan_of(one);
     if (!plan) return;
-    const auto answer = fused(*plan, one.temperature, one.visible);
+    const auto answer = fused(*plan, one.values());
     const FusionReference reference = reference_of(one, *plan);
     for (std::size_t i = 0; i < answer.size(); ++i) {
-      const auto exact = reference.fused(one.temperature[i], one.visible[i]);
+      const auto exact = exact_of(reference, one, i);
       for (std::size_t c = 0; c < 3; ++c) {
         if (test::within_accuracy(channels(answer[i])[c], exact[c])) continue;
         RC_LOG() << "vertex " << i << " channel " << c << " at " << std::hexfloat << one.temperature[i] << ": "
@@ -93,7 +101,7 @@ TEST_P(EveryMethod, EveryInstructionSetGivesTheSameBytes) {
       const test::UsingInstructionSet use(target);
       const auto plan = plan_of(one);
       if (!plan) return;
-      const auto answer = fused(*plan, one.temperature, one.visible);
+      const auto answer = fused(*plan, one.values());
       if (!first) first = answer;
       RC_ASSERT(answer == *first);
     }
@@ -110,6 +118,8 @@ TEST_P(EveryMethod, EveryLengthGivesTheSameBytes) {
       const auto bits = static_cast<std::uint32_t>(engine());
       room.visible.push_back({static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
                               static_cast<std::uint8_t>(bits >> 16)});
+      room.baseline.push_back(i % 7 ? celsius(engine) : std::numeric_limits<float>::quiet_NaN());
+      room.freshness.push_back(static_cast<std::uint8_t>(i < 300 ? 8 : engine() % 9));
     }
     FusionChange change;
     change.method = GetParam()->id;
@@ -120,13 +130,12 @@ TEST_P(EveryMethod, EveryLengthGivesTheSameBytes) {
   for (const std::int64_t target : test::instruction_sets()) {
     const test::UsingInstructionSet use(target);
     const FusionPlan plan = FusionPlan::prepare(one.settings, one.facts(), one.palette).value();
-    const auto whole = fused(plan, one.temperature, one.visible);
+    const auto whole = fused(plan, one.values());
     for (std::size_t length = 0; length <= one.temperature.size(); ++length) {
-      const std::span temperature = std::span(one.temperature).last(length);
-      const std::span visible = std::span(one.visible).last(length);
+      const VertexValues last = one.values().subspan(one.temperature.size() - length, length);
       // One colour more than is asked for, to see that nothing is written behind the end.
       std::vector<Rgb8> answer(length + 1, Rgb8{1, 2, 3});
-      plan.fuse(temperature, visible, std::span(answer).first(length));
+      plan.fuse(last, std::span(answer).first(length));
       ASSERT_EQ(answer.back(), (Rgb8{1, 2, 3})) << test::name_of(target) << " " << length;
       ASSERT_TRUE(std::equal(answer.begin(), answer.end() - 1, whole.end() - static_cast<std::ptrdiff_t>(length)))
           << test::name_of(target) << " " << length;
@@ -139,8 +148,8 @@ TEST_P(EveryMethod, FusingInPlaceIsAllowed) {
     Case one = *test::cases(*GetParam());
     const auto plan = plan_of(one);
     if (!plan) return;
-    const auto answer = fused(*plan, one.temperature, one.visible);
-    plan->fuse(one.temperature, one.visible, one.visible);
+    const auto answer = fused(*plan, one.values());
+    plan->fuse(one.values(), one.visible);
     RC_ASSERT(one.visible == answer);
   }));
 }
@@ -150,17 +159,15 @@ TEST_P(EveryMethod, ThreadsAndSplitsGiveTheSameBytes) {
     const Case one = *test::cases(*GetParam());
     const auto plan = plan_of(one);
     if (!plan) return;
-    const auto whole = fused(*plan, one.temperature, one.visible);
+    const auto whole = fused(*plan, one.values());
     std::vector<Rgb8> pieces(whole.size());
     std::vector<std::thread> threads;
     const std::size_t count = *rc::gen::inRange<std::size_t>(1, 5);
     const std::size_t piece = whole.size() / count + 1;
     for (std::size_t begin = 0; begin < whole.size(); begin += piece) {
       const std::size_t size = std::min(piece, whole.size() - begin);
-      threads.emplace_back([&, begin, size] {
-        plan->fuse(std::span(one.temperature).subspan(begin, size), std::span(one.visible).subspan(begin, size),
-                   std::span(pieces).subspan(begin, size));
-      });
+      threads.emplace_back(
+          [&, begin, size] { plan->fuse(one.values().subspan(begin, size), std::span(pieces).subspan(begin, size)); });
     }
     for (std::thread& thread : threads) thread.join();
     RC_ASSERT(pieces == whole);
@@ -172,7 +179,7 @@ TEST_P(EveryMethod, PermutingVerticesPermutesColours) {
     const Case one = *test::cases(*GetParam());
     const auto plan = plan_of(one);
     if (!plan) return;
-    const auto answer = fused(*plan, one.temperature, one.visible);
+    const auto answer = fused(*plan, one.values());
     std::vector<std::size_t> order(answer.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::shuffle(order.begin(), order.end(), std::mt19937(*rc::gen::arbitrary<std::uint32_t>()));
@@ -180,9 +187,11 @@ TEST_P(EveryMethod, PermutingVerticesPermutesColours) {
     for (std::size_t i = 0; i < order.size(); ++i) {
       moved.temperature[i] = one.temperature[order[i]];
       moved.visible[i] = one.visible[order[i]];
+      if (!one.baseline.empty()) moved.baseline[i] = one.baseline[order[i]];
+      if (!one.freshness.empty()) moved.freshness[i] = one.freshness[order[i]];
     }
     // The facts of the scene are gathered anew: they must not depend on the order either.
-    const auto again = fused(plan_of(moved).value(), moved.temperature, moved.visible);
+    const auto again = fused(plan_of(moved).value(), moved.values());
     for (std::size_t i = 0; i < order.size(); ++i) RC_ASSERT(again[i] == answer[order[i]]);
   }));
 }
@@ -197,7 +206,7 @@ TEST_P(EveryMethod, AnyBitsAsTemperatureAreAllowedBesideTheScene) {
     std::vector<float> temperature;
     for (const std::uint32_t bits : foreign) temperature.push_back(std::bit_cast<float>(bits));
     const auto visible = *test::colours(temperature.size());
-    const auto answer = fused(*plan, temperature, visible);
+    const auto answer = fused(*plan, {temperature, visible, temperature});
     for (std::size_t i = 0; i < answer.size(); ++i) {
       if (!std::isnan(temperature[i]) || !GetParam()->needs_temperature) continue;
       RC_ASSERT(answer[i] == one.settings.missing.value_or(visible[i]));
@@ -212,17 +221,25 @@ TEST_P(EveryMethod, AlphaZeroIsVisibleAndAlphaOneIsThermal) {
   if (!has_alpha) GTEST_SKIP() << GetParam()->id << " has no alpha";
   EXPECT_TRUE(rc::check([this] {
     Case one = *test::cases(*GetParam());
+    one.freshness.clear();
     one.settings.missing.reset();
     one.settings.params["alpha"] = 0.0;
-    RC_ASSERT(fused(plan_of(one).value(), one.temperature, one.visible) == one.visible);
+    RC_ASSERT(fused(plan_of(one).value(), one.values()) == one.visible);
     if (!GetParam()->uses_palette) return;
     one.settings.params["alpha"] = 1.0;
-    const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+    const auto answer = fused(plan_of(one).value(), one.values());
     FusionChange change;
     change.method = "thermal_only";
     Case thermal = one;
     thermal.settings = with_change(one.settings, change).value();
-    const auto colours = fused(plan_of(thermal).value(), one.temperature, one.visible);
+    if (GetParam()->compares_with_baseline) {
+      // The palette is that of the changes.
+      const double span = std::get<double>(one.settings.params.at("span"));
+      thermal.settings.range = RangeSetting::manual(-span, span);
+      thermal.baseline.resize(one.temperature.size(), kNan);
+      for (std::size_t i = 0; i < one.temperature.size(); ++i) thermal.temperature[i] -= thermal.baseline[i];
+    }
+    const auto colours = fused(plan_of(thermal).value(), thermal.values());
     for (std::size_t i = 0; i < answer.size(); ++i) {
       RC_ASSERT(answer[i] == colours[i] || answer[i] == one.visible[i]);
     }
@@ -247,19 +264,21 @@ Case exact_case(const Method& method) {
 TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
   EXPECT_TRUE(rc::check([this] {
     const Case celsius = exact_case(*GetParam());
-    const auto answer = fused(plan_of(celsius).value(), celsius.temperature, celsius.visible);
+    const auto answer = fused(plan_of(celsius).value(), celsius.values());
+    // A change is a number of kelvin, and there is no baseline here: what it shows is tried elsewhere.
+    if (GetParam()->compares_with_baseline) return;
     Case doubled = celsius;
     for (float& value : doubled.temperature) value *= 2;
-    RC_ASSERT(fused(plan_of(doubled).value(), doubled.temperature, doubled.visible) == answer);
+    RC_ASSERT(fused(plan_of(doubled).value(), doubled.values()) == answer);
     // A shift rounds mean and sigma anew, which may move a vertex that lies exactly on the border.
     if (GetParam()->id == "histogram_distribution") return;
     Case shifted = celsius;
     for (float& value : shifted.temperature) value += 256;
     const FusionPlan shifted_plan = plan_of(shifted).value();
     const FusionReference reference = reference_of(shifted, shifted_plan);
-    const auto moved = fused(shifted_plan, shifted.temperature, shifted.visible);
+    const auto moved = fused(shifted_plan, shifted.values());
     for (std::size_t i = 0; i < answer.size(); ++i) {
-      const auto exact = reference.fused(shifted.temperature[i], shifted.visible[i]);
+      const auto exact = exact_of(reference, shifted, i);
       for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(test::within_accuracy(channels(answer[i])[c], exact[c]));
       for (std::size_t c = 0; c < 3; ++c) RC_ASSERT(test::within_accuracy(channels(moved[i])[c], exact[c]));
     }
@@ -270,6 +289,7 @@ TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
 Case telling_case(const Method& method) {
   Case one = *test::cases(method);
   one.settings.missing.reset();
+  one.freshness.clear();
   for (auto& row : one.palette) row = {250, 10, 10};
   one.visible.assign(one.temperature.size(), Rgb8{0, 200, 100});
   if (one.settings.params.contains("alpha")) one.settings.params["alpha"] = 1.0;
@@ -277,7 +297,7 @@ Case telling_case(const Method& method) {
 }
 
 std::vector<bool> highlighted(const Case& one) {
-  const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+  const auto answer = fused(plan_of(one).value(), one.values());
   std::vector<bool> flags;
   for (const Rgb8 colour : answer) flags.push_back(colour != Rgb8{0, 200, 100});
   return flags;
@@ -305,16 +325,22 @@ TEST_P(InvertibleMethod, InvertComplementsExceptOnTheThreshold) {
     const bool nothing_is_unusual = thresholds.empty() && !(one.facts().summary.sigma > 0);
     for (std::size_t i = 0; i < plain.size(); ++i) {
       const float t = one.temperature[i];
-      const bool on_threshold = std::ranges::find(thresholds, t) != thresholds.end();
-      const bool either = !std::isnan(t) && !on_threshold && !nothing_is_unusual;
+      bool on_threshold = std::ranges::find(thresholds, t) != thresholds.end();
+      bool is_known = !std::isnan(t);
+      if (GetParam()->compares_with_baseline) {
+        const float change = one.baseline.empty() ? kNan : t - one.baseline[i];
+        is_known = !std::isnan(change);
+        on_threshold = std::fabs(change) == static_cast<float>(std::get<double>(one.settings.params.at("threshold")));
+      }
+      const bool either = is_known && !on_threshold && (GetParam()->compares_with_baseline || !nothing_is_unusual);
       RC_ASSERT(plain[i] + inverted[i] == (either ? 1 : 0));
     }
   }));
 }
 
-TEST(Promises, AMethodWithoutHighlightsHasNoIntervals) {
+TEST(Promises, AMethodWithoutHighlightsOfTemperaturesHasNoIntervals) {
   for (const Method* method : all_methods()) {
-    if (method->highlights) continue;
+    if (method->highlights && !method->compares_with_baseline) continue;
     EXPECT_TRUE(rc::check([method] {
       const auto plan = plan_of(*test::cases(*method));
       RC_ASSERT(!plan || plan->highlighted().empty());
@@ -330,11 +356,12 @@ TEST(Promises, EveryMethodThatMakesAPromiseIsTried) {
 
 TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
   for (const Method* method : methods_that(&Method::highlights)) {
+    if (method->compares_with_baseline) continue;
     EXPECT_TRUE(rc::check([method] {
       const Case one = telling_case(*method);
       const auto plan = plan_of(one);
       if (!plan) return;
-      const auto answer = fused(*plan, one.temperature, one.visible);
+      const auto answer = fused(*plan, one.values());
       const auto& intervals = plan->highlighted();
       for (std::size_t i = 0; i + 1 < intervals.size(); ++i) {
         RC_ASSERT(intervals[i].high < intervals[i + 1].low || intervals[i].high == intervals[i + 1].low);
@@ -372,6 +399,7 @@ TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
   for (const Method* method : methods_that(&Method::hotter_is_lighter)) {
     EXPECT_TRUE(rc::check([method] {
       Case one = *test::cases(*method);
+      one.freshness.clear();
       one.palette = find_palette("white_hot")->table;
       one.visible.assign(one.temperature.size(), (*test::colours(1))[0]);
       if (one.settings.params.contains("sides")) {
@@ -379,7 +407,7 @@ TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
         one.settings.params["sides"] = std::string("hot");
         one.visible.assign(one.temperature.size(), Rgb8{0, 0, 0});
       }
-      const auto answer = fused(plan_of(one).value(), one.temperature, one.visible);
+      const auto answer = fused(plan_of(one).value(), one.values());
       const auto order = by_temperature(one);
       for (std::size_t i = 1; i < order.size(); ++i) {
         const auto colder = channels(answer[order[i - 1]]);
@@ -392,18 +420,19 @@ TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
 
 TEST(IntensityHue, KeepsTheHueOfThePalette) {
   EXPECT_TRUE(rc::check([] {
-    const Case one = *test::cases(*find_method("intensity_hue"));
+    Case one = *test::cases(*find_method("intensity_hue"));
+    one.freshness.clear();
     FusionChange change;
     change.method = "thermal_only";
     const FusionPlan plan = plan_of(one).value();
     Case thermal = one;
     thermal.settings = with_change(one.settings, change).value();
     const FusionReference reference = reference_of(thermal, plan);
-    const auto answer = fused(plan, one.temperature, one.visible);
+    const auto answer = fused(plan, one.values());
     for (std::size_t i = 0; i < answer.size(); ++i) {
       if (std::isnan(one.temperature[i])) continue;
       // HSV hue is where the middle channel lies between the others; F = M + L (255 - M) and M + L M keep that.
-      const auto m = reference.fused(one.temperature[i], one.visible[i]);
+      const auto m = exact_of(reference, one, i);
       const auto f = channels(answer[i]);
       const auto [m_low, m_high] = std::minmax_element(m.begin(), m.end());
       const auto [f_low, f_high] = std::minmax_element(f.begin(), f.end());
@@ -525,14 +554,64 @@ TEST(Marks, AreWhereThePictureIsAnother) {
       const Case one = telling_case(*method);
       const auto plan = plan_of(one);
       if (!plan) return;
-      const auto answer = fused(*plan, one.temperature, one.visible);
+      const auto answer = fused(*plan, one.values());
       std::vector<std::uint8_t> marked(answer.size(), 7);
-      plan->mark(one.temperature, marked);
+      plan->mark(one.temperature, one.baseline, marked);
       for (std::size_t i = 0; i < answer.size(); ++i) {
         RC_ASSERT(marked[i] == (method->highlights && answer[i] != one.visible[i] ? 1 : 0));
       }
     })) << method->id;
   }
+}
+
+TEST(ThermalChange, WithoutABaselineItShowsTheVisiblePicture) {
+  EXPECT_TRUE(rc::check([] {
+    Case one = *test::cases(*find_method("thermal_change"));
+    one.baseline.clear();
+    one.freshness.clear();
+    one.settings.missing.reset();
+    const FusionPlan plan = plan_of(one).value();
+    RC_ASSERT(fused(plan, one.values()) == one.visible);
+    const double span = std::get<double>(one.settings.params.at("span"));
+    RC_ASSERT(plan.change_scale() && plan.change_scale()->minimum == -span && plan.change_scale()->maximum == span);
+  }));
+}
+
+TEST(Age, WhatIsFreshIsTheSameByteForByteAndWhatIsOldestIsGrey) {
+  for (const Method* method : all_methods()) {
+    EXPECT_TRUE(rc::check([method] {
+      Case one = *test::cases(*method);
+      one.freshness.clear();
+      const auto plan = plan_of(one);
+      if (!plan) return;
+      const auto without = fused(*plan, one.values());
+      one.freshness.assign(one.temperature.size(), 8);
+      RC_ASSERT(fused(*plan, one.values()) == without);
+      one.freshness.assign(one.temperature.size(), 0);
+      for (const Rgb8 colour : fused(*plan, one.values())) RC_ASSERT(colour.r == colour.g && colour.g == colour.b);
+    })) << method->id;
+  }
+}
+
+TEST(Age, FreshnessIsTheRoundedPower) {
+  EXPECT_TRUE(rc::check([] {
+    const double half_life_s = std::exp2(*rc::gen::inRange(0, 24));
+    const AgeSteps steps(half_life_s);
+    const double age_s = half_life_s * (*rc::gen::inRange(-1000, 8000) / 1000.0);
+    const double exact = age_s > 0 ? 8 * std::exp2(-age_s / half_life_s) : 8;
+    const int told = steps.freshness(age_s);
+    const double to_tie = std::abs(exact - std::floor(exact) - 0.5);
+    RC_ASSERT(std::abs(told - exact) <= 0.5 + 1e-9);
+    RC_ASSERT(to_tie < 1e-9 || told == static_cast<int>(std::floor(exact + 0.5)));
+    if (told > 0) {
+      RC_ASSERT(steps.freshness(steps.last_age_s(static_cast<std::uint8_t>(told))) == told);
+      RC_ASSERT(steps.freshness(std::nextafter(steps.last_age_s(static_cast<std::uint8_t>(told)), 1e300)) == told - 1);
+    }
+  }));
+  const AgeSteps minute(60);
+  EXPECT_EQ(minute.freshness(std::numeric_limits<double>::quiet_NaN()), 8);
+  EXPECT_EQ(minute.freshness(std::numeric_limits<double>::infinity()), 0);
+  EXPECT_EQ(minute.freshness(60), 4);
 }
 
 TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
@@ -547,10 +626,10 @@ TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
     one.settings = with_change(default_settings(), change).value();
     const SceneTemperature facts = one.facts();
     const auto plan = FusionPlan::prepare(one.settings, facts, one.palette).value();
-    const auto answer = fused(plan, one.temperature, one.visible);
+    const auto answer = fused(plan, one.values());
     const FusionReference reference = reference_of(one, plan);
-    const auto ordinary = reference.fused(21.5F, one.visible[0]);
-    const auto outlier = reference.fused(90.0F, one.visible[0]);
+    const auto ordinary = reference.fused(21.5F, one.visible[0], kNan, 8);
+    const auto outlier = reference.fused(90.0F, one.visible[0], kNan, 8);
     for (std::size_t i = 0; i < answer.size(); ++i) {
       const auto& exact = i == 123'456 ? outlier : ordinary;
       for (std::size_t c = 0; c < 3; ++c) {

@@ -78,6 +78,33 @@ std::vector<float> temperatures_of_kind(int kind, Engine& engine) {
   }
 }
 
+/// Mostly near the temperatures, and everything else.
+std::vector<float> baselines_of(const std::vector<float>& temperature, Engine& engine) {
+  std::vector<float> baseline = temperature;
+  for (float& value : baseline) {
+    switch (engine() % 12) {
+      case 0:
+        value = kNan;
+        break;
+      case 1:
+        value = engine() % 2 ? kInfinity : -kInfinity;
+        break;
+      case 2:
+        value = std::bit_cast<float>(static_cast<std::uint32_t>(engine()));
+        break;
+      case 3:
+        value += 0.5F;  // Just the usual threshold.
+        break;
+      case 4:
+        break;
+      default:
+        value += between(engine, -8, 8);
+        break;
+    }
+  }
+  return baseline;
+}
+
 const char* const kKinds[] = {"none",     "one vertex", "uniform",     "all missing", "random bits",
                               "extremes", "subnormal",  "one step",    "kelvin",      "outlier",
                               "edges",    "mixed",      "tiny values", "whole",       "room"};
@@ -249,6 +276,12 @@ rc::Gen<Case> cases(const Method& method) {
     Engine engine(*rc::gen::arbitrary<std::uint64_t>());
     one.temperature = temperatures_of_kind(kind, engine);
     one.visible = *colours(one.temperature.size());
+    if (*rc::gen::inRange(0, 8) != 0) one.baseline = baselines_of(one.temperature, engine);
+    if (*rc::gen::inRange(0, 2) != 0) {
+      const std::uint64_t steps = *rc::gen::inRange<std::uint64_t>(1, 10);
+      one.freshness.resize(one.temperature.size());
+      for (std::uint8_t& freshness : one.freshness) freshness = static_cast<std::uint8_t>(8 - engine() % steps);
+    }
     one.settings = *settings_of(method, one.temperature);
     one.palette = *palettes();
     return one;

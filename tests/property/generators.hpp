@@ -15,9 +15,12 @@ struct Case {
   std::string scene;  ///< What kind of temperatures it holds.
   std::vector<float> temperature;
   std::vector<Rgb8> visible;
+  std::vector<float> baseline;          ///< Empty: none.
+  std::vector<std::uint8_t> freshness;  ///< Empty: all fresh.
   FusionSettings settings;
   PaletteTable palette{};
   SceneTemperature facts() const;
+  VertexValues values() const { return {temperature, visible, baseline, freshness}; }
 };
 
 void showValue(const Case& one, std::ostream& out);

@@ -93,7 +93,10 @@ Real FusionReference::normalised(float temperature) const {
 }
 
 Colour FusionReference::thermal(float temperature) const {
-  const Real position = 255 * normalised(temperature);
+  return palette_at(255 * normalised(temperature));
+}
+
+Colour FusionReference::palette_at(Real position) const {
   const auto row = static_cast<std::size_t>(position);
   const std::size_t next = std::min<std::size_t>(row + 1, 255);
   const Real part = position - static_cast<Real>(row);
@@ -143,7 +146,14 @@ void FusionReference::choose_bins(std::span<const float> temperature) {
   for (std::size_t i = 0; i < shown(n).first; ++i) chosen_bins_[ranked[i].second] = true;
 }
 
-Colour FusionReference::fused(float temperature, Rgb8 visible) const {
+Colour FusionReference::fused(float temperature, Rgb8 visible, float baseline, std::uint8_t freshness) const {
+  Colour colour = unfaded(temperature, visible, baseline);
+  const Real grey = (299 * colour[0] + 587 * colour[1] + 114 * colour[2]) / 1000;
+  for (Real& channel : colour) channel = grey + (channel - grey) * (Real(freshness) / 8);
+  return colour;
+}
+
+Colour FusionReference::unfaded(float temperature, Rgb8 visible, float baseline) const {
   const std::string& method = settings_.method;
   const Colour v = {Real(visible.r), Real(visible.g), Real(visible.b)};
   if (method == "visible_only") return v;
@@ -194,6 +204,14 @@ Colour FusionReference::fused(float temperature, Rgb8 visible) const {
     const Real brightest = std::max({v[0], v[1], v[2]});
     if (brightest == 0) return {255 * intensity, 255 * intensity, 255 * intensity};
     return {255 * intensity * v[0] / brightest, 255 * intensity * v[1] / brightest, 255 * intensity * v[2] / brightest};
+  }
+  if (method == "thermal_change") {
+    const float change = temperature - baseline;
+    const auto threshold = static_cast<float>(number("threshold"));
+    const bool shows = toggle("invert") ? std::fabs(change) < threshold : std::fabs(change) > threshold;
+    if (!shows) return v;
+    const Real position = std::clamp((Real(change) / Real(number("span")) + 1) / 2, 0.0L, 1.0L) * 255;
+    return blend(Real(number("alpha")), palette_at(position), v);
   }
   if (method == "histogram_bin") {
     return chosen_bins_[bin_of(temperature)] ? blend(Real(number("alpha")), thermal(temperature), v) : v;

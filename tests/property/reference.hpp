@@ -20,15 +20,18 @@ class FusionReference {
   FusionReference(const FusionSettings& settings, const PaletteTable& palette, const TemperatureSummary& summary,
                   std::span<const float> temperature);
 
-  Colour fused(float temperature, Rgb8 visible) const;
+  /// `baseline` is NaN where there is none; `freshness` in eighths.
+  Colour fused(float temperature, Rgb8 visible, float baseline, std::uint8_t freshness) const;
 
  private:
+  Colour unfaded(float temperature, Rgb8 visible, float baseline) const;
   double number(const char* name) const;
   double temperature_or(const char* name, double sigmas) const;
   bool toggle(const char* name) const;
   const std::string& choice(const char* name) const;
   Real normalised(float temperature) const;
   Colour thermal(float temperature) const;
+  Colour palette_at(Real position) const;
   std::size_t bin_of(float temperature) const;
   void choose_bins(std::span<const float> temperature);
 

@@ -53,11 +53,13 @@ Seen compare(const Run& run, const std::vector<float>& temperature, const std::v
     return histogram;
   };
   std::vector<Rgb8> fused(temperature.size());
-  FusionPlan::prepare(settings, facts, palette).value().fuse(temperature, visible, fused);
+  // Half of all changes are beyond a span of 5 K.
+  const std::vector<float> baseline(temperature.size(), 27.5F);
+  FusionPlan::prepare(settings, facts, palette).value().fuse({temperature, visible, baseline}, fused);
   const test::FusionReference reference(settings, palette, facts.summary, temperature);
   Seen seen;
   for (std::size_t i = 0; i < fused.size(); ++i) {
-    const auto exact = reference.fused(temperature[i], visible[i]);
+    const auto exact = reference.fused(temperature[i], visible[i], baseline[i], 8);
     const std::uint8_t actual[3] = {fused[i].r, fused[i].g, fused[i].b};
     std::uint8_t rounded[3];
     bool differs = false;
@@ -110,6 +112,8 @@ std::vector<Run> runs() {
       {"64 bins, 32 shown, alpha 0.8", "histogram_bin", {{"n", Integer{32}}, {"alpha", 0.8}}},
       {"4096 bins, 2000 shown", "histogram_bin", {{"bins", Integer{4096}}, {"n", Integer{2000}}}},
       {"k 1, alpha 0.9", "histogram_distribution", {{"alpha", 0.9}, {"k", 1.0}}},
+      {"span 5, alpha 0.8", "thermal_change", {}, "blue_red"},
+      {"span 0.7, alpha 0.37", "thermal_change", {{"span", 0.7}, {"alpha", 0.37}}, "cyan_amber"},
   };
 }
 

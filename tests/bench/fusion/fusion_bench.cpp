@@ -25,11 +25,14 @@ using Clock = std::chrono::steady_clock;
 Scene make_scene(std::size_t count) {
   Scene scene;
   scene.temperature.resize(count);
+  scene.baseline.resize(count);
   scene.visible.resize(count);
   std::mt19937 engine(1);
   std::uniform_real_distribution<float> celsius(15, 40);
+  std::uniform_real_distribution<float> drift(-2, 2);  // Of which half is below a threshold of 1 K.
   for (std::size_t i = 0; i < count; ++i) {
     scene.temperature[i] = celsius(engine);
+    scene.baseline[i] = scene.temperature[i] + drift(engine);
     const auto bits = static_cast<std::uint32_t>(engine());
     scene.visible[i] = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
                         static_cast<std::uint8_t>(bits >> 16)};
@@ -55,6 +58,7 @@ FusionSettings working_settings(const std::string& method) {
   if (method == "inverse_intensity_hue") change.params["k"] = 2.5;
   if (method == "histogram_bin") change.params["n"] = std::int64_t{32};
   if (method == "histogram_distribution") change.params["k"] = 1.0;
+  if (method == "thermal_change") change.params["threshold"] = 1.0;
   return with_change(default_settings(), change).value();
 }
 
@@ -122,7 +126,7 @@ bool run(std::size_t count, const std::vector<std::string>& wanted) {
     const Loop as_double = scalar_double_loop(scene, plan, palette);
     const Loop plain = plain_float_blend(scene, plan, palette);
     const Loop opencv = opencv_composition(scene, plan, palette);
-    plan.fuse(scene.temperature, scene.visible, fused);
+    plan.fuse({scene.temperature, scene.visible, scene.baseline}, fused);
     if (as_double) {
       as_double(scalar);
       const Difference apart = difference(fused, scalar);
@@ -138,7 +142,9 @@ bool run(std::size_t count, const std::vector<std::string>& wanted) {
       if (!loop) return {};
       return [&loop, &out] { loop(out); };
     };
-    const auto best = best_times({[&] { plan.fuse(scene.temperature, scene.visible, fused); },
+    const auto best = best_times({[&] {
+                                    plan.fuse({scene.temperature, scene.visible, scene.baseline}, fused);
+                                  },
                                   [&] { std::memcpy(to.data(), from.data(), from.size()); }, call(as_double, scalar),
                                   call(plain, scalar), call(opencv, composed)},
                                  count);
@@ -159,7 +165,7 @@ bool run(std::size_t count, const std::vector<std::string>& wanted) {
     cell(bool(plain), ns(3) / ns(0), " %8.1f");
     cell(bool(opencv), ns(4) / ns(0), " %8.1f");
     if (opencv) {
-      plan.fuse(scene.temperature, scene.visible, fused);
+      plan.fuse({scene.temperature, scene.visible, scene.baseline}, fused);
       const Difference apart = difference(fused, composed);
       std::printf("  (OpenCV is off by up to %d levels)", apart.worst);
     }

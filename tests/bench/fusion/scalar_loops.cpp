@@ -125,6 +125,19 @@ Loop scalar_double_loop(const Scene& scene, const FusionPlan& plan, const Palett
                   return double{temperature} < lower || double{temperature} > upper ? mixed(a, thermal(t), v) : v;
                 });
   }
+  if (method == "thermal_change") {
+    const double span = number("span");
+    return [&scene, thermal, span, a = number("alpha"),
+            limit = static_cast<float>(number("threshold"))](std::span<Rgb8> fused) {
+      for (std::size_t i = 0; i < fused.size(); ++i) {
+        const float change = scene.temperature[i] - scene.baseline[i];
+        const Rgb8 v = scene.visible[i];
+        const Colour visible{double(v.r), double(v.g), double(v.b)};
+        const double t = std::clamp((double{change} / span + 1) / 2, 0.0, 1.0);
+        fused[i] = std::abs(change) > limit ? rounded(mixed(a, thermal(t), visible)) : v;
+      }
+    };
+  }
   return {};
 }
 

@@ -12,6 +12,7 @@ namespace spectra::fusion::bench {
 /// A scene in flat arrays, with what its plan knows.
 struct Scene {
   std::vector<float> temperature;
+  std::vector<float> baseline;
   std::vector<Rgb8> visible;
   TemperatureSummary summary;
   std::vector<std::uint64_t> counts;  ///< Of a histogram of 64 bins.

@@ -161,6 +161,32 @@ TEST(FusionMessages, WarnOfAPaletteByWhatMethodAndPaletteSayOfThemselves) {
   EXPECT_TRUE(to_message(method).wants_fusion_safe_palette);
 }
 
+TEST(FusionMessages, WarnOfAPaletteWithoutAMiddleWhereTwoDirectionsAreShown) {
+  fusion::Method method;
+  method.label = "A method of this test";
+  EXPECT_FALSE(direction_warning(method, fusion::find_palette("iron")));
+  method.wants_diverging_palette = true;
+  const auto warning = direction_warning(method, fusion::find_palette("iron"));
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->find("Iron"), std::string::npos) << *warning;
+  EXPECT_FALSE(direction_warning(method, fusion::find_palette("blue_red")));
+  EXPECT_FALSE(direction_warning(method, nullptr));
+  EXPECT_EQ(to_message(method).wants_diverging_palette, true);
+  EXPECT_EQ(to_message(*fusion::find_palette("blue_red")).diverging, true);
+  EXPECT_FALSE(to_message(*fusion::find_palette("iron")).diverging) << "said only where it is true";
+}
+
+TEST(FusionMessages, TellWhatThePaletteStandsForWhereItIsChanges) {
+  const auto scene = scene_from(10, 30);
+  const auto state = [&](const char* method) {
+    return to_message(fusion::FusionPlan::prepare(settings_of(method), scene).value(), scene.summary);
+  };
+  ASSERT_TRUE(state("thermal_change").change_scale);
+  EXPECT_EQ(state("thermal_change").change_scale->min, -5);
+  EXPECT_EQ(state("thermal_change").change_scale->max, 5);
+  EXPECT_FALSE(state("thermal_only").change_scale);
+}
+
 TEST(FusionMessages, TellNothingOfTemperaturesThatAreNotThere) {
   const fusion::SceneTemperature none;
   const auto settings = settings_of("thermal_highlighting");

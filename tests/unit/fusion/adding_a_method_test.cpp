@@ -55,7 +55,7 @@ TEST(AddingAMethod, TheKernelOfThePageFollowsItsFormula) {
   const PreparedMethod prepared =
       method.prepare({{"strength", 0.7}}, MethodContext{lo, hi, scene, palette, std::nullopt});
   std::vector<Rgb8> fused(visible.size());
-  prepared.kernel->fuse(temperature, visible, fused);
+  prepared.kernel->fuse({temperature, visible}, fused);
   for (std::size_t i = 0; i < fused.size(); ++i) {
     if (!std::isfinite(temperature[i])) {
       EXPECT_EQ(fused[i], visible[i]);

@@ -31,7 +31,8 @@ TEST(Highlighted, MethodsThatTreatAllTemperaturesAlikeHaveNone) {
   std::vector<float> temperature(40, 20.0F);
   temperature.insert(temperature.end(), {10, 40});
   for (const Method* method : all_methods()) {
-    EXPECT_EQ(highlighted(method->id, {}, temperature).empty(), !method->highlights) << method->id;
+    EXPECT_EQ(highlighted(method->id, {}, temperature).empty(), !method->highlights || method->compares_with_baseline)
+        << method->id;
   }
 }
 
@@ -84,7 +85,7 @@ TEST(Mark, TellsVerticesThatAreHighlightedFromOthersAndFromMissingOnes) {
                             scene_of(temperature))
             .value();
     std::vector<std::uint8_t> marked(temperature.size(), 7);
-    plan.mark(temperature, marked);
+    plan.mark(temperature, {}, marked);
     EXPECT_EQ(plan.highlights(), find_method(method)->highlights);
     return marked;
   };
@@ -96,6 +97,17 @@ TEST(Mark, TellsVerticesThatAreHighlightedFromOthersAndFromMissingOnes) {
       << "the range of the palette is another matter";
   EXPECT_EQ(marks("thermal_highlighting", {{"low", 15.0}, {"high", 25.0}}), (Marks{1, 0, 1, 1, 0, 1, 1}));
   EXPECT_EQ(marks("thermal_visible_blend", {}), (Marks{0, 0, 0, 0, 0, 0, 0}));
+}
+
+TEST(Mark, OfChangesAsksTheBaseline) {
+  const std::vector<float> temperature = {20, 20, 20, 20};
+  const std::vector<float> baseline = {20, 19, 21, std::numeric_limits<float>::quiet_NaN()};
+  const auto plan = FusionPlan::prepare(settings_with("thermal_change"), scene_of(temperature)).value();
+  std::vector<std::uint8_t> marked(4);
+  plan.mark(temperature, baseline, marked);
+  EXPECT_EQ(marked, (std::vector<std::uint8_t>{0, 1, 1, 0}));
+  plan.mark(temperature, {}, marked);
+  EXPECT_EQ(marked, (std::vector<std::uint8_t>{0, 0, 0, 0})) << "without a baseline nothing has changed";
 }
 
 }  // namespace

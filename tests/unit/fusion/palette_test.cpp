@@ -72,6 +72,31 @@ TEST(Palettes, RuleRefusesWeakChromaARepeatedHueAndAHalt) {
   EXPECT_FALSE(carries_hue_alone(halting));
 }
 
+TEST(Palettes, TwoTellTwoDirectionsAndTheRestDoNot) {
+  std::set<std::string> diverging;
+  for (const Palette& palette : all_palettes()) {
+    EXPECT_EQ(palette.diverging, is_diverging(palette.table)) << palette.id;
+    if (palette.diverging) diverging.insert(palette.id);
+  }
+  EXPECT_EQ(diverging, (std::set<std::string>{"blue_red", "cyan_amber"}));
+}
+
+TEST(Palettes, ADivergingOneHasANeutralMiddleStrongArmsAndEndsThatDiffer) {
+  const PaletteTable good = find_palette("blue_red")->table;
+  PaletteTable tinted = good;
+  tinted[128] = {240, 200, 180};
+  EXPECT_FALSE(is_diverging(tinted));
+  PaletteTable weak = good;
+  weak[200] = {128, 128, 120};
+  EXPECT_FALSE(is_diverging(weak));
+  PaletteTable turning = good;
+  turning[20] = {40, 200, 60};
+  EXPECT_FALSE(is_diverging(turning));
+  PaletteTable alike = good;
+  for (std::size_t row = 0; row < 128; ++row) alike[row] = good[255 - row];
+  EXPECT_FALSE(is_diverging(alike));
+}
+
 TEST(Palettes, RuleRefusesMoreThanOneTurn) {
   PaletteTable wheel{};
   const auto fill = [&wheel](double degrees_in_all) {

@@ -134,6 +134,24 @@ TEST(FusionSettings, AutomaticRangeForgetsHandSetValues) {
   EXPECT_EQ(with_change(by_hand, automatic).value(), default_settings());
 }
 
+TEST(FusionSettings, AgePartsMergeAndAHalfLifeHasItsLimits) {
+  FusionChange change;
+  change.age = {AgeMode::Fade, 60};
+  const FusionSettings minute = with_change(default_settings(), change).value();
+  change.age = {AgeMode::Off, std::nullopt};
+  const FusionSettings off = with_change(minute, change).value();
+  EXPECT_EQ(off.age.half_life_s, 60) << "what was set comes back with the fade";
+  EXPECT_EQ(off, default_settings()) << "while it is off it shows nothing";
+  for (const double wrong : {0.0, -1.0, 0.999, 1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    change.age = {std::nullopt, wrong};
+    const auto refused = with_change(minute, change);
+    ASSERT_FALSE(refused.has_value()) << wrong;
+    EXPECT_EQ(refused.error().code, ErrorCode::OutOfRange);
+    EXPECT_EQ(refused.error().field, "age.half_life_s");
+    EXPECT_NE(refused.error().message.find("at least 1 and of at most 10000000"), std::string::npos);
+  }
+}
+
 TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
   std::vector<FusionSettings> all = {default_settings()};
   for (const Method* method : all_methods()) {
@@ -142,6 +160,11 @@ TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
   }
   FusionChange change;
   change.params["alpha"] = std::nextafter(0.4, 1);
+  all.push_back(with_change(default_settings(), change).value());
+  change = {};
+  change.age.mode = AgeMode::Fade;
+  all.push_back(with_change(default_settings(), change).value());
+  change.age.half_life_s = 60;
   all.push_back(with_change(default_settings(), change).value());
   change = {};
   change.palette = "rainbow";

@@ -64,6 +64,7 @@ export interface ProtocolDefinitions {
   Bounds: Bounds;
   CameraSet: CameraSet;
   Catalogue: Catalogue;
+  ChangeScale: ChangeScale;
   Channel: Channel;
   Colour: Colour;
   ColourBytes: ColourBytes;
@@ -168,6 +169,14 @@ export interface MethodDescription {
    * A palette that is not fusion_safe loses temperature with this method.
    */
   wants_fusion_safe_palette: boolean;
+  /**
+   * A palette that is not diverging does not tell warmer from colder with this method. Absent: false.
+   */
+  wants_diverging_palette?: boolean;
+  /**
+   * It shows how temperatures differ from the vertices' baseline; where there is none it shows the visible colours. Absent: false.
+   */
+  compares_with_baseline?: boolean;
   params: ParameterDescription[];
 }
 /**
@@ -216,9 +225,23 @@ export interface PaletteDescription {
    */
   fusion_safe: boolean;
   /**
+   * Tells two directions from a neutral middle. Absent: false.
+   */
+  diverging?: boolean;
+  /**
    * Row 0 is the coldest.
    */
   colours: Colour[];
+}
+/**
+ * The changes of temperature at the ends of the palette, kelvin.
+ */
+export interface ChangeScale {
+  min: number;
+  /**
+   * Above min.
+   */
+  max: number;
 }
 /**
  * An object of no known field.
@@ -321,6 +344,17 @@ export interface FusionState {
   palette: string;
   range: FusionRange;
   missing: MissingDisplay;
+  change_scale?: ChangeScale1;
+}
+/**
+ * The changes of temperature at the ends of the palette, kelvin.
+ */
+export interface ChangeScale1 {
+  min: number;
+  /**
+   * Above min.
+   */
+  max: number;
 }
 /**
  * Params of the notification hello, the first message of every connection.

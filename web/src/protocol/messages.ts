@@ -109,6 +109,8 @@ export const method: Decoder<Method> = object({
   needs_temperature: boolean,
   uses_palette: boolean,
   wants_fusion_safe_palette: boolean,
+  wants_diverging_palette: optional(boolean),
+  compares_with_baseline: optional(boolean),
   params: array(parameter),
 });
 
@@ -116,6 +118,7 @@ export const palette: Decoder<Palette> = object({
   id: string,
   label: string,
   fusion_safe: boolean,
+  diverging: optional(boolean),
   colours: array(triple(number)),
 });
 
@@ -134,6 +137,7 @@ export const fusion: Decoder<Fusion> = object({
   palette: string,
   range,
   missing: string,
+  change_scale: optional(object({ min: number, max: number })),
 });
 
 export const quality: Decoder<Quality> = object({
