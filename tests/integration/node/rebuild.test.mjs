@@ -51,6 +51,20 @@ function checkPicture({ tiles, scene }, change, expected, shown = (value) => val
   assert.deepEqual(misplacedVertices(tiles, picture, origin).slice(0, 5), [], JSON.stringify(change));
 }
 
+/** The pictures of all clients: the first against the file's, the others against the first, bit by bit. */
+function checkPictures([one, ...others], change, expected, shown) {
+  checkPicture(one, change, expected, shown);
+  const bytesOf = ({ buffer, byteOffset, byteLength }) => Buffer.from(buffer, byteOffset, byteLength);
+  const content = ({ tiles }) =>
+    new Map(tiles.map(({ frame, geometry, colours }) => [frame.tile, [geometry.positions, geometry.indices, colours].map(bytesOf)]));
+  const wanted = content(one);
+  for (const other of others) {
+    const held = content(other);
+    assert.deepEqual([...held.keys()].sort(), [...wanted.keys()].sort());
+    for (const [tile, parts] of held) parts.forEach((part, i) => assert.ok(part.equals(wanted.get(tile)[i]), `${tile}, ${i}`));
+  }
+}
+
 /** The same scene for two clients, one for each way to write colours. */
 async function checkScene(scene, changes) {
   const pictures = []; // By change, then by client. Compared once nobody is connected: a client that is busy for long is cut.
@@ -85,10 +99,10 @@ async function checkScene(scene, changes) {
   let expected;
   changes.forEach((change, i) => {
     expected = fused(scene, change);
-    for (const picture of pictures[i]) checkPicture(picture, change, expected);
+    checkPictures(pictures[i], change, expected);
   });
   const rounded = (value) => Math.min(255, (value + 2) & ~3);
-  for (const picture of coarse) checkPicture(picture, changes.at(-1), expected, rounded);
+  checkPictures(coarse, changes.at(-1), expected, rounded);
 }
 
 test("every method on a generated scene", { timeout: 300_000 }, async () => {
