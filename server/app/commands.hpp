@@ -8,6 +8,7 @@
 
 #include "fusion/mesh/read_options.hpp"
 #include "protocol/draco_file.hpp"
+#include "server/access/role.hpp"
 #include "server/app/settings_text.hpp"
 #include "server/store/block_store.hpp"
 
@@ -27,6 +28,9 @@ struct ServeOptions {
   std::optional<store::StoreTime> at;  ///< The map of the store is shown as it was then, and takes no blocks.
   std::string listen = "127.0.0.1:8080";
   std::vector<std::string> allowed_hosts;
+  std::optional<std::filesystem::path> tokens;  ///< Whom to let in; absent: what the environment says.
+  bool is_insecure = false;                     ///< Others are let in without a token.
+  std::optional<AccessRole> invited;            ///< Print a link that lets one browser in.
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
   fusion::ReadOptions read;
@@ -67,17 +71,27 @@ struct StoreSalvageOptions {
   std::filesystem::path output;  ///< Must not be there yet.
 };
 
+struct TokenOptions {
+  std::filesystem::path file;
+  std::string role = "operator";
+  std::string name;     ///< Empty: of the role.
+  std::string removed;  ///< The name of one to take out.
+  bool is_list = false;
+};
+
 struct PushOptions {
   std::filesystem::path input;  ///< A PLY file, or a folder of them.
   std::string to;               ///< The server's address, http://HOST:PORT.
   std::string id;               ///< Of the block of one file; empty: its name.
   std::optional<double> blocks_per_s;
-  std::string observed_at = "file";  ///< "file", "now" or Unix seconds.
+  std::optional<std::filesystem::path> token_file;  ///< Holds a token in its first line; absent: the environment's.
+  std::string observed_at = "file";                 ///< "file", "now" or Unix seconds.
   fusion::ReadOptions read;
 };
 
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
+int run_token(const TokenOptions& options);
 int run_fuse(const FuseOptions& options);
 int run_info(const InfoOptions& options);
 int run_methods(bool as_json);

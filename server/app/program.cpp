@@ -81,6 +81,18 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
       ->excludes("--live");
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
+  command->add_option("--tokens", options.tokens, "Let in whom this file names; made by spectra token");
+  command
+      ->add_flag(
+          "--insecure", options.is_insecure,
+          "On a network: let anybody watch and operate without a token; the map is changed from this machine alone")
+      ->excludes("--tokens");
+  const auto set_invited = [&options](const std::string& role) {
+    options.invited = access_role(role);
+    if (!options.invited) throw CLI::ValidationError("--invite " + role, "viewer, operator, ingest or admin is wanted");
+  };
+  command->add_option_function<std::string>(
+      "--invite", set_invited, "Print a link and a QR code that let one browser in, as viewer or operator");
   add_reading(*command, options.read);
   command->add_option("--web", options.web, "Folder of the built web client");
   command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
@@ -177,8 +189,25 @@ void add_push(CLI::App& app, PushOptions& options, Run& run) {
                    "When it was seen: file (when the file was written), now, or Unix seconds")
       ->capture_default_str()
       ->check(CLI::Validator(is_time, ""));
+  command->add_option("--token-file", options.token_file,
+                      "A file that holds the token of the role ingest; else SPECTRA_TOKEN in the environment");
   add_reading(*command, options.read);
   command->final_callback([&options, &run] { run = [&options] { return run_push(options); }; });
+}
+
+void add_token(CLI::App& app, TokenOptions& options, Run& run) {
+  auto* command = app.add_subcommand("token", "Make a token that a server lets in, or take one back");
+  command->add_option("--file", options.file, "The file of the server's tokens; made when it is not there")->required();
+  auto* role = command->add_option("--role", options.role, "viewer, operator, ingest or admin")
+                   ->check(CLI::IsMember({"viewer", "operator", "ingest", "admin"}))
+                   ->capture_default_str();
+  auto* name = command->add_option("--name", options.name, "Whose it is: 1 to 32 of a-z A-Z 0-9 _ -");
+  command->add_flag("--list", options.is_list, "Show roles and names")->excludes(role)->excludes(name);
+  command->add_option("--remove", options.removed, "Take the token of this name back")
+      ->excludes(role)
+      ->excludes(name)
+      ->excludes("--list");
+  command->final_callback([&options, &run] { run = [&options] { return run_token(options); }; });
 }
 
 void add_store(CLI::App& app, std::filesystem::path& checked, StoreSalvageOptions& salvage, Run& run) {
@@ -208,6 +237,7 @@ int parse_and_run(int argc, const char* const* argv) {
   DemoSceneFileOptions demo_scene;
   TradeoffCommandOptions tradeoff;
   PushOptions push;
+  TokenOptions token;
   std::filesystem::path checked_store;
   StoreSalvageOptions salvage;
   Run run;
@@ -220,6 +250,7 @@ int parse_and_run(int argc, const char* const* argv) {
   add_tradeoff(app, tradeoff, run);
   add_push(app, push, run);
   add_store(app, checked_store, salvage, run);
+  add_token(app, token, run);
   bool is_quiet = false;
   constexpr auto* kQuietHelp = "No progress on the terminal";
   app.add_flag("--quiet", is_quiet, kQuietHelp);

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -100,11 +102,24 @@ std::string observed_at(const std::string& asked, const fs::path& path) {
   return seconds_text(static_cast<double>(facts.st_mtim.tv_sec) + 1e-9 * static_cast<double>(facts.st_mtim.tv_nsec));
 }
 
+/// What the server is shown; empty for none. Nothing when the file has none.
+std::optional<std::string> token_of(const PushOptions& options) {
+  std::string token;
+  if (options.token_file) {
+    std::ifstream file(*options.token_file);
+    if (!(file >> token)) return std::nullopt;
+  } else if (const char* text = std::getenv("SPECTRA_TOKEN")) {
+    token = text;
+  }
+  return token;
+}
+
 /// Sends files and keeps the account of what has become of them.
 class Push {
  public:
-  Push(const PushOptions& options, std::vector<BlockFile> files, const IngestAddress& to)
+  Push(const PushOptions& options, std::vector<BlockFile> files, const IngestAddress& to, std::string token)
       : options_(options),
+        token_(std::move(token)),
         files_(std::move(files)),
         to_(to),
         line_({{kPushingPhase, "pushing " + options.input.filename().string() + " to " + to.authority(), 1}}),
@@ -118,6 +133,7 @@ class Push {
                               [](const std::string& why) { warn(why + "; connecting again"); }};
     SendingLimits limits;
     limits.blocks_per_s = options_.blocks_per_s;
+    limits.token = token_;
     const auto problem = send_blocks(to_, blocks, limits);
     line_.end();
     print_notes(notes());
@@ -190,6 +206,7 @@ class Push {
   };
 
   const PushOptions& options_;
+  const std::string token_;
   const std::vector<BlockFile> files_;
   const IngestAddress& to_;
   ProgressLine line_;
@@ -208,7 +225,9 @@ int run_push(const PushOptions& options) {
   if (const auto meant = fusion::check_read_options(options.read); !meant) return fail(meant.error());
   auto files = block_files(options);
   if (!files) return fail(files.error());
-  return Push(options, std::move(files).value(), std::get<IngestAddress>(address)).run();
+  auto token = token_of(options);
+  if (!token) return fail(kJobFailed, options.token_file->string() + ": there is no token in its first line");
+  return Push(options, std::move(files).value(), std::get<IngestAddress>(address), std::move(*token)).run();
 }
 
 }  // namespace spectra::server

@@ -13,9 +13,11 @@
 #include <thread>
 
 #include "fusion/mesh/demo_scene.hpp"
+#include "server/access/access_control.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/http_api.hpp"
+#include "server/app/invitation.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/served_scene.hpp"
@@ -27,6 +29,7 @@ namespace spectra::server {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr const char* kTokensVariable = "SPECTRA_TOKENS";
 constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
 
 /// The built web client: as asked for, installed beside the program, or in the source tree it was built from.
@@ -56,6 +59,41 @@ void raise_descriptor_limit() {
     limit.rlim_cur = limit.rlim_max;
     setrlimit(RLIMIT_NOFILE, &limit);
   }
+}
+
+/// Whom to let in: as options and environment say. Nothing: nobody needs a token.
+AccessResult<std::optional<TokenList>> token_list(const ServeOptions& options) {
+  AccessResult<TokenList> list;
+  if (options.tokens) {
+    list = read_tokens(*options.tokens);
+  } else if (const char* text = std::getenv(kTokensVariable); text != nullptr && !options.is_insecure) {
+    list = tokens_of_text(text);
+    if (auto* problem = std::get_if<std::string>(&list)) return std::string(kTokensVariable) + ": " + *problem;
+  } else {
+    return std::optional<TokenList>();
+  }
+  if (auto* problem = std::get_if<std::string>(&list)) return std::move(*problem);
+  return std::optional(std::get<TokenList>(std::move(list)));
+}
+
+/// Reads the file again; what is wrong with it is said, and nothing changes.
+void reload_tokens(const std::filesystem::path& file, AccessControl& access) {
+  auto read = read_tokens(file);
+  if (const auto* problem = std::get_if<std::string>(&read)) {
+    spdlog::error("the tokens stay as they were: {}", *problem);
+    return;
+  }
+  auto& list = std::get<TokenList>(read);
+  spdlog::info("the tokens are read again: {}", list.tokens.size());
+  access.replace(std::move(list));
+}
+
+void print_invitation(const HttpServer& server, AccessControl& access, AccessRole role) {
+  const auto code = access.make_code({AccessRole::Admin, access.first_name(), false}, role);
+  if (!code) return;
+  const std::string link = server.urls().back() + "/login#" + *code;
+  std::printf("for one %s, within %d minutes: %s\n%s", std::string(to_string(role)).c_str(),
+              static_cast<int>(AccessControl::kCodeLifetime.count()), link.c_str(), qr_text(link).c_str());
 }
 
 /// Reads and tiles the scene in a thread of its own, while the server already answers.
@@ -139,9 +177,24 @@ int run_serve(const ServeOptions& options) {
   if (options.web && !fs::exists(*options.web / "index.html")) {
     return fail(kJobFailed, options.web->string() + ": there is no index.html in it");
   }
+  auto tokens = token_list(options);
+  if (const auto* problem = std::get_if<std::string>(&tokens)) return fail(kJobFailed, *problem);
+  auto& list = std::get<std::optional<TokenList>>(tokens);
+  if (!list && !options.is_insecure && !is_loopback(*listen)) {
+    return fail(kWrongUsage, "--listen " + options.listen +
+                                 " lets others in: name whom with --tokens FILE (spectra token makes it), or " +
+                                 "let anybody watch and operate with --insecure");
+  }
+  if (options.invited && !list) return fail(kWrongUsage, "--invite is for a server with --tokens");
   raise_descriptor_limit();
 
   NetOptions net;
+  if (list) {
+    net.access = std::make_shared<AccessControl>(std::move(*list), "spectra_" + std::to_string(listen->port));
+    if (options.tokens) {
+      net.reload = [file = *options.tokens, access = net.access] { reload_tokens(file, *access); };
+    }
+  }
   net.address = listen->address;
   net.port = listen->port;
   net.allowed_hosts = options.allowed_hosts;
@@ -174,6 +227,9 @@ int run_serve(const ServeOptions& options) {
   }
   api.set_metrics(server->metrics());
   for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
+  if (options.invited) print_invitation(*server, *net.access, *options.invited);
+  if (options.is_insecure && !is_loopback(*listen))
+    spdlog::warn("anybody on the network may watch and operate (--insecure)");
   std::fflush(stdout);
 
   SceneLoader loader(options, *served, map, *server);

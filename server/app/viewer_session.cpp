@@ -128,7 +128,7 @@ void ViewerSession::opened() {
   protocol::Hello hello;
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
-  hello.role = protocol::Role::Operator;
+  hello.role = may(peer_.role(), Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram", "probe",       "extremes", "extremes_in_view", "exports", "subtract_green",
                         "resume",    "cache_bytes", "marks"};
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
@@ -175,17 +175,17 @@ void ViewerSession::answered(const Id& id, const json& params) {
 std::span<const ViewerSession::Request> ViewerSession::requests() {
   using Self = ViewerSession;
   static constexpr Request kRequests[] = {
-      {"stream.ack", Cost::Free, &Self::answered<&Self::acknowledge>},
-      {"camera.set", Cost::Free, &Self::answered<&Self::set_camera>},
-      {"fusion.set", Cost::Request, &Self::fusion_set},
-      {"fusion.get", Cost::Request, &Self::answered<&Self::fusion_get>},
-      {"quality.set", Cost::Request, &Self::answered<&Self::set_quality>},
-      {"scene.get", Cost::Request, &Self::answered<&Self::scene_get>},
-      {"scene.subscribe", Cost::Request, &Self::answered<&Self::subscribe>},
-      {"scene.unsubscribe", Cost::Request, &Self::answered<&Self::unsubscribe>},
-      {"scene.histogram", Cost::Request, &Self::histogram},
-      {"scene.probe", Cost::Request, &Self::probe},
-      {"scene.extremes", Cost::Request, &Self::extremes},
+      {"stream.ack", Right::Watch, Cost::Free, &Self::answered<&Self::acknowledge>},
+      {"camera.set", Right::Watch, Cost::Free, &Self::answered<&Self::set_camera>},
+      {"fusion.set", Right::Watch, Cost::Request, &Self::fusion_set},
+      {"fusion.get", Right::Watch, Cost::Request, &Self::answered<&Self::fusion_get>},
+      {"quality.set", Right::Watch, Cost::Request, &Self::answered<&Self::set_quality>},
+      {"scene.get", Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
+      {"scene.subscribe", Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
+      {"scene.unsubscribe", Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
+      {"scene.histogram", Right::Watch, Cost::Request, &Self::histogram},
+      {"scene.probe", Right::Watch, Cost::Request, &Self::probe},
+      {"scene.extremes", Right::Watch, Cost::Request, &Self::extremes},
   };
   return kRequests;
 }
@@ -203,6 +203,10 @@ void ViewerSession::handle(const protocol::IncomingMessage& message) {
   if (!is_known) {
     return answer(message.id, refusal(RpcErrorCode::MethodNotFound,
                                       "there is no method \"" + message.method.substr(0, 64) + "\"", "method"));
+  }
+  if (!may(peer_.role(), request->right)) {
+    return answer(message.id, refusal(RpcErrorCode::Forbidden,
+                                      "that is not for the role " + std::string(to_string(peer_.role())), "method"));
   }
   (this->*request->handle)(message.id, message.params);
 }

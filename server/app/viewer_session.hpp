@@ -14,9 +14,9 @@
 #include "protocol/incoming_message.hpp"
 #include "protocol/messages/fusion_messages.hpp"
 #include "protocol/messages/stream_messages.hpp"
+#include "server/access/token_bucket.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/net/net_options.hpp"
-#include "server/net/token_bucket.hpp"
 #include "server/net/viewer_link.hpp"
 
 namespace spectra::server {
@@ -53,6 +53,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   /// One of the methods that a viewer may call.
   struct Request {
     std::string_view method;
+    Right right;
     Cost cost;
     void (ViewerSession::*handle)(const Id& id, const nlohmann::json& params);
   };

@@ -23,6 +23,9 @@
 #include "server/net/block_refusal.hpp"
 #include "server/net/block_room.hpp"
 #include "server/net/ingest_session.hpp"
+#include "server/net/request_right.hpp"
+#include "server/net/session_api.hpp"
+#include "server/net/steady_seconds.hpp"
 #include "server/net/websocket_session.hpp"
 
 namespace spectra::server {
@@ -92,6 +95,20 @@ bool is_block_change(const http::request<http::string_body>& request) {
          view(request.target()).starts_with(std::string(kBlocksPath) + '/');
 }
 
+std::string_view path_of(std::string_view target) {
+  return target.substr(0, target.find('?'));
+}
+
+/// Logging in or out, and letting others in.
+bool is_session_change(const http::request<http::string_body>& request) {
+  const auto path = path_of(view(request.target()));
+  return (request.method() == http::verb::post || request.method() == http::verb::delete_) &&
+         (path == kSessionPath || path == kCodesPath);
+}
+
+/// A token or a role.
+constexpr std::size_t kSessionBodyBytes = 1024;
+
 /// Counts a sender of blocks, as long as it is there.
 class SenderPlace {
  public:
@@ -147,7 +164,9 @@ asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();
   error_code error;
   local_address_ = stream_.socket().local_endpoint(error).address().to_string();
-  is_from_here_ = is_loopback(stream_.socket().remote_endpoint(error).address());
+  const auto peer = stream_.socket().remote_endpoint(error).address();
+  peer_address_ = peer.to_string();
+  is_from_here_ = is_loopback(peer);
   context_.metrics.connections_open += 1;
   if (context_.add(self)) {
     try {
@@ -175,15 +194,20 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   if (is_stopping_) co_return false;
   const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
   const bool is_change = is_block_change(parser.get());
-  const std::size_t largest_body = is_change ? limits.block_size_bytes : limits.body_size_bytes;
+  const bool is_session = is_session_change(parser.get());
+  const std::size_t largest_body = is_change    ? limits.block_size_bytes
+                                   : is_session ? kSessionBodyBytes
+                                                : limits.body_size_bytes;
   if (!error) {
     // A body whose end others see elsewhere would let requests be smuggled in.
     if (!is_transfer_coding_known(parser.get())) error = http::error::bad_transfer_encoding;
     if (parser.content_length().value_or(0) > largest_body) error = http::error::body_limit;
     parser.body_limit(largest_body);
   }
+  std::optional<HttpReply> refusal;
+  if (!error) refusal = refusal_of(parser.get());
   std::optional<BlockRoom> room;
-  if (!error && is_change && !refusal_of(parser.get())) {
+  if (!error && is_change && !refusal) {
     room.emplace(context_, static_cast<std::size_t>(
                                parser.content_length().value_or(parser.chunked() ? limits.block_size_bytes : 0)));
     if (!room->is_there()) {
@@ -192,8 +216,9 @@ asio::awaitable<bool> HttpConnection::serve_one() {
                                  std::to_string(limits.block_bytes_at_once) + " bytes at once"});
       co_return co_await write(busy, 11, false, false);
     }
-    std::tie(error, size) = co_await read_block_body(parser);
+    std::tie(error, size) = co_await read_body(parser);
   }
+  if (!error && is_session && !refusal) std::tie(error, size) = co_await read_body(parser);
   if (!error && is_read_method && !parser.is_done()) {
     std::tie(error, size) = co_await http::async_read(stream_, buffer_, parser, kAwait);
   }
@@ -216,9 +241,9 @@ asio::awaitable<bool> HttpConnection::serve_one() {
 
   Request request = parser.release();
   const bool is_head = request.method() == http::verb::head;
-  if (auto refused = refusal_of(request)) {
+  if (refusal) {
     context_.metrics.requests_refused += 1;
-    co_return co_await write(*refused, request.version(), is_head, request.keep_alive() && is_read_method);
+    co_return co_await write(*refusal, request.version(), is_head, request.keep_alive() && is_read_method);
   }
   if (is_change) {
     auto body = std::make_shared<const std::string>(std::move(request.body()));
@@ -230,6 +255,21 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   }
   auto target = *parsed_target(view(request.target()));
 
+  if (target.path == kSessionPath || target.path == kCodesPath) {
+    using Method = SessionRequest::Method;
+    const SessionRequest asked{.path = target.path,
+                               .method = request.method() == http::verb::post      ? Method::Post
+                                         : request.method() == http::verb::delete_ ? Method::Delete
+                                                                                   : Method::Get,
+                               .body = request.body(),
+                               .address = peer_address_};
+    const HttpReply reply = session_reply(*context_.options.access, who_.identity, asked, steady_seconds());
+    if (reply.status >= 400) {
+      context_.metrics.requests_refused += 1;
+      spdlog::info("{} is not let in: {}", peer_address_, reply.status);
+    }
+    co_return co_await write(reply, request.version(), is_head, request.keep_alive() && !is_stopping_);
+  }
   if (target.path == "/ws") {
     co_await serve_viewer(std::move(request), target);
     co_return false;
@@ -253,7 +293,7 @@ asio::awaitable<void> HttpConnection::serve_viewer(Request request, const Reques
     co_await refuse_upgrade(request, *refused);
     co_return;
   }
-  const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *form);
+  const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *form, *who_.identity);
   context_.remove(this);
   co_await session->run(std::move(request));
 }
@@ -262,9 +302,6 @@ asio::awaitable<void> HttpConnection::serve_sender(Request request) {
   const SenderPlace place(context_);
   const std::size_t most = context_.options.limits.ingest_sessions;
   auto refused = upgrade_refusal_of(request, protocol::kIngestProtocol);
-  if (!refused && !is_from_here_) {
-    refused = text_reply(403, "the map is changed from the robot's own machine alone\n");
-  }
   if (!refused && place.count() > static_cast<std::int64_t>(most)) {
     refused =
         text_reply(503, "too many senders of blocks are connected already: " + std::to_string(most) + " may be\n");
@@ -274,7 +311,7 @@ asio::awaitable<void> HttpConnection::serve_sender(Request request) {
     co_await refuse_upgrade(request, *refused);
     co_return;
   }
-  const auto session = std::make_shared<IngestSession>(std::move(stream_), context_);
+  const auto session = std::make_shared<IngestSession>(std::move(stream_), context_, *who_.identity);
   context_.remove(this);
   co_await session->run(std::move(request));
 }
@@ -284,7 +321,7 @@ asio::awaitable<void> HttpConnection::refuse_upgrade(const Request& request, con
   co_await write(reply, request.version(), request.method() == http::verb::head, false);
 }
 
-asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_block_body(
+asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_body(
     http::request_parser<http::string_body>& parser) {
   const auto expect = parser.get()[http::field::expect];
   if (!parser.is_done() && beast::iequals(expect, "100-continue")) {
@@ -301,28 +338,37 @@ asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_block_
   co_return std::tuple(error_code{}, std::size_t{0});
 }
 
-std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) const {
+std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) {
   if (count_of(request, http::field::host) != 1) return text_reply(400, "exactly one Host header is required\n");
   const auto host = view(request[http::field::host]);
   if (!context_.hosts.allows_host(host, local_address_)) {
     return text_reply(403, "this server does not answer to that host name; see --allow-host\n");
   }
-  if (is_block_change(request)) {
-    // Pages of other origins may not write, and nobody from another machine, as long as there are no roles.
+  const bool is_change = is_block_change(request);
+  if (is_change || is_session_change(request)) {
+    // Pages of other origins may not write.
     const auto origins = count_of(request, http::field::origin);
     if (origins > 1 ||
         (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
       return refused({403, "forbidden", "", "pages of that origin may not change the map; see --allow-host", ""});
-    }
-    if (!is_from_here_) {
-      return refused({403, "forbidden", "", "the map is changed from the robot's own machine alone", ""});
     }
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
     auto reply = text_reply(405, "only GET and HEAD; blocks of the map also PUT and DELETE\n");
     reply.headers.emplace_back("Allow", "GET, HEAD");
     return reply;
   }
-  if (!parsed_target(view(request.target()))) return text_reply(400, "bad request target\n");
+  const auto target = parsed_target(view(request.target()));
+  if (!target) return text_reply(400, "bad request target\n");
+  who_ =
+      context_.options.access->identify(view(request[http::field::authorization]), joined(request, http::field::cookie),
+                                        peer_address_, is_from_here_, steady_seconds());
+  if (target->path == "/" && (!who_.identity || !may(who_.identity->role, Right::Watch))) {
+    auto reply = text_reply(303, "log in at /login\n");
+    reply.headers.emplace_back("Location", "/login");
+    return reply;
+  }
+  const Right right = right_of(target->path, is_change);
+  if (right != Right::Nothing && (!who_.identity || !may(who_.identity->role, right))) return access_refusal(who_);
   return std::nullopt;
 }
 
@@ -340,6 +386,10 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
       (origins == 1 && !context_.hosts.allows_origin(view(request[http::field::origin]), local_address_))) {
     return text_reply(403, "pages of that origin may not connect; see --allow-host\n");
   }
+  // A browser says where a page comes from; a program has a token.
+  if (origins == 0 && who_.identity->is_by_cookie) {
+    return text_reply(403, "with a cookie an Origin is required; programs send Authorization: Bearer TOKEN\n");
+  }
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto it = begin; it != end; ++it) {
     for (const auto& offered : http::token_list(it->value())) {
@@ -350,7 +400,7 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
 }
 
 HttpReply HttpConnection::static_reply(const HttpRequest& request) const {
-  const std::string& path = request.target.path;
+  const std::string path = request.target.path == "/login" ? "/login.html" : request.target.path;
   const auto file = context_.files.find(path);
   if (!file) {
     if (path == "/") return text_reply(200, std::string(kNoWebClient), "text/html; charset=utf-8");

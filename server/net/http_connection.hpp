@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "server/access/access_control.hpp"
 #include "server/net/connection_stream.hpp"
 #include "server/net/server_context.hpp"
 
@@ -38,18 +39,20 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
   /// The rest of a request whose header was read and is good.
-  boost::asio::awaitable<std::tuple<boost::beast::error_code, std::size_t>> read_block_body(
+  boost::asio::awaitable<std::tuple<boost::beast::error_code, std::size_t>> read_body(
       boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
   HttpReply static_reply(const HttpRequest& request) const;
-  /// Why the request is refused before anything looks at what it asks for.
-  std::optional<HttpReply> refusal_of(const Request& request) const;
+  /// Why the request is refused before anything looks at what it asks for. Finds out who asks.
+  std::optional<HttpReply> refusal_of(const Request& request);
   std::optional<HttpReply> upgrade_refusal_of(const Request& request, const std::string& subprotocol) const;
 
   ConnectionStream stream_;
   ServerContext& context_;
   boost::beast::flat_buffer buffer_;
   std::string local_address_;
-  bool is_from_here_ = false;  ///< The peer is on this machine.
+  std::string peer_address_;
+  AccessControl::Outcome who_;  ///< Asks now.
+  bool is_from_here_ = false;   ///< The peer is on this machine.
   bool is_stopping_ = false;
   bool is_waiting_for_request_ = false;
 };

@@ -107,6 +107,11 @@ std::optional<ListenAddress> parsed_listen_address(std::string_view text) {
   return listen;
 }
 
+bool is_loopback(const ListenAddress& listen) {
+  error_code error;
+  return asio::ip::make_address(listen.address, error).is_loopback() && !error;
+}
+
 struct HttpServer::State {
   State(NetOptions options, HttpHandler http, ViewerClientFactory viewers, std::filesystem::path web_root,
         BlockHandler blocks)
@@ -115,12 +120,14 @@ struct HttpServer::State {
         io(static_cast<int>(context.options.io_thread_count)),
         acceptor(asio::make_strand(io)),
         accept_timer(acceptor.get_executor()),
-        signals(acceptor.get_executor()) {}
+        signals(acceptor.get_executor()),
+        hangups(acceptor.get_executor()) {}
 
   void listen();
   asio::awaitable<void> accept_connections();
   asio::awaitable<void> stop_in_stages();
   void begin_stop();
+  void reload_on_hangup();
 
   NetMetrics metrics;
   StaticFiles files;
@@ -129,6 +136,7 @@ struct HttpServer::State {
   tcp::acceptor acceptor;
   asio::steady_timer accept_timer;
   asio::signal_set signals;
+  asio::signal_set hangups;
   tcp::endpoint endpoint;
   bool is_stopping = false;
 };
@@ -201,6 +209,7 @@ asio::awaitable<void> HttpServer::State::stop_in_stages() {
   acceptor.close(ignored);
   accept_timer.cancel();
   signals.cancel(ignored);
+  hangups.cancel(ignored);
   for (const auto& connection : context.begin_stop()) connection->begin_stop();
   const auto deadline = std::chrono::steady_clock::now() + context.options.limits.stop_timeout;
   asio::steady_timer timer(acceptor.get_executor());
@@ -217,6 +226,14 @@ asio::awaitable<void> HttpServer::State::stop_in_stages() {
 void HttpServer::State::begin_stop() {
   if (std::exchange(is_stopping, true)) return;
   asio::co_spawn(acceptor.get_executor(), stop_in_stages(), asio::detached);
+}
+
+void HttpServer::State::reload_on_hangup() {
+  hangups.async_wait([this](const error_code& error, int) {
+    if (error) return;
+    context.options.reload();
+    reload_on_hangup();
+  });
 }
 
 HttpServer::HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory viewers,
@@ -236,6 +253,10 @@ void HttpServer::run() {
     state.signals.async_wait([&state](const error_code& error, int) {
       if (!error) state.begin_stop();
     });
+  }
+  if (state.context.options.reload) {
+    state.hangups.add(SIGHUP);
+    state.reload_on_hangup();
   }
   asio::co_spawn(state.acceptor.get_executor(), state.accept_connections(), asio::detached);
   std::vector<std::jthread> threads;

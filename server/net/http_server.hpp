@@ -20,6 +20,9 @@ struct ListenAddress {
   std::uint16_t port = 0;
 };
 
+/// Nobody but this machine reaches it.
+bool is_loopback(const ListenAddress& listen);
+
 /// Reads a ListenAddress; nothing when it is none.
 std::optional<ListenAddress> parsed_listen_address(std::string_view text);
 

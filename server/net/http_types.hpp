@@ -17,7 +17,7 @@ inline constexpr std::string_view kBlocksPath = "/api/v1/blocks";
 /// What a request asks for; HEAD is a Get whose body is left away.
 enum class HttpMethod { Get, Put, Delete };
 
-/// A request that has passed every check of the network side: Put and Delete come under kBlocksPath alone, from this machine.
+/// A request that has passed every check of the network side, by somebody who may: Put and Delete come under kBlocksPath alone.
 struct HttpRequest {
   RequestTarget target;
   std::string if_none_match = {};    ///< Empty when absent.

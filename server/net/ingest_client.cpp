@@ -40,7 +40,11 @@ constexpr std::chrono::milliseconds kBusyPause{500};
 constexpr std::size_t kLongestAnswer = 1024 * 1024;
 constexpr std::size_t kWriteBufferBytes = 256 * 1024;
 
-std::string first_line(const std::string& text) {
+/// Why a server refuses, as it says it: the reason of an error as JSON, or a line.
+std::string reason_in(const std::string& text) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  const auto reason = nlohmann::json::json_pointer("/error/reason");
+  if (json.is_object() && json.contains(reason) && json[reason].is_string()) return json[reason].get<std::string>();
   return text.substr(0, std::min<std::size_t>(text.find_first_of("\r\n"), 200));
 }
 
@@ -127,8 +131,9 @@ class Sending {
     timeouts.idle_timeout = websocket::stream_base::none();  // it does not count the server's pings
     timeouts.keep_alive_pings = false;
     ws_->set_option(timeouts);
-    ws_->set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+    ws_->set_option(websocket::stream_base::decorator([token = limits_.token](websocket::request_type& request) {
       request.set(beast::http::field::sec_websocket_protocol, protocol::kIngestProtocol);
+      if (!token.empty()) request.set(beast::http::field::authorization, "Bearer " + token);
     }));
     ws_->read_message_max(kLongestAnswer);
     ws_->auto_fragment(false);
@@ -138,7 +143,7 @@ class Sending {
     const auto [error] = co_await ws_->async_handshake(response, to_.authority(), to_.path, kAwait);
     if (error == websocket::error::upgrade_declined) {
       const unsigned status = response.result_int();
-      const std::string said = std::to_string(status) + ' ' + first_line(response.body());
+      const std::string said = std::to_string(status) + ' ' + reason_in(response.body());
       constexpr unsigned kNotFound = 404, kBusy = 503;
       failure_ = {status == kNotFound
                       ? where + to_.path + ": there is no such place; a Spectra server that takes blocks has it"

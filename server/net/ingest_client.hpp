@@ -44,6 +44,7 @@ struct BlocksToSend {
 
 struct SendingLimits {
   std::optional<double> blocks_per_s;
+  std::string token;  ///< Shown to the server; empty: none.
   std::chrono::milliseconds connect_timeout{10'000};
   std::chrono::milliseconds silence{15'000};   ///< The server pings every 4 s.
   std::chrono::milliseconds patience{30'000};  ///< A broken link is tried again for this long.

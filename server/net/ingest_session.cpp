@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "protocol/jsonrpc.hpp"
+#include "server/net/request_right.hpp"
 #include "server/net/request_target.hpp"
 
 namespace spectra::server {
@@ -36,9 +37,10 @@ BlockRefusal bad_request(std::string field, std::string reason, std::string limi
 
 }  // namespace
 
-IngestSession::IngestSession(ConnectionStream stream, ServerContext& context)
+IngestSession::IngestSession(ConnectionStream stream, ServerContext& context, AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),
+      who_(std::move(who)),
       writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
       minder_timer_(ws_.get_executor()),
       reader_timer_(ws_.get_executor()) {}
@@ -297,6 +299,8 @@ asio::awaitable<void> IngestSession::mind_deadlines() {
       end(false, "the close was not finished in time");
     } else if (closing_) {
       continue;
+    } else if (!context_.options.access->is_good(who_)) {
+      close(kAccessWithdrawn, "access was withdrawn");
     } else if (auto payload = pings_.next(now, limits.ping_interval)) {
       asio::co_spawn(ws_.get_executor(), ping(std::move(*payload)), asio::detached);
     }

@@ -28,7 +28,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  IngestSession(ConnectionStream stream, ServerContext& context);
+  IngestSession(ConnectionStream stream, ServerContext& context, AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -75,6 +75,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
 
   boost::beast::websocket::stream<ConnectionStream> ws_;
   ServerContext& context_;
+  const AccessControl::Identity who_;
   boost::asio::steady_timer writer_signal_;
   boost::asio::steady_timer minder_timer_;
   boost::asio::steady_timer reader_timer_;

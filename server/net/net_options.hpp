@@ -3,8 +3,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
+
+#include "server/access/access_control.hpp"
 
 namespace spectra::server {
 
@@ -44,8 +48,10 @@ struct NetOptions {
   std::string address = "127.0.0.1";       ///< An IPv4 or IPv6 address.
   std::uint16_t port = 8080;               ///< 0 picks a free one.
   std::vector<std::string> allowed_hosts;  ///< Host names beside loopback and the addresses listened on.
+  std::shared_ptr<AccessControl> access = std::make_shared<AccessControl>();
   unsigned io_thread_count = 1;
-  bool stop_on_signals = false;  ///< SIGINT and SIGTERM begin stop().
+  bool stop_on_signals = false;       ///< SIGINT and SIGTERM begin stop().
+  std::function<void()> reload = {};  ///< What SIGHUP does; empty: what the system does.
   NetLimits limits;
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/access/role.hpp"
 #include "server/stream/viewer_stream.hpp"
 
 namespace spectra::server {
@@ -47,6 +48,9 @@ class ViewerPeer {
 
   /// What the viewer asked for as it connected.
   virtual HelloForm hello_form() const = 0;
+
+  /// As whom the viewer was let in.
+  virtual AccessRole role() const = 0;
 
   /// Round trip of the last answered ping, milliseconds; 0 before the first.
   virtual double round_trip_ms() const = 0;

@@ -15,13 +15,16 @@
 
 #include "server/net/steady_seconds.hpp"
 
+#include "server/net/request_right.hpp"
+
 namespace spectra::server {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
-WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form)
+WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form,
+                                   AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),
       writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
@@ -29,7 +32,8 @@ WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& conte
       reader_timer_(ws_.get_executor()),
       messages_(context.options.limits.messages_per_s,
                 context.options.limits.messages_per_s * context.options.limits.message_burst_s),
-      hello_form_(hello_form) {}
+      hello_form_(hello_form),
+      who_(std::move(who)) {}
 
 asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
@@ -179,6 +183,8 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
       end(true, "it is silent");
     } else if (now >= close_deadline_) {
       end(false, "the close was not finished in time");
+    } else if (!closing_ && !context_.options.access->is_good(who_)) {
+      close({static_cast<websocket::close_code>(kAccessWithdrawn), "access was withdrawn"});
     } else if (!closing_) {
       client_->ticked();
       if (auto payload = pings_.next(now, limits.ping_interval)) {

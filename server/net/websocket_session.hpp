@@ -11,10 +11,10 @@
 #include <memory>
 #include <string>
 
+#include "server/access/token_bucket.hpp"
 #include "server/net/connection_stream.hpp"
 #include "server/net/ping_watch.hpp"
 #include "server/net/server_context.hpp"
-#include "server/net/token_bucket.hpp"
 
 namespace spectra::server {
 
@@ -27,7 +27,7 @@ class WebSocketSession final : public ViewerPeer,
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form);
+  WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form, AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -36,6 +36,7 @@ class WebSocketSession final : public ViewerPeer,
   void wake() override;
   void send(OutgoingText text) override;
   HelloForm hello_form() const override { return hello_form_; }
+  AccessRole role() const override { return who_.role; }
   double round_trip_ms() const override { return round_trip_ms_; }
   std::size_t queued_bytes() const override { return control_bytes_; }
 
@@ -63,6 +64,7 @@ class WebSocketSession final : public ViewerPeer,
   boost::asio::steady_timer reader_timer_;
   TokenBucket messages_;
   const HelloForm hello_form_;
+  const AccessControl::Identity who_;
   std::deque<OutgoingText> control_;
   std::size_t control_bytes_ = 0;
   bool is_open_ = false;

@@ -38,6 +38,8 @@ export async function startServer(args, port = 0) {
   return {
     url,
     port: Number(new URL(url).port),
+    output: () => output,
+    signal: (name) => child.kill(name),
     stop: async () => {
       child.kill('SIGTERM');
       await exited;

@@ -18,6 +18,7 @@ import {
   startServer,
   test,
 } from './harness.mjs';
+import { addAccessTests } from './access.mjs';
 import { addAccuracyTests } from './accuracy.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLinkTests } from './links.mjs';
@@ -518,6 +519,7 @@ addLayoutTests(browser);
 addLinkTests(browser);
 addLiveTests(browser);
 addLoadTests(browser, scratch);
+addAccessTests(browser);
 addViewTests(browser, scratch);
 
 await runTests();

@@ -21,7 +21,8 @@ export function run(...args) {
 
 /** Serves; resolves with {url, process, stop} once `listening on` is printed and the scene is ready. */
 export async function serve(args, { ready = true } = {}) {
-  const process_ = spawn(binary, ["serve", "--listen", "127.0.0.1:0", ...args], { stdio: ["ignore", "pipe", "pipe"] });
+  const place = args.includes("--listen") ? [] : ["--listen", "127.0.0.1:0"];
+  const process_ = spawn(binary, ["serve", ...place, ...args], { stdio: ["ignore", "pipe", "pipe"] });
   let output = "";
   let errors = "";
   process_.stderr.on("data", (chunk) => {
@@ -49,5 +50,5 @@ export async function serve(args, { ready = true } = {}) {
       await new Promise((resolve) => setTimeout(resolve, 20));
     }
   }
-  return { url, process: process_, stop, errors: () => errors };
+  return { url, process: process_, stop, errors: () => errors, output: () => output };
 }

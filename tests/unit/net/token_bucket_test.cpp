@@ -1,4 +1,4 @@
-#include "server/net/token_bucket.hpp"
+#include "server/access/token_bucket.hpp"
 
 #include <gtest/gtest.h>
 

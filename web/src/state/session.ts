@@ -15,6 +15,7 @@ import type { Insets, UpAxis, View } from '../view/first_view';
 import { FrameIntake } from '../tiles/frame_intake';
 import { TileSet } from '../tiles/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../view/viewport';
+import { mustLogIn } from '../transport/access';
 import { CatalogueLoader } from '../transport/catalogue_loader';
 import { Coalescer } from '../transport/coalescer';
 import { Connection, ConnectionLost } from '../transport/connection';
@@ -125,6 +126,8 @@ export class Session {
         onState: (state) => {
           store.link = state;
           if (state.phase === 'waiting' && store.lostAt === null && store.scene !== undefined) this.#disconnected();
+          // A refused upgrade looks like a broken link to a page.
+          if (state.phase === 'waiting') void mustLogIn().then((must) => must && location.replace('./login'));
         },
         onProtocolError: (error) => console.warn('left out:', error.message),
         onRoundTrip: (round_trip_ms) => {

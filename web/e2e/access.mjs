@@ -1,0 +1,51 @@
+// Who is not let in: logs in without a mouse, comes by a link, is put out again.
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
+
+export function addAccessTests(browser) {
+  test('Somebody without a token gets a page to log in, and nothing else; with one, by keyboard alone, the scene', async () => {
+    const scratch = mkdtempSync(join(tmpdir(), 'spectra-e2e-access-'));
+    const file = join(scratch, 'tokens');
+    const token = (...args) => spawnSync(PROGRAM, ['token', '--file', file, ...args], { encoding: 'utf8' }).stdout.trim();
+    const operator = token('--role', 'operator', '--name', 'bridge');
+    token('--role', 'admin');
+    const server = await startServer(['--demo', '--tokens', file, '--invite', 'viewer']);
+    const { page, problems } = await openClient(browser, server.url);
+    assert.equal(new URL(page.url()).pathname, '/login');
+    const requests = [];
+    page.on('request', (request) => requests.push(new URL(request.url()).pathname));
+    await screenshot(page, 'login');
+    await page.keyboard.type('wrong');
+    await page.keyboard.press('Enter');
+    await page.getByText('That is not known').waitFor();
+    const others = requests.filter((path) => path !== '/icon.svg' && path !== '/api/v1/session');
+    assert.deepEqual(others, [], 'nothing of the program comes before');
+    problems.length = 0; // The browser notes every 401.
+    await page.keyboard.type(operator);
+    await page.keyboard.press('Enter');
+    await settled(page);
+    assert.equal(await page.evaluate(() => globalThis.spectra.store.server.role), 'operator');
+    assert.deepEqual(problems, []);
+
+    // A link with a code, on another device.
+    const tablet = await browser.newContext({ viewport: { width: 820, height: 1180 } });
+    const link = /within 15 minutes: (\S+)/.exec(server.output())[1];
+    const { page: other } = await openClient(tablet, link, null);
+    await settled(other);
+    assert.equal(await other.evaluate(() => globalThis.spectra.store.server.role), 'viewer');
+    assert.ok(!other.url().includes('#'), other.url());
+    await tablet.close();
+
+    // The token is taken back: the page does not go on looking alive.
+    token('--remove', 'bridge');
+    server.signal('SIGHUP');
+    await page.waitForURL('**/login');
+    await page.close();
+    await server.stop();
+    rmSync(scratch, { recursive: true });
+  });
+}
