@@ -13,12 +13,14 @@
 #include <utility>
 
 #include "protocol/draco_attributes.hpp"
+#include "protocol/little_endian.hpp"
 
 namespace spectra::protocol {
 namespace {
 
 constexpr std::int32_t kLatticeLimit = 1 << 23;
 constexpr std::size_t kMostVertices = 1 << 21;
+constexpr std::size_t kTemperatureTableSize = 8;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 auto internal(std::string message) {
@@ -327,6 +329,29 @@ Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colo
   return bytes_of(buffer);
 }
 
+Result<std::vector<std::byte>> encoded_temperature_codes(std::span<const std::uint16_t> codes,
+                                                         const TemperatureTable& table, int speed) {
+  if (codes.empty()) return internal("no temperatures to encode");
+  if (codes.size() > std::numeric_limits<std::int32_t>::max()) return internal("too many temperatures");
+  if (speed < 0 || speed > 10) return internal("speed " + std::to_string(speed) + " is not within 0..10");
+  draco::PointCloud cloud;
+  cloud.set_num_points(static_cast<std::uint32_t>(codes.size()));
+  add_attribute(cloud, draco::GeometryAttribute::GENERIC, draco::DT_UINT16, 1, false, codes);
+  draco::ExpertEncoder encoder(cloud);
+  encoder.SetSpeedOptions(speed, speed);
+  encoder.SetEncodingMethod(draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+  draco::EncoderBuffer buffer;
+  if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
+    return internal("temperatures not encoded: " + status.error_msg_string());
+  std::vector<std::byte> payload(kTemperatureTableSize);
+  LittleEndianWriter table_out(payload);
+  table_out.put(table.scale);
+  table_out.put(table.offset);
+  const std::vector<std::byte> stream = bytes_of(buffer);
+  payload.insert(payload.end(), stream.begin(), stream.end());
+  return payload;
+}
+
 Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload) {
   draco::DecoderBuffer probe = decoder_buffer(payload);
   const auto type = draco::Decoder::GetEncodedGeometryType(&probe);
@@ -389,6 +414,25 @@ Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payl
                   static_cast<std::uint8_t>(red_and_blue[1] + green)};
   }
   return colours;
+}
+
+Result<DecodedTemperatureCodes> decoded_temperature_codes(std::span<const std::byte> payload) {
+  if (payload.size() < kTemperatureTableSize) return internal("no scale and offset before the temperatures");
+  DecodedTemperatureCodes decoded;
+  LittleEndianReader table_in(payload);
+  decoded.table.scale = table_in.get_float();
+  decoded.table.offset = table_in.get_float();
+  draco::DecoderBuffer stream = decoder_buffer(payload.subspan(kTemperatureTableSize));
+  draco::Decoder decoder;
+  auto cloud = decoder.DecodePointCloudFromBuffer(&stream);
+  if (!cloud.ok()) return internal("does not decode: " + cloud.status().error_msg_string());
+  const draco::PointAttribute* attribute = cloud.value()->GetNamedAttribute(draco::GeometryAttribute::GENERIC);
+  if (attribute == nullptr || attribute->data_type() != draco::DT_UINT16 || attribute->num_components() != 1)
+    return internal("no GENERIC attribute of one u16");
+  decoded.codes.resize(cloud.value()->num_points());
+  for (std::uint32_t i = 0; i < decoded.codes.size(); ++i)
+    attribute->GetMappedValue(draco::PointIndex(i), &decoded.codes[i]);
+  return decoded;
 }
 
 Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> payload) {

@@ -40,6 +40,17 @@ Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colo
                                                ColourTransform transform = ColourTransform::None,
                                                std::span<const std::uint8_t> marks = {});
 
+/// Temperatures as whole numbers: degC = code * scale + offset in 32-bit float, each operation rounded.
+struct TemperatureTable {
+  float scale = 1;
+  float offset = 0;
+};
+
+/// Encodes codes, value i for decoded vertex i: scale and offset, then a sequential Draco point cloud with one GENERIC attribute
+/// of one u16.
+Result<std::vector<std::byte>> encoded_temperature_codes(std::span<const std::uint16_t> codes,
+                                                         const TemperatureTable& table, int speed);
+
 /// The channel value that a decoder sees for `value` at `colour_bits`.
 std::uint8_t rounded_channel(std::uint8_t value, int colour_bits);
 
@@ -51,6 +62,11 @@ struct DecodedGeometry {
 Result<DecodedGeometry> decoded_geometry(std::span<const std::byte> payload);
 Result<std::vector<ColourBytes>> decoded_colours(std::span<const std::byte> payload,
                                                  ColourTransform transform = ColourTransform::None);
+struct DecodedTemperatureCodes {
+  TemperatureTable table;
+  std::vector<std::uint16_t> codes;
+};
+Result<DecodedTemperatureCodes> decoded_temperature_codes(std::span<const std::byte> payload);
 /// The marks beside colours; empty where there are none.
 Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> payload);
 

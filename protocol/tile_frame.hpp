@@ -18,6 +18,7 @@ enum class FrameKind : std::uint8_t {
   Temperature = 4,
   Visible = 5,
   ColoursSubtractGreen = 6,
+  VisibleSubtractGreen = 7,
 };
 
 /// How colours are written into a frame; both decode to the same colours. A client chooses with scene.subscribe.
@@ -29,6 +30,10 @@ enum class ColourTransform : std::uint8_t {
 /// The kind of a frame whose colours are written that way.
 constexpr FrameKind colour_frame_kind(ColourTransform transform) {
   return transform == ColourTransform::None ? FrameKind::Colours : FrameKind::ColoursSubtractGreen;
+}
+
+constexpr FrameKind visible_frame_kind(ColourTransform transform) {
+  return transform == ColourTransform::None ? FrameKind::Visible : FrameKind::VisibleSubtractGreen;
 }
 
 /// Names a node of the tile tree; level 0 is the root. Child i of (l,x,y,z) is (l+1, 2x+(i&1), 2y+(i>>1&1), 2z+(i>>2)).

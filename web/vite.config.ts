@@ -1,5 +1,6 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vitest/config';
+import { fusionModule } from './scripts/fusion_module';
 import { leanThree } from './scripts/lean_three';
 import { precompressed } from './scripts/precompressed';
 import { programPreload } from './scripts/program_preload';
@@ -7,7 +8,7 @@ import { programPreload } from './scripts/program_preload';
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [leanThree(), svelte(), programPreload(), precompressed()],
+  plugins: [leanThree(), fusionModule(), svelte(), programPreload(), precompressed()],
   base: './',
   // One style sheet and plain imports: the page itself says what is to be loaded early.
   build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0, cssCodeSplit: false, modulePreload: false },

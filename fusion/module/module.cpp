@@ -255,6 +255,11 @@ SPECTRA_MODULE_EXPORT(wants_hues) std::int32_t module_wants_hues() {
   return state().wanted_hues ? 1 : 0;
 }
 
+/// 1 when the plan compares with temperatures of before, which are not given here: it shows no vertex as changed.
+SPECTRA_MODULE_EXPORT(compares_with_baseline) std::int32_t module_compares_with_baseline() {
+  return state().plan && state().plan->compares_with_baseline() ? 1 : 0;
+}
+
 SPECTRA_MODULE_EXPORT(range_minimum) double module_range_minimum() {
   return state().plan ? state().plan->range_minimum() : 0;
 }
@@ -318,6 +323,35 @@ void module_fuse_codes(const std::uint16_t* code, float scale, float offset, con
     const std::uint32_t size = std::min(kBlock, count - begin);
     codes.decode({code + begin, size}, {temperature, size});
     state().plan->fuse({temperature, size}, {visible + begin, size}, {fused + begin, size});
+  }
+}
+
+/// The same into red, green, blue and alpha. Alpha is 255; with marks it is 0 where the method highlights the temperature so
+/// that it can be seen.
+SPECTRA_MODULE_EXPORT(fuse_codes_rgba)
+void module_fuse_codes_rgba(const std::uint16_t* code, float scale, float offset, const Rgb8* visible,
+                            std::uint8_t* rgba, std::uint32_t count, std::int32_t with_marks) {
+  if (!state().plan) return;
+  const FusionPlan& plan = *state().plan;
+  const TemperatureCodes codes{scale, offset};
+  constexpr std::uint32_t kBlock = 1024;
+  alignas(64) static float temperature[kBlock];
+  static Rgb8 fused[kBlock];
+  static std::uint8_t marked[kBlock];
+  const bool has_marks = with_marks != 0 && plan.highlights();
+  if (!has_marks) std::fill(marked, marked + kBlock, std::uint8_t{0});
+  for (std::uint32_t begin = 0; begin < count; begin += kBlock) {
+    const std::uint32_t size = std::min(kBlock, count - begin);
+    codes.decode({code + begin, size}, {temperature, size});
+    plan.fuse({temperature, size}, {visible + begin, size}, {fused, size});
+    if (has_marks) plan.mark({temperature, size}, {}, {marked, size});
+    std::uint8_t* to = rgba + 4 * std::size_t{begin};
+    for (std::uint32_t i = 0; i < size; ++i, to += 4) {
+      to[0] = fused[i].r;
+      to[1] = fused[i].g;
+      to[2] = fused[i].b;
+      to[3] = marked[i] == 0 ? 255 : 0;
+    }
   }
 }
 

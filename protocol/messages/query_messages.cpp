@@ -64,6 +64,28 @@ static void describe(auto& fields, Is<ExtremesReply> auto& message) {
   fields.optional("under_range", message.under_range);
 }
 
+static void describe(auto& fields, Is<FactsRequest> auto& message) {
+  fields.optional("bins", message.bins);
+  const std::uint32_t bins = message.bins.value_or(1);
+  fields.require("bins", bins >= 1 && bins <= 4096, "an integer from 1 to 4096");
+  fields.optional("hues", message.hues);
+}
+
+static void describe(auto& fields, Is<FactsReply> auto& message) {
+  fields.field("finite_count", message.finite_count);
+  fields.field("missing_count", message.missing_count);
+  fields.field("over_range_count", message.over_range_count);
+  fields.field("under_range_count", message.under_range_count);
+  fields.field("min", message.min);
+  fields.field("max", message.max);
+  fields.field("mean", message.mean);
+  fields.field("sigma", message.sigma);
+  fields.optional("counts", message.counts);
+  fields.optional("hues", message.hues);
+}
+
+template struct Wire<FactsRequest>;
+template struct Wire<FactsReply>;
 template struct Wire<HistogramRequest>;
 template struct Wire<HistogramReply>;
 template struct Wire<ProbeRequest>;

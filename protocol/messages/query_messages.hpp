@@ -67,6 +67,30 @@ struct ExtremesReply {
   std::optional<std::array<double, 3>> under_range;
 };
 
+/// Params of fusion.facts.
+struct FactsRequest {
+  std::optional<std::uint32_t> bins;  ///< 1..4096; absent: no histogram.
+  std::optional<bool> hues;           ///< Absent: no.
+};
+
+/// Result of fusion.facts: what automatic values are made of, so that a client that fuses by itself comes to the same. The
+/// extremes, mean and sigma are 0 without a finite temperature.
+struct FactsReply {
+  std::uint64_t finite_count = 0;
+  std::uint64_t missing_count = 0;
+  std::uint64_t over_range_count = 0;
+  std::uint64_t under_range_count = 0;
+  double min = 0;
+  double max = 0;
+  double mean = 0;
+  double sigma = 0;
+  std::optional<std::vector<std::uint64_t>> counts;  ///< Of `bins` equal bins from min to max.
+  std::optional<std::vector<std::uint64_t>>
+      hues;  ///< Chroma of the visible colours by equal sectors of hue, from red on.
+};
+
+extern template struct Wire<FactsRequest>;
+extern template struct Wire<FactsReply>;
 extern template struct Wire<HistogramRequest>;
 extern template struct Wire<HistogramReply>;
 extern template struct Wire<ProbeRequest>;

@@ -39,6 +39,11 @@ static void describe(auto& fields, Is<ResumeRequest> auto& message) {
   const bool are_tiles =
       std::all_of(message.tiles.begin(), message.tiles.end(), [](const auto& t) { return t[0] <= 255 && t[4] >= 1; });
   fields.require("tiles", are_tiles, "a list of [level from 0 to 255, x, y, z, revision from 1]");
+  fields.optional("raw", message.raw);
+  const bool are_places =
+      !message.raw || std::all_of(message.raw->begin(), message.raw->end(),
+                                  [&](std::uint32_t place) { return place < message.tiles.size(); });
+  fields.require("raw", are_places, "a list of places in tiles, from 0");
 }
 
 static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
@@ -52,6 +57,9 @@ static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
   bytes("in_flight_bytes", message.in_flight_bytes);
   bytes("cache_bytes", message.cache_bytes);
   fields.optional("colour_transform", message.colour_transform);
+  fields.optional("temperature_step_celsius", message.temperature_step_celsius);
+  const double step = message.temperature_step_celsius.value_or(1);
+  fields.require("temperature_step_celsius", step > 0 && step <= 1000, "a number above 0 and of at most 1000");
   fields.optional("resume", message.resume);
 }
 

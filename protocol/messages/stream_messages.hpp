@@ -17,6 +17,8 @@ enum class Channel { Fused, Temperature, Visible };
 struct ResumeRequest {
   std::string session_id;                           ///< Of the hello of that connection.
   std::vector<std::array<std::uint32_t, 5>> tiles;  ///< Level (0..255), x, y, z, revision (from 1); at most 1,500.
+  /// Which of `tiles`, by their places in it, it has both raw layers of, in the form that it asks for now; absent: none.
+  std::optional<std::vector<std::uint32_t>> raw;
 };
 
 /// Params of scene.subscribe; at least one channel.
@@ -25,6 +27,8 @@ struct SubscribeRequest {
   std::optional<std::uint32_t> in_flight_bytes;  ///< 1..2^31-1; absent: the server's choice.
   std::optional<std::uint32_t> cache_bytes;  ///< 1..2^31-1, of decoded tiles; absent: no bound to what is asked for.
   std::optional<ColourTransform> colour_transform;  ///< Absent: none.
+  std::optional<double>
+      temperature_step_celsius;  ///< Of the channel temperature; above 0; absent: the server's choice.
   std::optional<ResumeRequest> resume;
 };
 

@@ -31,6 +31,7 @@ struct ServeOptions {
   std::optional<std::filesystem::path> tokens;  ///< Whom to let in; absent: what the environment says.
   bool is_insecure = false;                     ///< Others are let in without a token.
   std::optional<AccessRole> invited;            ///< Print a link that lets one browser in.
+  bool is_fused_only = false;                   ///< Viewers get no raw layers.
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
   fusion::ReadOptions read;

@@ -291,6 +291,19 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
   return message;
 }
 
+protocol::FactsReply facts_message(const fusion::TemperatureSummary& summary) {
+  protocol::FactsReply message;
+  message.finite_count = summary.finite_count;
+  message.missing_count = summary.missing_count;
+  message.over_range_count = summary.over_range_count;
+  message.under_range_count = summary.under_range_count;
+  message.min = double{summary.minimum};
+  message.max = double{summary.maximum};
+  message.mean = summary.mean;
+  message.sigma = summary.sigma;
+  return message;
+}
+
 protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fusion::TemperatureSummary& scene,
                                     const std::vector<fusion::TemperatureInterval>& highlighted,
                                     std::optional<double> highlighted_share) {

@@ -45,6 +45,8 @@ protocol::RpcError to_rpc_error(const fusion::Error& error);
 
 protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary);
 protocol::SceneDescription to_message(const SceneSnapshot& scene);
+/// Without histogram and hues.
+protocol::FactsReply facts_message(const fusion::TemperatureSummary& summary);
 protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fusion::TemperatureSummary& scene,
                                     const std::vector<fusion::TemperatureInterval>& highlighted,
                                     std::optional<double> highlighted_share);

@@ -79,6 +79,8 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option_function<std::string>("--at", set_time, "Show the map of the store as it was at a time")
       ->needs("--store")
       ->excludes("--live");
+  command->add_flag("--fused-only", options.is_fused_only,
+                    "Give viewers fused colours only: no raw temperatures and colours to fuse by themselves");
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
   command->add_option("--tokens", options.tokens, "Let in whom this file names; made by spectra token");

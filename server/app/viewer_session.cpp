@@ -131,6 +131,7 @@ void ViewerSession::opened() {
   hello.role = may(peer_.role(), Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram", "probe",       "extremes", "extremes_in_view", "exports", "subtract_green",
                         "resume",    "cache_bytes", "marks"};
+  if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -185,6 +186,7 @@ std::span<const ViewerSession::Request> ViewerSession::requests() {
       {"scene.unsubscribe", Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
       {"scene.histogram", Right::Watch, Cost::Request, &Self::histogram},
       {"scene.probe", Right::Watch, Cost::Request, &Self::probe},
+      {"fusion.facts", Right::Watch, Cost::Request, &Self::facts},
       {"scene.extremes", Right::Watch, Cost::Request, &Self::extremes},
   };
   return kRequests;
@@ -230,11 +232,16 @@ ViewerSession::Answer ViewerSession::scene_get(const json& /*params*/) {
 
 ViewerSession::Answer ViewerSession::subscribe(const json& params) {
   BOOST_OUTCOME_TRY(const auto request, protocol::from_json<protocol::SubscribeRequest>(params));
-  for (const auto channel : request.channels) {
-    if (channel != protocol::Channel::Fused) {
-      return refusal(RpcErrorCode::InvalidParams, "this server streams the channel \"fused\" only", "channels",
-                     "fused");
-    }
+  const auto has_channel = [&request](protocol::Channel channel) {
+    return std::find(request.channels.begin(), request.channels.end(), channel) != request.channels.end();
+  };
+  const bool wants_raw = has_channel(protocol::Channel::Temperature) || has_channel(protocol::Channel::Visible);
+  if (wants_raw && !gives_raw_layers()) {
+    return refusal(RpcErrorCode::Forbidden,
+                   limits_.gives_raw_layers
+                       ? "a viewer is given fused colours only; raw layers take an operator's token"
+                       : "this server gives fused colours only (serve --fused-only)",
+                   "channels", "fused");
   }
   if (request.resume && is_subscribed_) {
     return refusal(RpcErrorCode::InvalidParams, "resume must come before the first frame, not while frames flow",
@@ -245,10 +252,18 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
   is_subscribed_ = true;
   subscription_ = {.in_flight_bytes = request.in_flight_bytes.value_or(0),
                    .cache_bytes = request.cache_bytes.value_or(0),
-                   .colour_transform = request.colour_transform.value_or(protocol::ColourTransform::None)};
+                   .colour_transform = request.colour_transform.value_or(protocol::ColourTransform::None),
+                   .fused = has_channel(protocol::Channel::Fused),
+                   .temperature = has_channel(protocol::Channel::Temperature),
+                   .visible = has_channel(protocol::Channel::Visible),
+                   .temperature_step_celsius = request.temperature_step_celsius.value_or(0)};
   if (stream_) stream_->subscribe(subscription_);
   peer_.wake();
   return protocol::to_json(reply);
+}
+
+bool ViewerSession::gives_raw_layers() const {
+  return limits_.gives_raw_layers && may(peer_.role(), Right::Operate);
 }
 
 std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
@@ -257,6 +272,9 @@ std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
   tiles.reserve(request.tiles.size());
   for (const auto& [level, x, y, z, revision] : request.tiles) {
     tiles.push_back({{static_cast<std::uint8_t>(level), x, y, z}, revision});
+  }
+  for (const std::uint32_t place : request.raw.value_or(std::vector<std::uint32_t>())) {
+    tiles[place].has_raw_layers = gives_raw_layers();
   }
   return stream_->resume(tiles);
 }
@@ -345,6 +363,24 @@ void ViewerSession::histogram(const Id& id, const json& params) {
     const bool highlights = fusion::find_method(plan.settings().method)->highlights;
     const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
     return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
+  });
+}
+
+void ViewerSession::facts(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::FactsRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  // With what plans are prepared, which follows a live map in steps.
+  answer_from_pool(id, [temperature = scene_->reference_temperature(), request = request.value()]() -> Answer {
+    protocol::FactsReply reply = facts_message(temperature->summary);
+    if (request.bins && temperature->summary.has_temperature())
+      reply.counts = temperature->histogram(*request.bins).counts;
+    if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
+    if (request.hues.value_or(false)) {
+      const auto chroma = temperature->hues().chroma;
+      reply.hues.emplace(chroma.begin(), chroma.end());
+    }
+    return protocol::to_json(reply);
   });
 }
 

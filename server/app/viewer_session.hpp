@@ -77,6 +77,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   Answer acknowledge(const nlohmann::json& params);
   void fusion_set(const Id& id, const nlohmann::json& params);
   void histogram(const Id& id, const nlohmann::json& params);
+  void facts(const Id& id, const nlohmann::json& params);
   void probe(const Id& id, const nlohmann::json& params);
   void extremes(const Id& id, const nlohmann::json& params);
 
@@ -93,6 +94,8 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void set_plan(fusion::FusionPlan plan);
   protocol::FusionReply fusion_reply() const;
   StreamQuality quality() const;
+  /// This viewer may have raw layers.
+  bool gives_raw_layers() const;
 
   /// Sends a status when it differs from what the viewer was told last.
   void set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message);

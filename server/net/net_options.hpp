@@ -25,6 +25,7 @@ struct NetLimits {
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
   std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.
   double messages_per_s = 10'000;                 ///< Beyond it a session's reading pauses (back-pressure).
+  bool gives_raw_layers = true;                   ///< Temperatures and visible colours of tiles, beside fused colours.
   double requests_per_s = 300;                    ///< Beyond it requests are refused with Busy.
   double message_burst_s = 2;                     ///< How many seconds' worth of either may come at once.
   /// A request must be complete within this; the peer sees the end well within 10 s.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 
@@ -7,6 +8,16 @@
 #include "server/stream/frame_cache.hpp"
 
 namespace spectra::server {
+
+/// Which raw layers one viewer is to have. An epoch rises when what it has of a layer is to be sent in another form.
+struct RawDemand {
+  /// The raw layers, in the order in which they are sent.
+  static constexpr std::array<Layer, 2> kLayers = {Layer::Temperature, Layer::Visible};
+
+  std::array<bool, kLayers.size()> is_wanted{};
+  std::array<std::uint64_t, kLayers.size()> epoch = {1, 1};
+  double temperature_step_celsius = 0;  ///< 0 = TemperatureCodes::kDefaultStepCelsius.
+};
 
 /// What one viewer is to be shown, as a job needs it: the settings in force. An epoch rises with each change that makes
 /// frames of that kind stale; 0 stands for none.
@@ -21,6 +32,8 @@ struct Demand {
   int colour_bits = 8;
   int preview_colour_bits = 8;  ///< Of tiles that are drawn only until their children are there.
   protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
+  bool fused = true;  ///< Colours are wanted, not the geometry alone.
+  RawDemand raw;
   bool marks = false;                              ///< Of what is highlighted are wanted beside the colours.
   std::shared_ptr<const fusion::FusionPlan> plan;  ///< Null before there are settings.
   std::shared_ptr<const PlanIdentity> plan_identity;
@@ -31,6 +44,15 @@ struct Demand {
   /// `bits` is one of the two above.
   ColourKey colour_key(const EncodedTile& geometry, int bits) const {
     return {geometry.revision, plan_identity, bits, colour_transform, carries_marks()};
+  }
+  ColourKey raw_key(std::uint32_t revision, Layer layer) const {
+    const bool is_visible = layer == Layer::Visible;
+    return {.revision = revision,
+            .plan = nullptr,
+            .colour_bits = 8,
+            .transform = is_visible ? colour_transform : protocol::ColourTransform::None,
+            .layer = layer,
+            .step_celsius = is_visible ? 0 : raw.temperature_step_celsius};
   }
   /// A method that highlights nothing has no marks to carry.
   bool carries_marks() const { return marks && plan && plan->highlights(); }

@@ -53,16 +53,21 @@ struct GeometryKey {
 /// One per distinct picture (settings and the scene's facts that enter them); compared by address.
 struct PlanIdentity {};
 
-/// Names one colour encoding before it exists. The encoder speed is that of the geometry.
+/// What a layer of a tile holds.
+enum class Layer { Fused, Visible, Temperature };
+
+/// Names the encoding of a layer before it exists, by what it shows. The encoder speed is that of the geometry.
 struct ColourKey {
   std::uint32_t revision;
-  std::shared_ptr<const PlanIdentity> plan;
+  std::shared_ptr<const PlanIdentity> plan;  ///< Of Fused.
   int colour_bits;
   protocol::ColourTransform transform = protocol::ColourTransform::None;
   bool has_marks = false;
+  Layer layer = Layer::Fused;
+  double step_celsius = 0;  ///< Of Temperature.
   friend bool operator<(const ColourKey& a, const ColourKey& b) {
-    return std::tie(a.revision, a.plan, a.colour_bits, a.transform, a.has_marks) <
-           std::tie(b.revision, b.plan, b.colour_bits, b.transform, b.has_marks);
+    return std::tie(a.revision, a.plan, a.colour_bits, a.transform, a.has_marks, a.layer, a.step_celsius) <
+           std::tie(b.revision, b.plan, b.colour_bits, b.transform, b.has_marks, b.layer, b.step_celsius);
   }
 };
 

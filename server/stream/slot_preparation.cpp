@@ -54,6 +54,10 @@ void encode(Encoding& encoding, FrameCache::State& cache) {
 void SlotPreparation::look_up(TileSlot& slot, const Demand& demand) {
   auto geometry = cache_.find_geometry(demand.geometry_key(slot.tile));
   if (!geometry) return;
+  if (!demand.fused) {
+    tiles_.make_ready(slot, std::move(geometry), nullptr, 0);
+    return;
+  }
   const int bits = slot.wanted_colour_bits(demand);
   auto colours = cache_.find_colours(demand.colour_key(*geometry, bits));
   if (colours) tiles_.make_ready(slot, std::move(geometry), std::move(colours), bits);
@@ -79,6 +83,10 @@ std::optional<Encoding> SlotPreparation::advance(const std::shared_ptr<TileSlot>
 std::optional<Encoding> SlotPreparation::advance_colours(Encoding encoding, std::shared_ptr<const EncodedTile> geometry,
                                                          const std::weak_ptr<CacheWaiter>& waiter) {
   TileSlot& slot = *encoding.slot;
+  if (!encoding.demand.fused) {
+    tiles_.make_ready(slot, std::move(geometry), nullptr, 0);
+    return std::nullopt;
+  }
   encoding.geometry = std::move(geometry);
   const int bits = encoding.colour_bits;
   auto colours = cache_.claim_colours(encoding.demand.colour_key(*encoding.geometry, bits), waiter);
@@ -101,7 +109,8 @@ std::optional<Encoding> SlotPreparation::advance_after(const Encoding& done, con
   if (done.demand.geometry_epoch == demand.geometry_epoch) {
     const Encoding next{done.slot, done.tile, demand, done.slot->wanted_colour_bits(demand)};
     if (done.made_geometry) return advance_colours(next, done.made_geometry, waiter);
-    if (done.made_colours && done.demand.colour_epoch == demand.colour_epoch && done.colour_bits == next.colour_bits) {
+    if (done.made_colours && demand.fused && done.demand.colour_epoch == demand.colour_epoch &&
+        done.colour_bits == next.colour_bits) {
       tiles_.make_ready(*done.slot, done.geometry, done.made_colours, done.colour_bits);
       return std::nullopt;
     }

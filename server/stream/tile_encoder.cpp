@@ -1,9 +1,12 @@
 #include "server/stream/tile_encoder.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
 
+#include "fusion/temperature_codes.hpp"
 #include "protocol/draco_codec.hpp"
 #include "server/stream/lattice.hpp"
 
@@ -43,6 +46,42 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
     for (const std::uint32_t input : geometry.input_of_decoded) marks.push_back(marked[input]);
   }
   BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));
+  return std::make_shared<const std::vector<std::byte>>(std::move(payload));
+}
+
+protocol::Result<Payload> encoded_visible_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+                                                protocol::ColourTransform transform) {
+  std::vector<protocol::ColourBytes> colours;
+  colours.reserve(geometry.input_of_decoded.size());
+  for (const std::uint32_t input : geometry.input_of_decoded) {
+    const fusion::Rgb8 colour = tile.visible[input];
+    colours.push_back({colour.r, colour.g, colour.b});
+  }
+  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, 8, encoder_speed, transform));
+  return std::make_shared<const std::vector<std::byte>>(std::move(payload));
+}
+
+protocol::Result<Payload> encoded_temperature_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+                                                    double step_celsius) {
+  std::vector<float> temperature;
+  temperature.reserve(geometry.input_of_decoded.size());
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -lowest;
+  for (const std::uint32_t input : geometry.input_of_decoded) {
+    const float value =
+        tile.temperature_celsius.empty() ? std::numeric_limits<float>::quiet_NaN() : tile.temperature_celsius[input];
+    temperature.push_back(value);
+    if (!std::isfinite(value)) continue;
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+  }
+  using Codes = fusion::TemperatureCodes;
+  const double step = step_celsius > 0 ? step_celsius : Codes::kDefaultStepCelsius;
+  const Codes codes = lowest <= highest ? Codes::covering(lowest, highest, step) : Codes{};
+  std::vector<std::uint16_t> code(temperature.size());
+  codes.encode(temperature, code);
+  BOOST_OUTCOME_TRY(auto payload,
+                    protocol::encoded_temperature_codes(code, {codes.scale, codes.offset}, encoder_speed));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 

@@ -34,4 +34,13 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
                                                protocol::ColourTransform transform = protocol::ColourTransform::None,
                                                bool has_marks = false);
 
+/// The visible colours of a tile in the decoded vertex order of `geometry`.
+protocol::Result<Payload> encoded_visible_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+                                                protocol::ColourTransform transform);
+
+/// Its temperatures as codes (fusion::TemperatureCodes); `step_celsius` 0 = the default one. A tile without temperatures
+/// has missing ones.
+protocol::Result<Payload> encoded_temperature_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+                                                    double step_celsius);
+
 }  // namespace spectra::server

@@ -9,6 +9,7 @@
 #include "server/stream/frame_cache.hpp"
 #include "server/stream/lattice.hpp"
 #include "server/stream/quality_frontier.hpp"
+#include "server/stream/raw_layers.hpp"
 #include "server/stream/screen_accuracy.hpp"
 #include "server/stream/sending_order.hpp"
 #include "server/stream/sending_window.hpp"
@@ -21,6 +22,14 @@ namespace {
 
 using protocol::FrameKind;
 using protocol::TileFrameHeader;
+
+// Places in RawDemand::kLayers.
+constexpr std::size_t kTemperature = 0;
+constexpr std::size_t kVisible = 1;
+static_assert(RawDemand::kLayers[kTemperature] == Layer::Temperature && RawDemand::kLayers[kVisible] == Layer::Visible);
+
+// After every tile of anybody: raw layers fill what time is left.
+constexpr int kRawPriority = 100;
 
 // How much may wait, encoded, for the window of one viewer. Enough to bridge the making of the next tile, little
 // enough that a viewer who stopped reading costs nothing.
@@ -73,6 +82,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       closed_ = true;
       tiles_.clear();
       order_.clear();
+      raw_order_.clear();
     }
     // Taking this lock waits for a wake that is being called right now; none follows.
     const std::lock_guard lock(wake_mutex_);
@@ -86,9 +96,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void subscribe(const Subscription& subscription) override {
     change([&] {
       window_.set_ceiling(subscription.in_flight_bytes);
+      take_channels(subscription);
       if (subscription.colour_transform != demand_.colour_transform) {
         demand_.colour_transform = subscription.colour_transform;
         ++demand_.colour_epoch;
+        ++demand_.raw.epoch[kVisible];
         colour_cost_ = ColourCost(subscription.colour_transform);
         is_complete_due_ = true;
       }
@@ -98,6 +110,12 @@ class Stream final : public ViewerStream, public CacheWaiter {
         is_complete_due_ = true;
       }
       if (subscribed_) return;
+      // What was resumed is in the form of this subscription.
+      for (const auto& slot : tiles_.slots()) {
+        for (std::size_t layer = 0; layer < slot->raw.size(); ++layer) {
+          if (slot->raw[layer].held_epoch != 0) slot->raw[layer].held_epoch = demand_.raw.epoch[layer];
+        }
+      }
       subscribed_ = true;
       is_complete_due_ = true;
     });
@@ -189,11 +207,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
           continue;
         }
         tiles_.give_geometry(*slot, name, demand_.geometry_epoch);
-        return given_out(header_of(*slot, FrameKind::Geometry), slot->geometry->payload, now_s);
+        auto frame = given_out(header_of(*slot, FrameKind::Geometry), slot->geometry->payload, now_s);
+        if (!demand_.fused) note_geometry_alone(*slot);
+        return frame;
       }
-      slot->held_geometry_epoch = demand_.geometry_epoch;
-      slot->held_position_step_m = slot->geometry->position_step_m;
-      slot->held_vertex_count = static_cast<std::uint32_t>(slot->geometry->input_of_decoded.size());
+      note_geometry(*slot);
       std::optional<OutgoingFrame> frame;
       if (!slot->has_colours(demand_)) {
         const bool is_first_picture = slot->held_colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
@@ -217,23 +235,20 @@ class Stream final : public ViewerStream, public CacheWaiter {
       }
       if (head() == nullptr) refine();
     }
+    // What is complete is said before raw layers follow.
+    if (demand_.fused && is_complete()) return std::nullopt;
+    if (head() == nullptr && !is_refining_due()) {
+      if (const auto due = raw_head()) return next_raw(*due, now_s);
+    }
     window_.on_idle();
     post_jobs();
     return std::nullopt;
   }
 
   std::optional<StreamComplete> take_complete() override {
-    const std::lock_guard lock(mutex_);
-    wake_pending_ = false;
-    if (!is_complete()) return std::nullopt;
-    is_complete_due_ = false;
-    StreamComplete complete{
-        .generation = generation_, .scene_revision = scene_->revision(), .tile_count = 0, .vertex_count = 0};
-    for (const auto& slot : order_.slots()) {
-      if (slot->held_colour_epoch != demand_.colour_epoch) continue;
-      ++complete.tile_count;
-      complete.vertex_count += slot->held_vertex_count;
-    }
+    bool is_followed = false;
+    const auto complete = completed(is_followed);
+    if (is_followed) wake();
     return complete;
   }
 
@@ -247,7 +262,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
     stats.failed_tiles = failed_tile_count_;
     std::vector<HeldQuality> held;
     for (const auto& slot : tiles_.slots())
-      held.push_back({slot->is_drawable() ? slot->held_colour_bits : 0, slot->held_position_step_m});
+      held.push_back({!slot->is_drawable()     ? 0
+                      : slot->has_raw_layers() ? 8
+                                               : slot->held_colour_bits,
+                      slot->held_position_step_m});
     const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), held, camera_);
     const int colour_bits_drawn = std::min(accuracy.colour_bits, demand_.colour_bits);
     const double rounding_levels = colour_bits_drawn < 8 ? 1 << (7 - colour_bits_drawn) : 0;
@@ -263,6 +281,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
     change([&] {
       for (const auto& slot : tiles_.slots()) {
         if (slot->work == TileSlot::Work::Waiting) slot->work = TileSlot::Work::Idle;
+        for (TileSlot::Raw& raw : slot->raw) {
+          if (raw.work == TileSlot::Work::Waiting) raw.work = TileSlot::Work::Idle;
+        }
       }
     });
   }
@@ -282,6 +303,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
         drop_superseded();
       }
       order_.rewind();
+      raw_head_ = 0;
       if (TileSlot* slot = head(); slot != nullptr && slot->work == TileSlot::Work::Idle) {
         preparation_.look_up(*slot, demand_);
       }
@@ -289,6 +311,23 @@ class Stream final : public ViewerStream, public CacheWaiter {
       if (!has_news()) return;
     }
     wake();
+  }
+
+  // With the lock not held. `is_followed`: raw layers have waited for it.
+  std::optional<StreamComplete> completed(bool& is_followed) {
+    const std::lock_guard lock(mutex_);
+    wake_pending_ = false;
+    if (!is_complete()) return std::nullopt;
+    is_complete_due_ = false;
+    StreamComplete complete{
+        .generation = generation_, .scene_revision = scene_->revision(), .tile_count = 0, .vertex_count = 0};
+    for (const auto& slot : order_.slots()) {
+      if (demand_.fused ? slot->held_colour_epoch != demand_.colour_epoch : slot->held_name == 0) continue;
+      ++complete.tile_count;
+      complete.vertex_count += slot->held_vertex_count;
+    }
+    is_followed = raw_head().has_value();
+    return complete;
   }
 
   void wake() {
@@ -302,6 +341,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void adopt(std::shared_ptr<const SceneSnapshot> scene) {
     scene_ = std::move(scene);
     order_.clear();
+    raw_order_.clear();
     tiles_.adopt(*scene_);
     is_complete_due_ = true;
     answer_first();
@@ -309,6 +349,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // Something has changed: the first answer may be coarser than the last; see StreamQuality.
   void answer_first() {
+    if (!demand_.fused) {
+      point_ = {.pixel_error_factor = 1, .colour_bits = quality_.colour_bits};
+      return apply();
+    }
     const auto target_vertices = [this](double pixel_error) {
       return target_vertex_count(tiles_.tree(), selected(pixel_error));
     };
@@ -318,7 +362,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // There is a second answer still to come.
   bool is_refining_due() const {
-    return demand_.plan && (point_.pixel_error_factor != 1 || point_.colour_bits != quality_.colour_bits);
+    return demand_.plan && demand_.fused &&
+           (point_.pixel_error_factor != 1 || point_.colour_bits != quality_.colour_bits);
   }
 
   void refine() {
@@ -364,13 +409,15 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const bool is_slow = rate > 0 && !is_quick;
     demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
     order_.choose(tiles_, chosen, is_quick ? 0 : kPreviewShare * vertices);
+    raw_order_ = raw_order(order_.slots(), tiles_.tree(), camera_);
+    raw_head_ = 0;
     remove_surplus();
     remove_outdated();
   }
 
   // Beneath tiles that have become fine enough when they had their colours already.
   void remove_outdated() {
-    if (!demand_.plan || is_refining_due()) return;
+    if (!demand_.plan || !demand_.fused || is_refining_due()) return;
     for (const auto& slot : order_.slots()) {
       if (slot->is_target && slot->held_geometry_epoch == demand_.geometry_epoch && slot->has_colours(demand_))
         tiles_.remove_outdated_beneath(*slot, demand_);
@@ -390,14 +437,164 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   bool is_complete() {
     return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && !tiles_.has_removals() && head() == nullptr &&
-           !is_refining_due();
+           !is_refining_due() && (demand_.fused || !raw_head());
   }
 
   bool has_news() {
     if (!subscribed_) return false;
     if (tiles_.has_removals() || is_complete() || (head() == nullptr && is_refining_due())) return true;
     const TileSlot* slot = head();
-    return slot != nullptr && slot->work == TileSlot::Work::Ready;
+    if (slot != nullptr) return slot->work == TileSlot::Work::Ready;
+    const auto due = raw_head();
+    return due && due->raw().work == TileSlot::Work::Ready;
+  }
+
+  // A tile's geometry has gone out and is the one in force.
+  void note_geometry(TileSlot& slot) {
+    slot.held_geometry_epoch = demand_.geometry_epoch;
+    slot.held_position_step_m = slot.geometry->position_step_m;
+    slot.held_vertex_count = static_cast<std::uint32_t>(slot.geometry->input_of_decoded.size());
+    slot.held_origin_m = slot.geometry->origin_m;
+  }
+
+  // The same where nothing more of the tile follows in this lane.
+  void note_geometry_alone(TileSlot& slot) {
+    note_geometry(slot);
+    tiles_.put_down(slot);
+  }
+
+  void take_channels(const Subscription& subscription) {
+    RawDemand& raw = demand_.raw;
+    if (subscription.temperature_step_celsius != raw.temperature_step_celsius) {
+      raw.temperature_step_celsius = subscription.temperature_step_celsius;
+      ++raw.epoch[kTemperature];
+    }
+    raw.is_wanted[kTemperature] = subscription.temperature;
+    raw.is_wanted[kVisible] = subscription.visible;
+    if (subscription.fused == demand_.fused) return;
+    demand_.fused = subscription.fused;
+    for (const auto& slot : tiles_.slots()) tiles_.put_down(*slot);
+    is_complete_due_ = true;
+    answer_first();
+  }
+
+  // A raw layer that is to be sent.
+  struct RawDue {
+    std::shared_ptr<TileSlot> slot;
+    std::size_t layer;
+    TileSlot::Raw& raw() const { return slot->raw[layer]; }
+  };
+
+  // The first one; what was passed is looked at again after every change.
+  std::optional<RawDue> raw_head() { return next_raw_due(raw_head_); }
+
+  // The first one from place `at` on, which becomes its place. Two places a slot.
+  std::optional<RawDue> next_raw_due(std::size_t& at) const {
+    constexpr std::size_t kLayers = RawDemand::kLayers.size();
+    for (; at < kLayers * raw_order_.size(); ++at) {
+      const auto& slot = raw_order_[at / kLayers];
+      if (slot->lacks_raw(at % kLayers, demand_)) return RawDue{slot, at % kLayers};
+    }
+    return std::nullopt;
+  }
+
+  std::optional<OutgoingFrame> next_raw(const RawDue& due, double now_s) {
+    TileSlot::Raw& raw = due.raw();
+    if (raw.work == TileSlot::Work::Idle) {
+      if (auto payload = cache_->find_colours(raw_key(due))) make_raw_ready(due, std::move(payload));
+    }
+    if (raw.work != TileSlot::Work::Ready) {
+      window_.on_idle();
+      post_jobs();
+      return std::nullopt;
+    }
+    if (!window_.admits(frame_size(raw.payload), SendingWindow::Urgency::Detail)) return std::nullopt;
+    auto header = raw_header(*due.slot, due.layer);
+    raw.held_epoch = demand_.raw.epoch[due.layer];
+    raw.work = TileSlot::Work::Idle;
+    auto frame = given_out(header, std::exchange(raw.payload, nullptr), now_s);
+    if (!demand_.fused && !raw_head()) is_complete_due_ = true;
+    post_jobs();
+    return frame;
+  }
+
+  TileFrameHeader raw_header(const TileSlot& slot, std::size_t layer) const {
+    TileFrameHeader header;
+    header.kind =
+        layer == kTemperature ? FrameKind::Temperature : protocol::visible_frame_kind(demand_.colour_transform);
+    header.child_mask = slot.tile->child_mask;
+    header.tile = slot.tile->id;
+    header.revision = slot.held_name;
+    header.vertex_count = slot.held_vertex_count;
+    header.origin_m = slot.held_origin_m;
+    header.position_step_m = slot.held_position_step_m;
+    header.geometric_error_m = slot.tile->geometric_error_m;
+    header.colour_error_levels = slot.tile->colour_error_levels;
+    header.temperature_error_celsius = slot.tile->temperature_error_celsius;
+    header.lowest_celsius = slot.tile->lowest_celsius;
+    header.highest_celsius = slot.tile->highest_celsius;
+    return header;
+  }
+
+  ColourKey raw_key(const RawDue& due) const {
+    return demand_.raw_key(due.slot->held_revision, RawDemand::kLayers[due.layer]);
+  }
+
+  void make_raw_ready(const RawDue& due, Payload payload) {
+    due.raw().payload = std::move(payload);
+    due.raw().work = TileSlot::Work::Ready;
+  }
+
+  // How many raw layers jobs could begin with, at most `most`.
+  unsigned startable_raw_count(unsigned most) {
+    unsigned startable = 0;
+    std::size_t at = raw_head_;
+    std::size_t prepared_bytes = 0;
+    for (auto due = next_raw_due(at); due && startable < most && prepared_bytes < kPreparedBytes;
+         due = next_raw_due(++at)) {
+      if (due->raw().payload) prepared_bytes += due->raw().payload->size();
+      if (due->raw().work == TileSlot::Work::Idle) ++startable;
+    }
+    return startable;
+  }
+
+  // The next raw layer that nobody has or makes, for a job.
+  std::optional<RawEncoding> next_raw_encoding() {
+    if (closed_ || !subscribed_ || head() != nullptr) return std::nullopt;
+    std::size_t at = 0;
+    std::size_t prepared_bytes = 0;
+    for (auto due = next_raw_due(at); due && prepared_bytes < kPreparedBytes; due = next_raw_due(++at)) {
+      if (due->raw().payload) prepared_bytes += due->raw().payload->size();
+      if (due->raw().work != TileSlot::Work::Idle) continue;
+      auto claim = cache_->claim_colours(raw_key(*due), weak_waiter());
+      switch (claim.kind) {
+        case Claim<std::vector<std::byte>>::Kind::Ready:
+          prepared_bytes += claim.value->size();
+          make_raw_ready(*due, std::move(claim.value));
+          break;
+        case Claim<std::vector<std::byte>>::Kind::Busy:
+          due->raw().work = TileSlot::Work::Waiting;
+          break;
+        case Claim<std::vector<std::byte>>::Kind::Yours:
+          due->raw().work = TileSlot::Work::Busy;
+          return RawEncoding{due->slot, due->slot->tile, demand_, due->layer, due->slot->held_revision};
+      }
+    }
+    return std::nullopt;
+  }
+
+  void finish_raw(const RawEncoding& done) {
+    TileSlot::Raw& raw = done.slot->raw[done.layer];
+    raw.work = TileSlot::Work::Idle;
+    const bool is_current =
+        done.slot->held_revision == done.revision && demand_.raw.epoch[done.layer] == done.demand.raw.epoch[done.layer];
+    if (!done.made && is_current) {
+      ++failed_tile_count_;
+      raw.failed_epoch = done.demand.raw.epoch[done.layer];
+    }
+    if (done.made && is_current && done.slot->lacks_raw(done.layer, demand_)) {
+      make_raw_ready({done.slot, done.layer}, done.made);
+    }
   }
 
   std::optional<OutgoingFrame> next_removal(double now_s) {
@@ -453,13 +650,14 @@ class Stream final : public ViewerStream, public CacheWaiter {
   // A job is a promise to do whatever is most urgent when its turn comes, so what was superseded while it waited
   // costs nothing, few are enough, and viewers take turns tile by tile.
   void post_jobs() {
-    if (closed_ || !subscribed_ || head() == nullptr) return;
+    if (closed_ || !subscribed_ || !demand_.plan) return;
     const unsigned most = pool_.thread_count() + 1;
     unsigned startable = 0;
-    std::size_t first_startable = 0;
+    int priority = kRawPriority;
+    if (head() == nullptr) startable = startable_raw_count(most);
     for (std::size_t index = order_.head_index(); index < order_.slots().size() && startable < most; ++index) {
       if (!may_start(index)) continue;
-      if (startable++ == 0) first_startable = index;
+      if (startable++ == 0) priority = order_.slots()[index]->tile->id.level;
     }
     while (waiting_job_count_ < startable && waiting_job_count_ + running_job_count_ < most) {
       ++waiting_job_count_;
@@ -467,7 +665,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
           [weak = std::weak_ptr<ViewerStream>(shared_from_this())] {
             if (const auto stream = weak.lock()) static_cast<Stream&>(*stream).run_job();
           },
-          order_.slots()[first_startable]->tile->id.level);
+          priority);
     }
   }
 
@@ -478,11 +676,18 @@ class Stream final : public ViewerStream, public CacheWaiter {
   // Without the lock: a job, on a worker.
   void run_job() {
     std::optional<Encoding> encoding;
+    std::optional<RawEncoding> raw;
     {
       const std::lock_guard lock(mutex_);
       --waiting_job_count_;
       ++running_job_count_;
       encoding = next_encoding();
+      if (!encoding) raw = next_raw_encoding();
+    }
+    if (raw) {
+      encode(*raw, *cache_);
+      const std::lock_guard lock(mutex_);
+      finish_raw(*raw);
     }
     while (encoding) {
       encode(*encoding, *cache_);
@@ -513,6 +718,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
   Demand demand_;
   ViewerTiles tiles_;
   SendingOrder order_;
+  std::vector<std::shared_ptr<TileSlot>> raw_order_;
+  std::size_t raw_head_ = 0;  // Everything before it is there; two places a slot.
   SlotPreparation preparation_{*cache_, tiles_};
   SendingWindow window_;
   std::uint32_t generation_ = 0;

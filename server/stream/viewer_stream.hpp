@@ -78,7 +78,12 @@ struct Subscription {
   /// asks for is refined no further than fits, where its lack is seen most first; the tops of the tree are always sent.
   /// 0 = kCacheBytes for what is left over from earlier cameras, and no bound to what the present one asks for.
   std::uint64_t cache_bytes = 0;
-  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;
+  protocol::ColourTransform colour_transform = protocol::ColourTransform::None;  ///< Of visible colours, too.
+  bool fused = true;  ///< Colours by the plan; without, tiles come as geometry and raw layers.
+  /// Raw layers come after everything else, hottest and nearest first, and the visible colours after the temperatures of a tile.
+  bool temperature = false;
+  bool visible = false;
+  double temperature_step_celsius = 0;  ///< 0 = the default.
 
   static constexpr std::uint64_t kCacheBytes = 256u << 20;
 };
@@ -87,6 +92,7 @@ struct Subscription {
 struct ResumedTile {
   protocol::TileId tile;
   std::uint32_t revision = 0;
+  bool has_raw_layers = false;  ///< Both, in the form that it subscribes to.
 };
 
 /// Encoded geometry and colours, each made once and shared by every viewer with the same need; bounded in bytes, the
@@ -122,7 +128,8 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
   virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
 
-  /// Starts sending. A later call replaces the subscription; colours that were sent with another transform are sent anew.
+  /// Starts sending. A later call replaces the subscription; what was sent with another transform or step is sent anew, what
+  /// the viewer has is not, nor is geometry.
   virtual void subscribe(const Subscription& subscription) = 0;
   virtual void unsubscribe() = 0;
 
@@ -148,7 +155,7 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   virtual std::optional<OutgoingFrame> next_frame(double now_s) = 0;
 
   /// Once after everything that the newest settings, quality, camera and scene ask for has been given out by
-  /// next_frame(). The counts are of the tiles that show the newest generation; a tile whose place is taken by its
+  /// next_frame(); raw layers count only for a viewer who is not given fused colours. The counts are of the tiles that show the newest generation; a tile whose place is taken by its
   /// children may be left with older colours until it is needed again.
   virtual std::optional<StreamComplete> take_complete() = 0;
 

@@ -19,6 +19,16 @@ void TileSlot::forget_held() {
   held_geometry_epoch = 0;
   held_colour_epoch = 0;
   held_colour_bits = 0;
+  forget_raw();
+}
+
+void TileSlot::forget_raw() {
+  for (Raw& layer : raw) {
+    layer.held_epoch = 0;
+    layer.failed_epoch = 0;
+    layer.payload = nullptr;
+    if (layer.work == Work::Ready) layer.work = Work::Idle;
+  }
 }
 
 void ViewerTiles::adopt(const SceneSnapshot& scene) {
@@ -83,6 +93,7 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   slot.held_bytes = decoded_bytes(*slot.tile);
   slot.held_geometry_epoch = geometry_epoch;
   slot.held_colour_epoch = 0;
+  slot.forget_raw();
 }
 
 void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
@@ -91,7 +102,8 @@ void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
 }
 
 std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
-  return slot.colours->size() + (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
+  return (slot.colours ? slot.colours->size() : 0) +
+         (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
 }
 
 bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const {
@@ -125,6 +137,10 @@ std::uint32_t ViewerTiles::resume(std::span<const ResumedTile> claims, const Dem
       push_removal(claim.tile, claim.revision);
     } else if (hold_resumed(*known->second, claim.revision, demand, cache)) {
       ++current_count;
+      if (!claim.has_raw_layers) continue;
+      for (std::size_t layer = 0; layer < demand.raw.epoch.size(); ++layer) {
+        known->second->raw[layer].held_epoch = demand.raw.epoch[layer];
+      }
     }
   }
   if (current_count == 0) forget_all_held();

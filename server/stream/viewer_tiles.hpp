@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -47,6 +49,15 @@ struct TileSlot {
   std::uint64_t held_colour_epoch = 0;
   int held_colour_bits = 0;
   float held_position_step_m = 0;  ///< The coarsest of the tile.
+  std::array<float, 3> held_origin_m{};
+  /// A raw layer on its way to the viewer.
+  struct Raw {
+    Work work = Work::Idle;
+    Payload payload;               ///< While Ready; of `held_revision`.
+    std::uint64_t held_epoch = 0;  ///< Of RawDemand; 0 = the viewer does not have it.
+    std::uint64_t failed_epoch = 0;
+  };
+  std::array<Raw, RawDemand::kLayers.size()> raw;  ///< In the order of RawDemand::kLayers.
   std::uint64_t failed_geometry_epoch = 0;
   std::uint64_t failed_colour_epoch = 0;
 
@@ -55,10 +66,24 @@ struct TileSlot {
   }
   /// Holds the newest colours, as exact as the tile's part in the picture asks for.
   bool has_colours(const Demand& demand) const {
+    if (!demand.fused) return true;
     return held_colour_epoch == demand.colour_epoch && held_colour_bits >= wanted_colour_bits(demand);
   }
-  bool is_drawable() const { return held_geometry_epoch != 0 && held_colour_epoch != 0; }
+  /// With colours, or with what the viewer makes them of.
+  bool is_drawable() const { return held_geometry_epoch != 0 && (held_colour_epoch != 0 || has_raw_layers()); }
+  bool has_raw_layers() const {
+    return std::all_of(raw.begin(), raw.end(), [](const Raw& layer) { return layer.held_epoch != 0; });
+  }
+  /// Holds that geometry, and a raw layer of it is wanted and not there.
+  bool lacks_raw(std::size_t layer, const Demand& demand) const {
+    const std::uint64_t epoch = demand.raw.epoch[layer];
+    return demand.raw.is_wanted[layer] && !is_gone && is_wanted && held_revision != 0 &&
+           held_geometry_epoch == demand.geometry_epoch && raw[layer].held_epoch != epoch &&
+           raw[layer].failed_epoch != epoch;
+  }
   void forget_held();
+  /// The viewer has no raw layers, nor are any ready for it.
+  void forget_raw();
 };
 
 /// The tiles of the scene as one viewer has them: what is given out, what is prepared for it, and what it is to be told to

@@ -3,7 +3,15 @@
 import draco3d from "draco3d";
 import WebSocket from "ws";
 
-export const KIND = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5, colours_subtract_green: 6 };
+export const KIND = {
+  geometry: 1,
+  colours: 2,
+  remove: 3,
+  temperature: 4,
+  visible: 5,
+  colours_subtract_green: 6,
+  visible_subtract_green: 7,
+};
 export const isColours = ({ kind }) => kind === KIND.colours || kind === KIND.colours_subtract_green;
 const MAGIC = 0x31435053;
 
@@ -71,7 +79,7 @@ export class DracoReader {
     if (id < 0) throw new Error("draco: attribute missing");
     const attribute = decoder.GetAttribute(geometry, id);
     if (attribute.num_components() !== components) throw new Error("draco: attribute of another size");
-    const ArrayType = type === module.DT_FLOAT32 ? Float32Array : Uint8Array;
+    const ArrayType = type === module.DT_FLOAT32 ? Float32Array : type === module.DT_UINT16 ? Uint16Array : Uint8Array;
     const count = geometry.num_points() * components;
     const size = count * ArrayType.BYTES_PER_ELEMENT;
     const pointer = module._malloc(size);
@@ -114,6 +122,16 @@ export class DracoReader {
     return this.#decoded(bytes, (decoder, geometry) =>
       this.#values(decoder, geometry, module.COLOR, module.DT_UINT8, 3),
     );
+  }
+
+  /** Scale and offset, and a code for each vertex. */
+  temperature(bytes) {
+    const { module } = this;
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    const codes = this.#decoded(bytes.subarray(8), (decoder, geometry) =>
+      this.#values(decoder, geometry, module.GENERIC, module.DT_UINT16, 1),
+    );
+    return { scale: view.getFloat32(0, true), offset: view.getFloat32(4, true), codes };
   }
 
   /** Colours of kind 6: green, and red and blue as differences from it modulo 256. */
@@ -303,6 +321,13 @@ export class SpectraClient {
       if (colours.length !== tile.geometry.positions.length) throw new Error("colours: vertex count differs");
       tile.colours = colours;
       tile.generation = frame.generation;
+    } else if (frame.kind === KIND.temperature || frame.kind === KIND.visible || frame.kind === KIND.visible_subtract_green) {
+      const tile = this.tiles.get(frame.tile);
+      if (!tile || tile.frame.revision !== frame.revision) throw new Error("a raw layer before its geometry");
+      if (frame.vertexCount !== tile.frame.vertexCount) throw new Error("a raw layer of another vertex count");
+      if (frame.kind === KIND.temperature) tile.temperature = this.draco.temperature(frame.payload);
+      else if (frame.kind === KIND.visible) tile.visible = this.draco.colours(frame.payload);
+      else tile.visible = this.draco.coloursSubtractGreen(frame.payload);
     }
   }
 

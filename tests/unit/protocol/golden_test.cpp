@@ -66,6 +66,7 @@ const std::map<std::string, MethodPassages> kMethods{
     {"scene.unsubscribe", {unchanged, unchanged}},
     {"fusion.set", {through<FusionChange>(), through<FusionReply>()}},
     {"fusion.get", {unchanged, through<FusionReply>()}},
+    {"fusion.facts", {through<FactsRequest>(), through<FactsReply>()}},
     {"quality.set", {through<QualityChange>(), through<QualityReply>()}},
     {"scene.histogram", {through<HistogramRequest>(), through<HistogramReply>()}},
     {"scene.probe", {through<ProbeRequest>(), through<ProbeReply>()}},
@@ -236,6 +237,18 @@ json frame_json(const TileFrameView& frame) {
     described["colours"] = colours.value();
     const auto marks = decoded_marks(frame.payload).value();
     if (!marks.empty()) described["marks"] = marks;
+  } else if (frame.header.kind == FrameKind::Visible || frame.header.kind == FrameKind::VisibleSubtractGreen) {
+    const auto transform =
+        frame.header.kind == FrameKind::Visible ? ColourTransform::None : ColourTransform::SubtractGreen;
+    const auto visible = decoded_colours(frame.payload, transform);
+    if (!visible) return visible.error().message;
+    described["visible"] = visible.value();
+  } else if (frame.header.kind == FrameKind::Temperature) {
+    const auto temperature = decoded_temperature_codes(frame.payload);
+    if (!temperature) return temperature.error().message;
+    described["scale"] = temperature.value().table.scale;
+    described["offset"] = temperature.value().table.offset;
+    described["codes"] = temperature.value().codes;
   }
   return described;
 }
@@ -303,6 +316,19 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.kind = FrameKind::Colours;
   frames["colours_marks"] =
       frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::None, marks).value());
+
+  header.generation = 0;
+  header.kind = FrameKind::Visible;
+  frames["visible"] = frame_bytes(header, encoded_colours(decoded_order, 8, 7).value());
+  header.kind = FrameKind::VisibleSubtractGreen;
+  frames["visible_subtract_green"] =
+      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
+  std::vector<std::uint16_t> codes;
+  for (const std::uint32_t input : mesh.input_of_decoded) {
+    codes.push_back(static_cast<std::uint16_t>(input < 13 ? 215 * input : 65520 + input));
+  }
+  header.kind = FrameKind::Temperature;
+  frames["temperature"] = frame_bytes(header, encoded_temperature_codes(codes, {0.0125F, 4.25F}, 7).value());
 
   header.kind = FrameKind::Remove;
   header.sequence = 4;

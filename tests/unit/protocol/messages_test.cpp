@@ -178,6 +178,27 @@ TEST(QualityChange, HoldsTheBoundsOfItsKnobs) {
     EXPECT_EQ(refused_field<QualityChange>("{\"marks\":" + marks + "}"), "marks");
 }
 
+TEST(FactsRequest, HoldsTheBoundsOfBins) {
+  EXPECT_EQ(refused_field<FactsRequest>("{}"), "accepted");
+  EXPECT_EQ(refused_field<FactsRequest>(R"({"bins":4096,"hues":true})"), "accepted");
+  EXPECT_EQ(refused_field<FactsRequest>(R"({"bins":0})"), "bins");
+  EXPECT_EQ(refused_field<FactsRequest>(R"({"bins":4097})"), "bins");
+  EXPECT_EQ(refused_field<FactsRequest>(R"({"hues":1})"), "hues");
+}
+
+TEST(SubscribeRequest, HoldsTheBoundsOfRawLayers) {
+  const auto with = [](const std::string& more) {
+    return refused_field<SubscribeRequest>(R"({"channels":["temperature","visible"])" + more + "}");
+  };
+  EXPECT_EQ(with(""), "accepted");
+  EXPECT_EQ(with(R"(,"temperature_step_celsius":0.05)"), "accepted");
+  for (const std::string step : {"0", "-1", "1001", "\"x\""}) {
+    EXPECT_EQ(with(",\"temperature_step_celsius\":" + step), "temperature_step_celsius");
+  }
+  EXPECT_EQ(with(R"(,"resume":{"session_id":"a","tiles":[[0,0,0,0,1]],"raw":[0]})"), "accepted");
+  EXPECT_EQ(with(R"(,"resume":{"session_id":"a","tiles":[[0,0,0,0,1]],"raw":[1]})"), "resume.raw");
+}
+
 TEST(HistogramRequest, HoldsTheBoundsOfBins) {
   EXPECT_EQ(refused_field<HistogramRequest>(R"({"bins":1})"), "accepted");
   EXPECT_EQ(refused_field<HistogramRequest>(R"({"bins":4096})"), "accepted");

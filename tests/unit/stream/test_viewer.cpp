@@ -28,7 +28,8 @@ TestViewer::~TestViewer() {
 std::vector<ResumedTile> TestViewer::claims() const {
   std::vector<ResumedTile> claims;
   for (const auto& [id, tile] : tiles) {
-    if (!tile.colours.empty()) claims.push_back({id, tile.geometry.revision});
+    if (!tile.colours.empty())
+      claims.push_back({id, tile.geometry.revision, !tile.visible.empty() && !tile.temperature.codes.empty()});
   }
   return claims;
 }
@@ -110,8 +111,9 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       const auto geometry = protocol::decoded_geometry(frame.value().payload);
       ASSERT_TRUE(geometry.has_value());
       HeldTile& tile = tiles[header.tile];
-      tile = {
-          .geometry = header, .positions_m = geometry.value().positions_m, .generation = 0, .colours = {}, .marks = {}};
+      tile = {};
+      tile.geometry = header;
+      tile.positions_m = geometry.value().positions_m;
       ASSERT_EQ(tile.positions_m.size(), header.vertex_count);
       for (auto& position : tile.positions_m) {
         for (std::size_t axis = 0; axis < 3; ++axis) position[axis] += header.origin_m[axis];
@@ -131,6 +133,24 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       held->second.colours = protocol::decoded_colours(frame.value().payload, colour_transform).value();
       EXPECT_EQ(held->second.colours.size(), header.vertex_count);
       held->second.marks = protocol::decoded_marks(frame.value().payload).value();
+      break;
+    }
+    case protocol::FrameKind::Temperature:
+    case protocol::FrameKind::Visible:
+    case protocol::FrameKind::VisibleSubtractGreen: {
+      const auto held = tiles.find(header.tile);
+      ASSERT_NE(held, tiles.end()) << "a layer without geometry";
+      EXPECT_EQ(held->second.geometry.revision, header.revision);
+      EXPECT_EQ(held->second.geometry.vertex_count, header.vertex_count);
+      EXPECT_EQ(held->second.geometry.origin_m, header.origin_m);
+      if (header.kind == protocol::FrameKind::Temperature) {
+        held->second.temperature = protocol::decoded_temperature_codes(frame.value().payload).value();
+        EXPECT_EQ(held->second.temperature.codes.size(), header.vertex_count);
+      } else {
+        EXPECT_EQ(header.kind, protocol::visible_frame_kind(colour_transform));
+        held->second.visible = protocol::decoded_colours(frame.value().payload, colour_transform).value();
+        EXPECT_EQ(held->second.visible.size(), header.vertex_count);
+      }
       break;
     }
     case protocol::FrameKind::Remove:

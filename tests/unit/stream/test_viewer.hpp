@@ -20,7 +20,9 @@ struct HeldTile {
   std::vector<std::array<float, 3>> positions_m;  ///< Relative to the scene origin.
   std::uint32_t generation = 0;                   ///< Of the colours; 0 = none of this connection.
   std::vector<protocol::ColourBytes> colours;
-  std::vector<std::uint8_t> marks;  ///< That came with them, if any.
+  std::vector<std::uint8_t> marks;             ///< That came with them, if any.
+  std::vector<protocol::ColourBytes> visible;  ///< Raw layers.
+  protocol::DecodedTemperatureCodes temperature;
 };
 
 /// A client on a perfect link: takes the frames of a stream, decodes them and expects of each what the protocol says

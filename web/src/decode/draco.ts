@@ -1,12 +1,30 @@
 /** Draco payloads to plain arrays. Runs in a worker in the browser, and as it is in tests. */
 
 import type { Attribute, Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d/draco_decoder_nodejs.js';
-import type { ColoursJob, DecodedColours, DecodedGeometry, DecodeJob, DecodeResult } from './messages';
+import type {
+  ColoursJob,
+  DecodedColours,
+  DecodedGeometry,
+  DecodedTemperature,
+  DecodedVisible,
+  DecodeJob,
+  DecodeResult,
+  VisibleJob,
+} from './messages';
 import { summaryOf } from './summary';
 
 /** Decodes one job; throws an Error that says what the decoder disliked. */
 export function decodeJob(draco: DecoderModule, job: DecodeJob): DecodeResult {
-  return job.kind === 'geometry' ? decodeGeometry(draco, job.payload, job.origin_m) : decodeColours(draco, job);
+  switch (job.kind) {
+    case 'geometry':
+      return decodeGeometry(draco, job.payload, job.origin_m);
+    case 'colours':
+      return decodeColours(draco, job);
+    case 'visible':
+      return decodeVisible(draco, job);
+    case 'temperature':
+      return decodeTemperature(draco, job.payload);
+  }
 }
 
 function decodeGeometry(draco: DecoderModule, payload: Uint8Array, origin: readonly [number, number, number]): DecodedGeometry {
@@ -100,6 +118,49 @@ function decodeColours(draco: DecoderModule, { payload, transform }: ColoursJob)
       for (let from = 0, to = 3; to < rgba.length; from += 1, to += 4) rgba[to] = marks[from] === 0 ? 255 : 0;
     });
     return { kind: 'colours', rgba };
+  } finally {
+    draco.destroy(cloud);
+    draco.destroy(decoder);
+  }
+}
+
+function decodeVisible(draco: DecoderModule, { payload, transform }: VisibleJob): DecodedVisible {
+  const { rgba } = decodeColours(draco, { kind: 'colours', payload, transform });
+  const rgb = new Uint8Array((rgba.length / 4) * 3);
+  for (let from = 0, to = 0; to < rgb.length; from += 4, to += 3) {
+    rgb[to] = rgba[from]!;
+    rgb[to + 1] = rgba[from + 1]!;
+    rgb[to + 2] = rgba[from + 2]!;
+  }
+  return { kind: 'visible', rgb };
+}
+
+/** Scale and offset stand before the Draco stream. */
+const TABLE_BYTES = 8;
+
+function decodeTemperature(draco: DecoderModule, payload: Uint8Array): DecodedTemperature {
+  if (payload.byteLength <= TABLE_BYTES) throw new Error('temperature: no scale and offset before the codes');
+  const table = new DataView(payload.buffer, payload.byteOffset, TABLE_BYTES);
+  const scale = table.getFloat32(0, true);
+  const offset = table.getFloat32(4, true);
+  if (!(scale > 0) || !Number.isFinite(scale) || !Number.isFinite(offset)) {
+    throw new Error(`temperature: a scale of ${scale} and an offset of ${offset} are no temperatures`);
+  }
+  const decoder = new draco.Decoder();
+  const cloud = new draco.PointCloud();
+  const bytes = new Int8Array(payload.buffer, payload.byteOffset + TABLE_BYTES, payload.byteLength - TABLE_BYTES);
+  try {
+    check(decoder.DecodeArrayToPointCloud(bytes, bytes.byteLength, cloud));
+    const attributeId = decoder.GetAttributeId(cloud, draco.GENERIC);
+    if (attributeId < 0) throw new Error('temperature: no GENERIC attribute');
+    const attribute = decoder.GetAttribute(cloud, attributeId);
+    if (attribute.num_components() !== 1) throw new Error(`temperature: ${attribute.num_components()} components, not 1`);
+    const count = cloud.num_points();
+    const heap = draco._malloc(2 * count);
+    decoder.GetAttributeDataArrayForAllPoints(cloud, attribute, draco.DT_UINT16, 2 * count, heap);
+    const codes = new Uint16Array(draco.HEAPF32.buffer, heap, count).slice();
+    draco._free(heap);
+    return { kind: 'temperature', codes, scale, offset };
   } finally {
     draco.destroy(cloud);
     draco.destroy(decoder);

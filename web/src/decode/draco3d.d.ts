@@ -41,6 +41,7 @@ declare module 'draco3d/draco_decoder_nodejs.js' {
     GENERIC: number;
     DT_FLOAT32: number;
     DT_UINT8: number;
+    DT_UINT16: number;
     HEAPF32: Float32Array<ArrayBuffer>;
     _malloc(size_bytes: number): number;
     _free(address: number): void;

@@ -11,7 +11,17 @@ export interface ColoursJob {
   /** How the payload writes colours, see docs/protocol.md. */
   transform: 'none' | 'subtract_green';
 }
-export type DecodeJob = GeometryJob | ColoursJob;
+/** A raw layer: what the sensors saw, for whoever fuses by himself. */
+export interface VisibleJob {
+  kind: 'visible';
+  payload: Uint8Array<ArrayBuffer>;
+  transform: 'none' | 'subtract_green';
+}
+export interface TemperatureJob {
+  kind: 'temperature';
+  payload: Uint8Array<ArrayBuffer>;
+}
+export type DecodeJob = GeometryJob | ColoursJob | VisibleJob | TemperatureJob;
 
 /** What the page keeps of a geometry, whose arrays go on to where they are drawn. */
 export interface GeometrySummary {
@@ -41,7 +51,19 @@ export interface DecodedColours {
   /** Red, green, blue, alpha per vertex: sRGB bytes as they go to the screen; alpha 0 where the vertex is marked as highlighted, else 255. */
   rgba: Uint8Array<ArrayBuffer>;
 }
-export type DecodeResult = DecodedGeometry | DecodedColours;
+export interface DecodedVisible {
+  kind: 'visible';
+  /** Red, green, blue per vertex. */
+  rgb: Uint8Array<ArrayBuffer>;
+}
+export interface DecodedTemperature {
+  kind: 'temperature';
+  /** degC = code * scale + offset; the last three codes stand for what has no number. */
+  codes: Uint16Array<ArrayBuffer>;
+  scale: number;
+  offset: number;
+}
+export type DecodeResult = DecodedGeometry | DecodedColours | DecodedVisible | DecodedTemperature;
 
 export interface WorkerRequest {
   id: number;

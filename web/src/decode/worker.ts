@@ -2,7 +2,7 @@
 import createDecoderModule from 'draco3d/draco_decoder_nodejs.js';
 import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import { decodeJob } from './draco';
-import type { WorkerReply, WorkerRequest } from './messages';
+import type { DecodeResult, WorkerReply, WorkerRequest } from './messages';
 
 declare const self: DedicatedWorkerGlobalScope;
 
@@ -18,17 +18,24 @@ function reply(message: WorkerReply, transfer: Transferable[] = []): void {
   self.postMessage(message, transfer);
 }
 
+function buffersOf(result: DecodeResult): Transferable[] {
+  switch (result.kind) {
+    case 'geometry':
+      return [result.positions.buffer, ...(result.indices === null ? [] : [result.indices.buffer])];
+    case 'colours':
+      return [result.rgba.buffer];
+    case 'visible':
+      return [result.rgb.buffer];
+    case 'temperature':
+      return [result.codes.buffer];
+  }
+}
+
 self.onmessage = async (event: MessageEvent<WorkerRequest>) => {
   const { id, job } = event.data;
   try {
     const result = decodeJob(await decoder, job);
-    const transfer: Transferable[] =
-      result.kind === 'colours'
-        ? [result.rgba.buffer]
-        : result.indices === null
-          ? [result.positions.buffer]
-          : [result.positions.buffer, result.indices.buffer];
-    reply({ id, result }, transfer);
+    reply({ id, result }, buffersOf(result));
   } catch (error) {
     reply({ id, error: error instanceof Error ? error.message : String(error) });
   }

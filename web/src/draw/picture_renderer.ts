@@ -20,8 +20,18 @@ import { depthRange } from './depth_range';
 import { Outline } from './outline';
 import { PictureBuffer } from './picture_buffer';
 import { nearestHit } from './picking';
-import type { Eye, GpuObjects, RenderCommand, RenderReply, RenderRequest, TileArrays } from './render_messages';
+import type {
+  Eye,
+  GpuObjects,
+  ProbedVertex,
+  RawArrays,
+  RenderCommand,
+  RenderReply,
+  RenderRequest,
+  TileArrays,
+} from './render_messages';
 import { SlicePace, Slices } from './slices';
+import { celsiusOf, TileFuser } from './tile_fuser';
 import { TileMaterials } from './tile_materials';
 
 // Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
@@ -36,6 +46,9 @@ interface Tile {
   object: Mesh | Points;
   isShown: boolean;
   colours: BufferAttribute;
+  raw: RawArrays | null;
+  /** Number of the settings that its colours were fused with here; 0: they came as they are. */
+  fusedWith: number;
   arrays: Omit<TileArrays, 'rgba'>;
 }
 
@@ -76,6 +89,10 @@ export class PictureRenderer {
   /** Under way; a newer one takes its place. */
   #picture: Picture | null = null;
   #pointDiameter: number | null = null;
+  #fuser: TileFuser | null = null;
+  /** Of the settings that tiles are fused with here; 0: none. */
+  #fusing = 0;
+  #settingsCount = 0;
   #frame = 0;
   #newest = 0;
 
@@ -113,6 +130,7 @@ export class PictureRenderer {
       case 'picture':
         this.#eye = request.eye;
         for (const command of request.commands) this.#apply(command);
+        this.#fuseShown();
         this.#newest = request.number;
         this.#resolution = request.resolution;
         this.#isInParts = !request.isMoving;
@@ -123,6 +141,9 @@ export class PictureRenderer {
         break;
       case 'sight':
         this.reply({ kind: 'sighted', id: request.id, eye: clearSight(this.#drawn(), request.wish) });
+        break;
+      case 'probe':
+        this.reply({ kind: 'probed', id: request.id, vertex: this.#nearestVertex(request.point) });
         break;
       case 'copy':
         void this.#copy(request.id);
@@ -147,6 +168,33 @@ export class PictureRenderer {
         if (tile === undefined) break;
         tile.colours.array = command.rgba;
         tile.colours.needsUpdate = true;
+        // While tiles are fused here, these are of the same settings.
+        tile.fusedWith = this.#fusing;
+        break;
+      }
+      case 'raw': {
+        const tile = this.#tiles.get(command.tile);
+        if (tile !== undefined) tile.raw = command.raw;
+        break;
+      }
+      case 'module':
+        this.#orSay(() => {
+          this.#fuser = new TileFuser(command.module);
+        });
+        break;
+      case 'facts':
+        this.#orSay(() => this.#fuser?.setFacts(command.facts));
+        break;
+      case 'fuse': {
+        const { settings } = command;
+        this.#fusing = 0;
+        if (settings === null) break;
+        this.#orSay(() => {
+          if (this.#fuser === null) throw new Error('the library is not there');
+          this.#fuser.setSettings(settings);
+          this.#settingsCount += 1;
+          this.#fusing = this.#settingsCount;
+        });
         break;
       }
       case 'visible': {
@@ -169,6 +217,7 @@ export class PictureRenderer {
         this.#pointDiameter = command.diameter;
         break;
       case 'outline':
+        if (this.#isOutlined !== command.isOn) for (const tile of this.#tiles.values()) tile.fusedWith = 0;
         this.#isOutlined = command.isOn;
         this.#materials.setOutlined(command.isOn);
         break;
@@ -176,6 +225,60 @@ export class PictureRenderer {
         this.#fullPixelRatio = command.pixel_ratio;
         this.#size = [command.width, command.height];
     }
+  }
+
+  /** All tiles that are seen change in the same picture, those that are not when they are. */
+  #fuseShown(): void {
+    const fuser = this.#fuser;
+    if (this.#fusing === 0 || fuser === null) return;
+    this.#orSay(() => {
+      for (const tile of this.#tiles.values()) {
+        if (!tile.isShown || tile.raw === null || tile.fusedWith === this.#fusing) continue;
+        fuser.fuse(tile.raw, tile.colours.array as Uint8Array, this.#isOutlined);
+        tile.colours.needsUpdate = true;
+        tile.fusedWith = this.#fusing;
+      }
+    });
+  }
+
+  #orSay(act: () => void): void {
+    try {
+      act();
+    } catch (error) {
+      this.#fusing = 0;
+      this.reply({ kind: 'not_fused', message: error instanceof Error ? error.message : String(error) });
+    }
+  }
+
+  #nearestVertex([x, y, z]: Vec3): ProbedVertex | null {
+    let least = Infinity;
+    let found: { tile: Tile; raw: RawArrays; vertex: number } | null = null;
+    for (const tile of this.#tiles.values()) {
+      const { raw } = tile;
+      if (!tile.isShown || raw === null) continue;
+      const { positions, centre, radius } = tile.arrays;
+      const away = Math.hypot(centre[0] - x, centre[1] - y, centre[2] - z) - radius;
+      if (away > 0 && away * away > least) continue;
+      for (let i = 0, vertex = 0; i < positions.length; i += 3, vertex += 1) {
+        const dx = positions[i]! - x;
+        const dy = positions[i + 1]! - y;
+        const dz = positions[i + 2]! - z;
+        const square = dx * dx + dy * dy + dz * dz;
+        if (square >= least) continue;
+        least = square;
+        found = { tile, raw, vertex };
+      }
+    }
+    if (found === null) return null;
+    const { tile, raw, vertex } = found;
+    const triple = (array: ArrayLike<number>, at: number): Vec3 => [array[at]!, array[at + 1]!, array[at + 2]!];
+    return {
+      position: triple(tile.arrays.positions, 3 * vertex),
+      temperature: celsiusOf(raw.codes[vertex]!, raw),
+      visible: triple(raw.rgb, 3 * vertex),
+      fused: triple(tile.colours.array, 4 * vertex),
+      distance: Math.sqrt(least),
+    };
   }
 
   #drawn(): Tile['arrays'][] {
@@ -198,7 +301,14 @@ export class PictureRenderer {
     object.matrixAutoUpdate = false;
     object.visible = false;
     this.#scene.add(object);
-    return { object, isShown: false, colours, arrays: { positions, indices, centre, radius, point_spacing } };
+    return {
+      object,
+      isShown: false,
+      colours,
+      raw: null,
+      fusedWith: 0,
+      arrays: { positions, indices, centre, radius, point_spacing },
+    };
   }
 
   /** Draws an empty tile with each of these materials, so that their shaders are compiled before the first real one comes. */

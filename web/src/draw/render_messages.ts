@@ -1,8 +1,18 @@
 /** What the page and its drawing side, in a worker of its own where the browser can do that, say to each other. */
 
 import type { Vec3 } from '../protocol/messages';
+import type { FusionChange } from '../protocol/messages';
+import type { SceneFacts } from '../fusion/fusion_module';
 import type { SightWish } from './clear_sight';
 import type { Ray } from './picking';
+
+/** What the sensors saw of a tile, a value per vertex: what it is fused from here. */
+export interface RawArrays {
+  codes: Uint16Array<ArrayBuffer>;
+  scale: number;
+  offset: number;
+  rgb: Uint8Array<ArrayBuffer>;
+}
 
 /** One tile as it is drawn: metres relative to the scene origin, and a colour per vertex. */
 export interface TileArrays {
@@ -20,6 +30,12 @@ export interface TileArrays {
 export type RenderCommand =
   | { change: 'create'; tile: number; arrays: TileArrays }
   | { change: 'colours'; tile: number; rgba: Uint8Array<ArrayBuffer> }
+  | { change: 'raw'; tile: number; raw: RawArrays }
+  /** The library that fuses, compiled. */
+  | { change: 'module'; module: WebAssembly.Module }
+  | { change: 'facts'; facts: SceneFacts }
+  /** From now on tiles with raw arrays show these settings, all in the same picture; null: they keep the colours that they are given. */
+  | { change: 'fuse'; settings: FusionChange | null }
   | { change: 'visible'; tile: number; visible: boolean }
   | { change: 'dispose'; tile: number }
   | { change: 'background'; colour: number }
@@ -46,6 +62,8 @@ export type RenderRequest =
   | { kind: 'pick'; id: number; ray: Ray; cone: number }
   /** Where the target of the wish is seen from. */
   | { kind: 'sight'; id: number; wish: SightWish }
+  /** The vertex of what is drawn, and has raw arrays, that is nearest to a point. */
+  | { kind: 'probe'; id: number; point: Vec3 }
   | { kind: 'copy'; id: number };
 
 /** Objects held on the GPU, and what the last picture drew. */
@@ -57,11 +75,24 @@ export interface GpuObjects {
   calls: number;
 }
 
+/** What the picture knows of a place by itself. */
+export interface ProbedVertex {
+  position: Vec3;
+  /** degC; infinite beyond the sensor's range, NaN where nothing was measured. */
+  temperature: number;
+  visible: Vec3;
+  fused: Vec3;
+  distance: number;
+}
+
 export type RenderReply =
   | { kind: 'failed'; message: string }
   /** Everything up to picture `number` has been drawn; the last one took so long. */
   | { kind: 'drawn'; number: number; gpu: GpuObjects; ms: number }
   | { kind: 'picked'; id: number; distance: number | null }
+  | { kind: 'probed'; id: number; vertex: ProbedVertex | null }
+  /** Fusing here has failed; what was fused so far stands. */
+  | { kind: 'not_fused'; message: string }
   | { kind: 'sighted'; id: number; eye: Vec3 | null }
   /** Null: there is none, for the GPU is away. */
   | { kind: 'copied'; id: number; picture: ImageBitmap | null }

@@ -47,6 +47,7 @@ interface Exports extends WebAssembly.Exports {
   prepare_with_palette(): number;
   wanted_bins(): number;
   wants_hues(): number;
+  compares_with_baseline(): number;
   range_minimum(): number;
   range_maximum(): number;
   highlighted_count(): number;
@@ -59,6 +60,15 @@ interface Exports extends WebAssembly.Exports {
   parameter_in_force(index: number): number;
   fuse(temperature: number, visible: number, fused: number, count: number): void;
   fuse_codes(codes: number, scale: number, offset: number, visible: number, fused: number, count: number): void;
+  fuse_codes_rgba(
+    codes: number,
+    scale: number,
+    offset: number,
+    visible: number,
+    rgba: number,
+    count: number,
+    with_marks: number,
+  ): void;
 }
 
 const FACTS_MISSING = -1;
@@ -89,6 +99,13 @@ export interface SceneSummary {
   sigma: number;
 }
 
+/** What is known of a scene: histograms of any numbers of bins, and the chroma of its hues. */
+export interface SceneFacts {
+  summary: SceneSummary;
+  histograms: readonly (readonly number[])[];
+  hues: readonly number[] | null;
+}
+
 /** What a plan wants to know of the scene beyond its summary: the histogram of so many bins, the chroma of its hues. */
 export interface WantedFacts {
   bins: number | null;
@@ -102,6 +119,8 @@ export interface PlanInForce {
   range_minimum: number;
   range_maximum: number;
   highlighted: [number, number][];
+  /** Temperatures are compared with those of before, which are not here. */
+  compares_with_baseline: boolean;
 }
 
 export class FusionModule {
@@ -117,6 +136,18 @@ export class FusionModule {
   /** Rejects when the machine cannot compile or start it. */
   static async from(bytes: BufferSource): Promise<FusionModule> {
     return new FusionModule((await WebAssembly.instantiate(bytes, {})).instance);
+  }
+
+  /** The same of a module that is compiled already. */
+  static start(module: WebAssembly.Module): FusionModule {
+    return new FusionModule(new WebAssembly.Instance(module, {}));
+  }
+
+  /** All that is known of a scene. */
+  setFacts({ summary, histograms, hues }: SceneFacts): void {
+    this.setScene(summary);
+    for (const counts of histograms) this.setHistogram(counts);
+    if (hues !== null) this.setHues(hues);
   }
 
   /** Facts of a scene; histograms and hues of the one before are forgotten. */
@@ -217,7 +248,14 @@ export class FusionModule {
     const edges = new Float64Array(module.memory.buffer, module.highlighted(), 2 * module.highlighted_count());
     const highlighted: [number, number][] = [];
     for (let i = 0; i < edges.length; i += 2) highlighted.push([edges[i]!, edges[i + 1]!]);
-    return { params, params_in_force, range_minimum: module.range_minimum(), range_maximum: module.range_maximum(), highlighted };
+    return {
+      params,
+      params_in_force,
+      range_minimum: module.range_minimum(),
+      range_maximum: module.range_maximum(),
+      highlighted,
+      compares_with_baseline: module.compares_with_baseline() !== 0,
+    };
   }
 
   /** Memory of the module; throws when it has no more. */
@@ -244,6 +282,19 @@ export class FusionModule {
   /** The same of temperatures as 16-bit codes. */
   fuseCodes(codes: number, scale: number, offset: number, visible: number, fused: number, count: number): void {
     this.#exports.fuse_codes(codes, scale, offset, visible, fused, count);
+  }
+
+  /** Into red, green, blue, alpha; alpha is 0 where the method highlights, when `with_marks`. */
+  fuseCodesRgba(
+    codes: number,
+    scale: number,
+    offset: number,
+    visible: number,
+    rgba: number,
+    count: number,
+    with_marks: boolean,
+  ): void {
+    this.#exports.fuse_codes_rgba(codes, scale, offset, visible, rgba, count, with_marks ? 1 : 0);
   }
 
   #check(code: number): void {

@@ -4,7 +4,15 @@ export const FRAME_MAGIC = 0x31435053;
 /** The shortest header; from 80 on it states the errors of colour and temperature too. */
 export const FRAME_HEADER_BYTES = 72;
 
-export const FrameKind = { geometry: 1, colours: 2, remove: 3, temperature: 4, visible: 5, colours_subtract_green: 6 } as const;
+export const FrameKind = {
+  geometry: 1,
+  colours: 2,
+  remove: 3,
+  temperature: 4,
+  visible: 5,
+  colours_subtract_green: 6,
+  visible_subtract_green: 7,
+} as const;
 
 export interface TileId {
   level: number;

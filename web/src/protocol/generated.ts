@@ -73,6 +73,8 @@ export interface ProtocolDefinitions {
   Extreme: Extreme;
   ExtremesReply: ExtremesReply;
   ExtremesRequest: ExtremesRequest;
+  FactsReply: FactsReply;
+  FactsRequest: FactsRequest;
   FusionChange: FusionChange;
   FusionRange: FusionRange;
   FusionReply: FusionReply;
@@ -275,6 +277,40 @@ export interface ExtremesRequest {
    * @maxItems 4
    */
   window?: [number, number, number, number];
+}
+/**
+ * Result of fusion.facts: what automatic values are made of; extremes, mean and sigma are 0 without a finite temperature.
+ */
+export interface FactsReply {
+  finite_count: number;
+  missing_count: number;
+  over_range_count: number;
+  under_range_count: number;
+  min: number;
+  max: number;
+  mean: number;
+  sigma: number;
+  /**
+   * Of bins equal bins from min to max; there when bins was given.
+   */
+  counts?: number[];
+  /**
+   * Chroma (largest channel less the smallest) of the visible colours, summed by equal sectors of hue from red on; there when hues was asked for.
+   */
+  hues?: number[];
+}
+/**
+ * Params of fusion.facts.
+ */
+export interface FactsRequest {
+  /**
+   * Absent: no histogram.
+   */
+  bins?: number;
+  /**
+   * Absent: no.
+   */
+  hues?: boolean;
 }
 /**
  * Params of fusion.set: any part of FUSION; what is absent stays.
@@ -694,6 +730,10 @@ export interface ResumeRequest {
    * [level (0..255), x, y, z, revision (from 1)] of each.
    */
   tiles: number[][];
+  /**
+   * Places in tiles of those of which it has both raw layers, in the form that it asks for now; absent: none.
+   */
+  raw?: number[];
 }
 /**
  * A refusal; a refused request changes nothing.
@@ -855,6 +895,10 @@ export interface SubscribeRequest {
    * How colours are written: none = frames of kind 2 (r, g, b), subtract_green = kind 6 (g and r - g, b - g).
    */
   colour_transform?: "none" | "subtract_green";
+  /**
+   * Step of the channel temperature; absent: the larger of 0.01 degC and a 65,000th of the tile's span.
+   */
+  temperature_step_celsius?: number;
   resume?: ResumeRequest1;
 }
 /**
@@ -869,4 +913,8 @@ export interface ResumeRequest1 {
    * [level (0..255), x, y, z, revision (from 1)] of each.
    */
   tiles: number[][];
+  /**
+   * Places in tiles of those of which it has both raw layers, in the form that it asks for now; absent: none.
+   */
+  raw?: number[];
 }

@@ -21,6 +21,7 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
   'scene.histogram.': messages.histogram,
   'scene.probe.': messages.probe,
   'scene.extremes.': messages.extremes,
+  'fusion.facts.': messages.facts,
   'fusion.': messages.fusionState,
   'quality.set.': messages.qualityState,
   'stream.complete.': messages.streamComplete,
@@ -40,6 +41,7 @@ const optionalFields = new Set([
   'temperature_range',
   'over_range',
   'under_range',
+  'hues',
 ]);
 /** What a viewer sends, or only a sender of blocks is sent. */
 const notForViewers = ['camera.set', 'stream.ack', 'ingest.'];
@@ -70,7 +72,11 @@ describe('Golden messages', () => {
     const source = JSON.parse(text(`messages/${name}`)) as { params?: object; result?: object };
     const body = source.params ?? source.result ?? {};
     // In its place both methods and palettes would do.
-    const optional = name === 'hello.brief.notification.json' ? [...optionalFields, 'catalogue'] : [...optionalFields];
+    const optional = [
+      ...optionalFields,
+      ...(name === 'hello.brief.notification.json' ? ['catalogue'] : []),
+      ...(name.startsWith('fusion.facts.') ? ['counts'] : []),
+    ];
     for (const key of Object.keys(body).filter((name) => !optional.includes(name))) {
       const { [key as keyof typeof body]: _left, ...rest } = body;
       expect(() => reader?.(rest, name), key).toThrow(key);
@@ -111,6 +117,10 @@ describe('Golden frames', () => {
       triangles?: number[][];
       colours?: number[][];
       marks?: number[];
+      visible?: number[][];
+      scale?: number;
+      offset?: number;
+      codes?: number[];
     };
     const { payload, tile, ...fields } = frame;
     const nullIfNone = (value: number) => (Number.isNaN(value) ? null : value);
@@ -139,6 +149,16 @@ describe('Golden frames', () => {
         (expected.colours ?? []).flatMap((rgb, i) => [...rgb, expected.marks?.[i] === 1 ? 0 : 255]),
       );
       expect([...decoded.rgba].some((alpha, i) => i % 4 === 3 && alpha === 0)).toBe(expected.marks !== undefined);
+    } else if (frame.kind === FrameKind.visible || frame.kind === FrameKind.visible_subtract_green) {
+      const transform = frame.kind === FrameKind.visible ? 'none' : 'subtract_green';
+      const decoded = decodeJob(draco, { kind: 'visible', payload, transform });
+      if (decoded.kind !== 'visible') throw new Error('not visible colours');
+      expect([...decoded.rgb]).toEqual((expected.visible ?? []).flat());
+    } else if (frame.kind === FrameKind.temperature) {
+      const decoded = decodeJob(draco, { kind: 'temperature', payload });
+      if (decoded.kind !== 'temperature') throw new Error('not temperatures');
+      expect([decoded.scale, decoded.offset]).toEqual([Math.fround(expected.scale ?? 0), Math.fround(expected.offset ?? 0)]);
+      expect([...decoded.codes]).toEqual(expected.codes);
     } else if (Object.values<number>(FrameKind).includes(frame.kind)) {
       expect(frame.kind).toBe(FrameKind.remove);
       expect(payload.byteLength).toBe(0);
@@ -161,6 +181,9 @@ describe('Golden frames', () => {
   it('say what is wrong with a payload that is not Draco', () => {
     const payload = new Uint8Array([1, 2, 3, 4]);
     expect(() => decodeJob(draco, { kind: 'colours', payload, transform: 'none' })).toThrow('Draco');
+    expect(() => decodeJob(draco, { kind: 'temperature', payload })).toThrow('no scale and offset');
+    const unscaled = new Uint8Array([0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4]);
+    expect(() => decodeJob(draco, { kind: 'temperature', payload: unscaled })).toThrow('no temperatures');
     expect(() => decodeJob(draco, { kind: 'geometry', payload, origin_m: [0, 0, 0] })).toThrow('not a Draco stream');
   });
 });

@@ -39,6 +39,7 @@ export type QualityChange = wire.QualityChange;
 export type Catalogue = Omit<wire.Catalogue, 'methods'> & { methods: Method[] };
 /** With methods and palettes, or with where they are. */
 export type Hello = Omit<wire.Hello, 'methods' | 'palettes' | 'catalogue'> & (Catalogue | { catalogue: string });
+export type Facts = wire.FactsReply;
 export type Histogram = wire.HistogramReply;
 export type Probe = wire.ProbeReply;
 export type Extreme = wire.Extreme;
@@ -179,6 +180,19 @@ export const hello: Decoder<Hello> = (value, path) => {
 export const fusionState: Decoder<FusionState> = object({ generation: count, fusion });
 
 export const qualityState = object({ quality });
+
+export const facts: Decoder<Facts> = object({
+  finite_count: count,
+  missing_count: count,
+  over_range_count: count,
+  under_range_count: count,
+  min: number,
+  max: number,
+  mean: number,
+  sigma: number,
+  counts: optional(array(count)),
+  hues: optional(array(count)),
+});
 
 export const histogram: Decoder<Histogram> = object({
   edges: array(number),

@@ -78,6 +78,7 @@ export class Session {
         if (this.#firstColours !== null) this.#judge(this.#firstColours);
         this.readings.askFacts();
       },
+      onNotFused: (message) => say(new Error(message)),
       onFailure: drawing.onFailure,
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker ? takePictureWorker() : null);

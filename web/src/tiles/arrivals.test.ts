@@ -33,7 +33,12 @@ beforeEach(() => {
   sequence = 0;
   now = 1000;
   problems = [];
-  tiles = new TileSet(() => ({ setColours: () => undefined, setVisible: () => undefined, dispose: () => undefined }));
+  tiles = new TileSet(() => ({
+    setColours: () => undefined,
+    setRaw: () => undefined,
+    setVisible: () => undefined,
+    dispose: () => undefined,
+  }));
   arrivals = new Arrivals(tiles, (error) => problems.push(error));
   for (const tile of [root, left, right]) {
     arrivals.add(frame(tile, 1), decodedGeometry(), now);

@@ -46,7 +46,7 @@ export class Arrivals {
   drop(tile: TileId): void {
     const key = tileKey(tile);
     this.#waiting.delete(`geometry ${key}`);
-    this.#waiting.delete(`colours ${key}`);
+    for (const kind of ['colours', 'temperature', 'visible']) this.#waiting.delete(`${kind} ${key}`);
     this.#hiding.delete(key);
   }
 
@@ -102,8 +102,12 @@ export class Arrivals {
         this.tiles.addGeometry(frame, result);
         return result.positions.byteLength + (result.indices?.byteLength ?? 0);
       }
-      this.tiles.addColours(frame, result.rgba);
-      return result.rgba.byteLength;
+      if (result.kind === 'colours') {
+        this.tiles.addColours(frame, result.rgba);
+        return result.rgba.byteLength;
+      }
+      this.tiles.addRaw(frame, result);
+      return result.kind === 'visible' ? result.rgb.byteLength : result.codes.byteLength;
     } catch (error) {
       this.onProblem(error);
       return 0;

@@ -7,7 +7,9 @@ import { TileSet } from './tile_set';
 
 const COMPLETE = { generation: 1, scene_revision: 1, tiles: 1, vertices: 1 };
 
-const results: Record<'geometry' | 'colours', DecodeResult> = {
+const results: Record<DecodeResult['kind'], DecodeResult> = {
+  visible: { kind: 'visible', rgb: new Uint8Array(3) },
+  temperature: { kind: 'temperature', codes: new Uint16Array(1), scale: 1, offset: 0 },
   geometry: decodedGeometry(),
   colours: { kind: 'colours', rgba: new Uint8Array(4) },
 };
@@ -33,7 +35,12 @@ beforeEach(() => {
   problems = [];
   wholes = [];
   sequence = 0;
-  tiles = new TileSet(() => ({ setColours: () => undefined, setVisible: () => undefined, dispose: () => undefined }));
+  tiles = new TileSet(() => ({
+    setColours: () => undefined,
+    setRaw: () => undefined,
+    setVisible: () => undefined,
+    dispose: () => undefined,
+  }));
   intake = new FrameIntake(
     tiles,
     {

@@ -71,6 +71,11 @@ export class FrameIntake {
     } else if (frame.kind === FrameKind.colours || frame.kind === FrameKind.colours_subtract_green) {
       const transform = frame.kind === FrameKind.colours ? 'none' : 'subtract_green';
       this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload, transform });
+    } else if (frame.kind === FrameKind.temperature) {
+      this.#decode(`temperature ${key}`, frame, { kind: 'temperature', payload: frame.payload });
+    } else if (frame.kind === FrameKind.visible || frame.kind === FrameKind.visible_subtract_green) {
+      const transform = frame.kind === FrameKind.visible ? 'none' : 'subtract_green';
+      this.#decode(`visible ${key}`, frame, { kind: 'visible', payload: frame.payload, transform });
     } else {
       if (frame.kind === FrameKind.remove) {
         this.#removedAt.set(key, frame.sequence);

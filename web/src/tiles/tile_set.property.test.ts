@@ -55,6 +55,7 @@ class Picture {
       const drawable = {
         visible: false,
         setColours: () => undefined,
+        setRaw: () => undefined,
         setVisible: (visible: boolean) => {
           drawable.visible = visible;
         },

@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, it } from 'vitest';
 import { childTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 import { decodedGeometry, ROOT as root, tileFrame as frame } from './test_tiles';
-import { type Drawable, TileSet } from './tile_set';
+import { type Drawable, TileSet, RawMismatch, type RawLayers } from './tile_set';
 
 const geometry = (vertices = 3) => decodedGeometry(vertices);
 const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fill(shade);
@@ -9,9 +9,13 @@ const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fi
 class FakeDrawable implements Drawable {
   visible = false;
   disposed = false;
+  raw: RawLayers | null = null;
   constructor(public shade: number) {}
   setColours(rgba: Uint8Array): void {
     this.shade = rgba[0] ?? -1;
+  }
+  setRaw(raw: RawLayers): void {
+    this.raw = raw;
   }
   setVisible(visible: boolean): void {
     this.visible = visible;
@@ -472,5 +476,81 @@ describe('TileSet, which of two generations is drawn', () => {
     expect(tiles.wouldHideDetail(frame(root, { generation: 2 }))).toBe(false);
     recolour(root, 3);
     expect(tiles.wouldHideDetail(frame(root, { generation: 4 }))).toBe(false);
+  });
+});
+
+describe('TileSet, raw layers', () => {
+  const child = (octant: number) => childTile(root, octant);
+  const rawFrame = (tile: TileId, part: Partial<TileFrame> = {}) =>
+    frame(tile, { child_mask: masks.get(tileKey(tile)) ?? 0, vertex_count: 3, ...part });
+
+  function addRaw(tile: TileId, part: Partial<TileFrame> = {}): void {
+    tiles.addRaw(rawFrame(tile, part), { kind: 'temperature', codes: new Uint16Array(3), scale: 0.01, offset: 20 });
+    tiles.addRaw(rawFrame(tile, part), { kind: 'visible', rgb: new Uint8Array(9) });
+  }
+
+  it('go to what draws when both are there, and are counted', () => {
+    const top = add(root);
+    tiles.updateSelection();
+    tiles.addRaw(rawFrame(root), { kind: 'visible', rgb: new Uint8Array(9) });
+    expect(top.raw).toBeNull();
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 0 });
+    addRaw(root);
+    expect(top.raw).toMatchObject({ scale: 0.01, offset: 20 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1 });
+  });
+
+  it('of another revision wait for their geometry', () => {
+    const top = add(root);
+    addRaw(root, { revision: 2 });
+    expect(top.raw).toBeNull();
+    const next = add(root, { revision: 2 });
+    expect(next.raw).not.toBeNull();
+  });
+
+  it('that do not fit are refused', () => {
+    add(root);
+    const codes = new Uint16Array(4);
+    expect(() => tiles.addRaw(rawFrame(root), { kind: 'temperature', codes, scale: 1, offset: 0 })).toThrow(RawMismatch);
+    expect(() =>
+      tiles.addRaw(rawFrame(root, { vertex_count: 4 }), { kind: 'temperature', codes, scale: 1, offset: 0 }),
+    ).not.toThrow();
+    expect(() => tiles.addRaw(rawFrame(root, { vertex_count: 4 }), { kind: 'visible', rgb: new Uint8Array(12) })).toThrow(
+      RawMismatch,
+    );
+  });
+
+  it('make a tile without colours while fusing is here, and not before', () => {
+    tiles.addGeometry(frame(root), geometry());
+    addRaw(root);
+    expect(made).toHaveLength(0);
+    tiles.setHere(true);
+    expect(made).toHaveLength(1);
+    expect(made[0]?.visible).toBe(true);
+  });
+
+  it('draw a tile in front of detail that cannot follow the settings here', () => {
+    const top = add(root, { child_mask: 0b11 });
+    const children = [0, 1].map((octant) => add(child(octant)));
+    addRaw(root);
+    addRaw(child(0));
+    tiles.updateSelection();
+    expect(top.visible).toBe(false);
+    tiles.setHere(true);
+    expect([top.visible, ...children.map(({ visible }) => visible)]).toEqual([true, false, false]);
+    addRaw(child(1));
+    tiles.updateSelection();
+    expect([top.visible, ...children.map(({ visible }) => visible)]).toEqual([false, true, true]);
+    // And as before when colours come from the server again.
+    tiles.setHere(false);
+    expect([top.visible, ...children.map(({ visible }) => visible)]).toEqual([false, true, true]);
+  });
+
+  it('are claimed beside their tiles', () => {
+    add(root, { child_mask: 1 });
+    add(child(0));
+    addRaw(child(0));
+    const claims = tiles.claims(10);
+    expect(tiles.rawOf(claims)).toEqual([claims.findIndex(([level]) => level === 1)]);
   });
 });

@@ -1,13 +1,26 @@
-import type { DecodedGeometry, GeometrySummary } from '../decode/messages';
+import type { DecodedGeometry, DecodedTemperature, DecodedVisible, GeometrySummary } from '../decode/messages';
 import type { Vec3 } from '../protocol/messages';
 import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 
 /** What the drawing side keeps for one tile; the tile set owns it and disposes of it. */
 export interface Drawable {
   setColours(rgba: Uint8Array<ArrayBuffer>): void;
+  /** What the sensors saw, from which colours are made here. */
+  setRaw(raw: RawLayers): void;
   setVisible(visible: boolean): void;
   dispose(): void;
 }
+
+/** Both raw layers of a tile, a value per vertex. */
+export interface RawLayers {
+  codes: Uint16Array<ArrayBuffer>;
+  scale: number;
+  offset: number;
+  rgb: Uint8Array<ArrayBuffer>;
+}
+
+/** A raw layer does not fit the tile that it is of. */
+export class RawMismatch extends Error {}
 
 export type CreateDrawable = (geometry: DecodedGeometry, rgba: Uint8Array<ArrayBuffer>) => Drawable;
 
@@ -32,6 +45,8 @@ interface Shown {
   rank: number;
   /** Rank of what was asked for that they answer: what they may hide, and be hidden by, is decided by it. */
   answer: number;
+  /** The drawing side has both raw layers of this geometry. */
+  hasRaw: boolean;
   /** The server that is or was connected knows that this geometry is held here. */
   isKnownToServer: boolean;
 }
@@ -52,6 +67,8 @@ interface TileNode {
   waitingGeometry: { revision: number; geometry: DecodedGeometry; error: DrawnError } | null;
   /** Colours whose geometry is not decoded yet. */
   waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
+  /** Raw layers of which not both are there, or whose geometry is not. */
+  waitingRaw: { revision: number; temperature: DecodedTemperature | null; visible: DecodedVisible | null } | null;
   /** Rank of the oldest colours that stand on the screen when the children are drawn in this tile's place; NOTHING when they cannot be. */
   coverRank: number;
   /** The same when this place is drawn as well as it can be: by the tile itself or by its children, whichever is newer. */
@@ -72,6 +89,8 @@ export interface TileCounts {
 const NOTHING = Number.NEGATIVE_INFINITY;
 /** More than there are generations in one connection. */
 const CONNECTION_RANKS = 2 ** 32;
+/** Of tiles that are fused here: as new as can be. */
+const HERE = Number.MAX_SAFE_INTEGER;
 const OCTANTS = [0, 1, 2, 3, 4, 5, 6, 7] as const;
 
 /**
@@ -81,6 +100,9 @@ const OCTANTS = [0, 1, 2, 3, 4, 5, 6, 7] as const;
  * The children of a tile are drawn in its place when all of them can be (the REPLACE rule of docs/protocol.md) and nothing that is
  * drawn then has older colours than the tile itself. So no old detail ever stands in front of a newer answer, however coarse; where
  * both are equally new the detail wins. A tile that its children replace may keep old colours: it hides nothing that is newer.
+ *
+ * While fusing is here (setHere), tiles with raw layers show whatever is set: they are newer than all others, and a tile needs no colours
+ * to be drawn.
  *
  * A generation that nobody has asked for, because the scene has changed by itself, is the same answer in another version: detail in the
  * version before stays where it is until its own successor has come.
@@ -98,6 +120,7 @@ export class TileSet {
   #versions: [number, number][] = [];
   /** Tiles of this level and beyond are not replaced by their children, unless those are newer. */
   #finestLevel = Infinity;
+  #isHere = false;
 
   constructor(private readonly createDrawable: CreateDrawable) {}
 
@@ -125,6 +148,36 @@ export class TileSet {
       .map(({ id, shown }) => [id.level, id.x, id.y, id.z, shown?.revision ?? 0]);
   }
 
+  /** Of these claims, by their places, those of which both raw layers are here. */
+  rawOf(claims: readonly TileClaim[]): number[] {
+    const hasRaw = ([level, x, y, z]: TileClaim) => this.#nodes.get(tileKey({ level, x, y, z }))?.shown?.hasRaw === true;
+    return claims.flatMap((claim, place) => (hasRaw(claim) ? [place] : []));
+  }
+
+  /** How many tiles are drawn, and how many of them can be fused here. */
+  rawCounts(): { drawn: number; raw: number } {
+    const counts = { drawn: 0, raw: 0 };
+    for (const { shown } of this.#drawn) {
+      if (shown === null) continue;
+      counts.drawn += 1;
+      if (shown.hasRaw) counts.raw += 1;
+    }
+    return counts;
+  }
+
+  /** Tiles are fused here, or their colours come from the server again. */
+  setHere(isHere: boolean): void {
+    if (isHere === this.#isHere) return;
+    this.#isHere = isHere;
+    const nodes = [...this.#nodes.values()].sort((a, b) => b.id.level - a.id.level);
+    for (const node of nodes) {
+      this.#joinRaw(node);
+      node.bestRank = NaN;
+      this.#changed(node);
+    }
+    this.updateSelection();
+  }
+
   /**
    * The server's frames start anew: what is held stays on the screen, but everything that comes is newer, and geometry comes again
    * unless resume() follows.
@@ -136,6 +189,7 @@ export class TileSet {
     for (const node of [...this.#nodes.values()]) {
       node.waitingGeometry = null;
       node.waitingColours = null;
+      node.waitingRaw = null;
       this.#prune(node);
     }
   }
@@ -205,6 +259,23 @@ export class TileSet {
     this.#join(node);
   }
 
+  addRaw(frame: TileFrame, layer: DecodedTemperature | DecodedVisible): void {
+    const length = layer.kind === 'visible' ? layer.rgb.length / 3 : layer.codes.length;
+    if (length !== frame.vertex_count) {
+      throw new RawMismatch(
+        `tile ${tileKey(frame.tile)}: a raw layer of ${length} vertices for a geometry of ${frame.vertex_count}`,
+      );
+    }
+    const node = this.#node(frame.tile);
+    this.#setChildMask(node, frame.child_mask);
+    if (node.waitingRaw?.revision !== frame.revision) {
+      node.waitingRaw = { revision: frame.revision, temperature: null, visible: null };
+    }
+    if (layer.kind === 'visible') node.waitingRaw.visible = layer;
+    else node.waitingRaw.temperature = layer;
+    this.#joinRaw(node);
+  }
+
   /** True when these colours, once added, would put the tile on the screen in the place of older detail that stands there now. */
   wouldHideDetail(frame: TileFrame): boolean {
     const node = this.#nodes.get(tileKey(frame.tile));
@@ -212,7 +283,7 @@ export class TileSet {
       node !== undefined &&
       node.shown !== null &&
       node.replacedIn === this.#selectionCount &&
-      node.coverRank >= node.shown.answer &&
+      node.coverRank >= this.#answerOf(node.shown) &&
       node.coverRank < this.#answer(frame.generation)
     );
   }
@@ -220,7 +291,7 @@ export class TileSet {
   /** False while the tile is held and is to be drawn itself rather than its children. */
   isReplaced(id: TileId): boolean {
     const node = this.#nodes.get(tileKey(id));
-    return node === undefined || node.shown === null || node.coverRank >= node.shown.answer;
+    return node === undefined || node.shown === null || node.coverRank >= this.#answerOf(node.shown);
   }
 
   remove(id: TileId): void {
@@ -324,6 +395,19 @@ export class TileSet {
     return this.#rank(generation);
   }
 
+  #answerOf(shown: Shown | null): number {
+    if (shown === null) return NOTHING;
+    return this.#isHere && shown.hasRaw ? HERE : shown.answer;
+  }
+
+  /** Nothing that the tile stands for has newer colours. */
+  #isAsNewAsBelow(node: TileNode): boolean {
+    const answer = this.#answerOf(node.shown);
+    const isOlder = (child: TileNode | undefined): boolean =>
+      child !== undefined && (this.#answerOf(child.shown) > answer || child.children.some(isOlder));
+    return !node.children.some(isOlder);
+  }
+
   /** From an earlier connection: drawn until its successor is complete, never changed. */
   #isStale(shown: Shown): boolean {
     return shown.rank < this.#rank(0);
@@ -344,6 +428,7 @@ export class TileSet {
       shown: null,
       waitingGeometry: null,
       waitingColours: null,
+      waitingRaw: null,
       coverRank: NOTHING,
       bestRank: NOTHING,
       replacedIn: 0,
@@ -364,6 +449,49 @@ export class TileSet {
 
   /** Brings together what has come of a tile, as far as it fits together. */
   #join(node: TileNode): void {
+    this.#joinColours(node);
+    this.#joinRaw(node);
+  }
+
+  #joinRaw(node: TileNode): void {
+    const { shown, waitingGeometry, waitingRaw } = node;
+    if (waitingRaw === null) return;
+    const { revision, temperature, visible } = waitingRaw;
+    if (temperature === null || visible === null) return;
+    const { codes, scale, offset } = temperature;
+    const raw: RawLayers = { codes, scale, offset, rgb: visible.rgb };
+    if (shown !== null && shown.revision === revision && waitingGeometry?.revision !== revision) {
+      node.waitingRaw = null;
+      checkRaw(node, raw, shown.geometry);
+      shown.drawable.setRaw(raw);
+      shown.hasRaw = true;
+      this.#changed(node);
+    } else if (this.#isHere && waitingGeometry !== null && waitingGeometry.revision === revision) {
+      node.waitingRaw = null;
+      node.waitingGeometry = null;
+      const { geometry, error } = waitingGeometry;
+      checkRaw(node, raw, geometry.summary);
+      shown?.drawable.dispose();
+      // Its colours are made before it is drawn.
+      const drawable = this.createDrawable(geometry, new Uint8Array(4 * geometry.summary.vertex_count));
+      drawable.setRaw(raw);
+      const rank = this.#rank(0);
+      node.shown = {
+        drawable,
+        geometry: geometry.summary,
+        revision,
+        error,
+        rank,
+        answer: rank,
+        hasRaw: true,
+        isKnownToServer: true,
+      };
+      if (node.isDrawn) drawable.setVisible(true);
+      this.#arrived(node);
+    }
+  }
+
+  #joinColours(node: TileNode): void {
     const { shown, waitingGeometry, waitingColours } = node;
     if (waitingColours === null) return;
     const { revision, generation, rgba } = waitingColours;
@@ -386,7 +514,7 @@ export class TileSet {
       const drawable = this.createDrawable(geometry, rgba);
       error.rounding_levels = roundingOf(rgba);
       const answer = this.#answer(generation);
-      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, answer, isKnownToServer: true };
+      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, answer, hasRaw: false, isKnownToServer: true };
       if (node.isDrawn) drawable.setVisible(true);
       this.#arrived(node);
     }
@@ -402,6 +530,7 @@ export class TileSet {
     node.shown = null;
     node.waitingGeometry = null;
     node.waitingColours = null;
+    node.waitingRaw = null;
     node.child_mask = 0;
     node.isDrawn = false;
     node.isEnd = false;
@@ -425,15 +554,15 @@ export class TileSet {
     this.#selectionDirty = true;
     for (let at: TileNode | null = node; at !== null; at = at.parent) {
       at.coverRank = coverRankOf(at);
-      const bestRank = Math.max(at.coverRank, at.shown?.answer ?? NOTHING);
+      const bestRank = Math.max(at.coverRank, this.#answerOf(at.shown));
       if (bestRank === at.bestRank) return;
       at.bestRank = bestRank;
     }
   }
 
   #select(node: TileNode): void {
-    const isFineEnough = node.id.level >= this.#finestLevel && isAsNewAsBelow(node);
-    if (node.shown !== null && (node.coverRank < node.shown.answer || isFineEnough)) {
+    const isFineEnough = node.id.level >= this.#finestLevel && this.#isAsNewAsBelow(node);
+    if (node.shown !== null && (node.coverRank < this.#answerOf(node.shown) || isFineEnough)) {
       this.#drawn.add(node);
       if (node.isDrawn) return;
       node.isDrawn = true;
@@ -463,20 +592,19 @@ function checkLength(node: TileNode, rgba: Uint8Array, { vertex_count }: Geometr
   throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for a geometry of ${vertex_count}`);
 }
 
+function checkRaw(node: TileNode, { codes, rgb }: RawLayers, { vertex_count }: GeometrySummary): void {
+  if (codes.length === vertex_count && rgb.length === 3 * vertex_count) return;
+  throw new RawMismatch(
+    `tile ${node.key}: temperatures of ${codes.length} and colours of ${rgb.length / 3} vertices for a geometry of ${vertex_count}`,
+  );
+}
+
 function octantOf(id: TileId): number {
   return (id.x & 1) + (id.y & 1) * 2 + (id.z & 1) * 4;
 }
 
 function isHeld(node: TileNode): boolean {
   return node.shown !== null || node.waitingGeometry !== null || node.waitingColours !== null;
-}
-
-/** Nothing that the tile stands for has newer colours. */
-function isAsNewAsBelow(node: TileNode): boolean {
-  const answer = node.shown?.answer ?? NOTHING;
-  const isOlder = (child: TileNode | undefined): boolean =>
-    child !== undefined && ((child.shown?.answer ?? NOTHING) > answer || child.children.some(isOlder));
-  return !node.children.some(isOlder);
 }
 
 function coverRankOf(node: TileNode): number {

@@ -1,10 +1,11 @@
 import type { DecodedGeometry } from '../decode/messages';
-import type { CameraPose, Vec3 } from '../protocol/messages';
+import type { SceneFacts } from '../fusion/fusion_module';
+import type { CameraPose, FusionChange, Vec3 } from '../protocol/messages';
 import { directionInScene, distanceOf, type Look, lookAt, toView, worldFromCamera } from '../view/look';
 import type { Steering } from '../view/steering';
 import { UP, type UpAxis, type View } from './first_view';
 import type { SightWish } from '../draw/clear_sight';
-import type { GpuObjects, RenderCommand, RenderReply, RenderRequest } from '../draw/render_messages';
+import type { GpuObjects, ProbedVertex, RenderCommand, RenderReply, RenderRequest } from '../draw/render_messages';
 import { type RenderPort, startRenderingHere, startRenderWorker } from '../draw/render_port';
 import { MotionPace, type Notch } from './motion_pace';
 import type { Drawable } from '../tiles/tile_set';
@@ -30,6 +31,8 @@ export interface ViewportEvents {
   onContext: (isLost: boolean) => void;
   /** The first picture with any of the scene in it stands on the screen. */
   onFirstPicture: () => void;
+  /** Tiles cannot be fused here. */
+  onNotFused: (message: string) => void;
   /** The drawing side has failed; `everDrew` false: it could not even start. */
   onFailure: (message: string, everDrew: boolean) => void;
 }
@@ -143,6 +146,7 @@ export class Viewport {
       ...(indices === null ? [] : [indices.buffer]),
     ]);
     return {
+      setRaw: (raw) => this.#change({ change: 'raw', tile, raw }, [raw.codes.buffer, raw.rgb.buffer]),
       setColours: (next) => this.#change({ change: 'colours', tile, rgba: next }, [next.buffer]),
       setVisible: (visible) => {
         if (visible && !this.#hasShown) {
@@ -153,6 +157,24 @@ export class Viewport {
       },
       dispose: () => this.#change({ change: 'dispose', tile }),
     };
+  }
+
+  /** What tiles with raw arrays are fused with here. */
+  startFusing(module: WebAssembly.Module): void {
+    this.#change({ change: 'module', module });
+  }
+  setFacts(facts: SceneFacts): void {
+    this.#change({ change: 'facts', facts });
+  }
+  /** Null: tiles keep the colours that they are given. */
+  fuse(settings: FusionChange | null): void {
+    this.#change({ change: 'fuse', settings });
+  }
+
+  /** The vertex of what is drawn that is nearest to a point, by the raw arrays that are here. */
+  async probe(point: Vec3): Promise<ProbedVertex | null> {
+    const reply = await this.#ask((id) => ({ kind: 'probe', id, point }));
+    return reply.kind === 'probed' ? reply.vertex : null;
   }
 
   get aspect(): number {
@@ -483,6 +505,9 @@ export class Viewport {
         break;
       case 'context':
         this.events.onContext(reply.isLost);
+        break;
+      case 'not_fused':
+        this.events.onNotFused(reply.message);
         break;
       case 'failed':
         this.events.onFailure(reply.message, this.#drawn > 0);
