@@ -56,8 +56,13 @@ export function startBrowser() {
 }
 
 /** Opens the client in a browser or one of its contexts; `problems` collects what the browser complained about (a breach of the content policy among it). */
-export async function openClient(browser, url, viewport = { width: 1440, height: 900 }) {
+export async function openClient(browser, url, viewport = { width: 1440, height: 900 }, { fusing = 'robot' } = {}) {
   const page = await browser.newPage(viewport === null ? undefined : { viewport });
+  // Colours come from the robot unless a test is about something else: what a setting costs is counted then.
+  await page.addInitScript((kept) => {
+    if (location.protocol === 'about:') return;
+    if (localStorage.getItem('spectra.preferences') === null) localStorage.setItem('spectra.preferences', kept);
+  }, JSON.stringify({ fusing }));
   const problems = [];
   page.on('console', (message) => {
     if (message.type() === 'error' || message.type() === 'warning') problems.push(message.text());

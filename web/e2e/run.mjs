@@ -20,6 +20,7 @@ import {
 } from './harness.mjs';
 import { addAccessTests } from './access.mjs';
 import { addAccuracyTests } from './accuracy.mjs';
+import { addFusingTests } from './fusing.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLiveTests } from './live.mjs';
@@ -515,6 +516,7 @@ test('Nothing broke the content policy', () => {
 });
 
 addAccuracyTests(browser);
+addFusingTests(browser);
 addLayoutTests(browser);
 addLinkTests(browser);
 addLiveTests(browser);

@@ -130,7 +130,7 @@ export class PictureRenderer {
       case 'picture':
         this.#eye = request.eye;
         for (const command of request.commands) this.#apply(command);
-        this.#fuseShown();
+        this.#fuseTiles(({ isShown }) => isShown);
         this.#newest = request.number;
         this.#resolution = request.resolution;
         this.#isInParts = !request.isMoving;
@@ -166,10 +166,11 @@ export class PictureRenderer {
       case 'colours': {
         const tile = this.#tiles.get(command.tile);
         if (tile === undefined) break;
+        // While tiles are fused here, these may be of settings of before.
+        if (this.#fusing !== 0 && tile.raw !== null) break;
         tile.colours.array = command.rgba;
         tile.colours.needsUpdate = true;
-        // While tiles are fused here, these are of the same settings.
-        tile.fusedWith = this.#fusing;
+        tile.fusedWith = 0;
         break;
       }
       case 'raw': {
@@ -187,8 +188,12 @@ export class PictureRenderer {
         break;
       case 'fuse': {
         const { settings } = command;
-        this.#fusing = 0;
-        if (settings === null) break;
+        if (settings === null) {
+          // Hidden tiles, too, keep what was set last.
+          this.#fuseTiles(() => true);
+          this.#fusing = 0;
+          break;
+        }
         this.#orSay(() => {
           if (this.#fuser === null) throw new Error('the library is not there');
           this.#fuser.setSettings(settings);
@@ -227,13 +232,13 @@ export class PictureRenderer {
     }
   }
 
-  /** All tiles that are seen change in the same picture, those that are not when they are. */
-  #fuseShown(): void {
+  /** Tiles that are seen change all in the same picture, those that are not when they are. */
+  #fuseTiles(isWanted: (tile: Tile) => boolean): void {
     const fuser = this.#fuser;
     if (this.#fusing === 0 || fuser === null) return;
     this.#orSay(() => {
       for (const tile of this.#tiles.values()) {
-        if (!tile.isShown || tile.raw === null || tile.fusedWith === this.#fusing) continue;
+        if (tile.raw === null || tile.fusedWith === this.#fusing || !isWanted(tile)) continue;
         fuser.fuse(tile.raw, tile.colours.array as Uint8Array, this.#isOutlined);
         tile.colours.needsUpdate = true;
         tile.fusedWith = this.#fusing;

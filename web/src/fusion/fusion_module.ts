@@ -138,7 +138,12 @@ export class FusionModule {
     return new FusionModule((await WebAssembly.instantiate(bytes, {})).instance);
   }
 
-  /** The same of a module that is compiled already. */
+  /** The same of a module that is compiled already, where the page may not wait. */
+  static async instantiate(module: WebAssembly.Module): Promise<FusionModule> {
+    return new FusionModule(await WebAssembly.instantiate(module, {}));
+  }
+
+  /** The same in a worker. */
   static start(module: WebAssembly.Module): FusionModule {
     return new FusionModule(new WebAssembly.Instance(module, {}));
   }

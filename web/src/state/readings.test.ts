@@ -1,3 +1,4 @@
+import type { ProbedVertex } from '../draw/render_messages';
 import { readFileSync } from 'node:fs';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { CameraPose, Extremes, Hello, Probe, Scene, Vec3 } from '../protocol/messages';
@@ -29,7 +30,7 @@ function setUp() {
     refuse: (error: Error) => Promise<void>;
   }[] = [];
   const seen = { extremes: [] as (Extremes | null)[], problems: [] as unknown[], aimed: [] as Vec3[] };
-  const picture = { under: [1, 2, 3] as Vec3 | null, shift: 0 };
+  const picture = { under: [1, 2, 3] as Vec3 | null, shift: 0, vertex: null as ProbedVertex | null };
   const readings = new Readings(
     store,
     {
@@ -55,6 +56,7 @@ function setUp() {
         }),
       onExtremes: (extremes) => seen.extremes.push(extremes),
       onProblem: (error) => seen.problems.push(error),
+      probeHere: () => Promise.resolve(picture.vertex),
     },
   );
   return { store, readings, asked, seen, picture };
@@ -144,5 +146,25 @@ describe('Readings', () => {
     store.marksShown = false;
     expect(await readings.extremesInView(camera, [0, 0, 1, 1])).toBeNull();
     expect(asked).toHaveLength(2);
+  });
+});
+
+describe('Readings without a link', () => {
+  it('are those of the nearest vertex that is here, where colours are made here', async () => {
+    const { store, readings, asked, picture } = setUp();
+    store.link = { phase: 'connecting', attempt: 2 };
+    picture.vertex = { position: [1, 2, 4], temperature: Infinity, visible: [1, 2, 3], fused: [4, 5, 6], distance: 1 };
+    await readings.pin({ x: 5, y: 6 });
+    expect(asked).toHaveLength(0);
+    expect(store.pinned?.reading.probe).toMatchObject({
+      position: [1, 2, 4],
+      temperature: null,
+      temperature_range: 'over',
+      fused: [4, 5, 6],
+    });
+    picture.vertex = null;
+    store.pinned = null;
+    await readings.pin({ x: 5, y: 6 });
+    expect(store.pinned).toBeNull();
   });
 });

@@ -1,6 +1,7 @@
-import { type CameraPose, type Extremes, extremes, histogram, probe, type Vec3 } from '../protocol/messages';
+import { type CameraPose, type Extremes, extremes, histogram, type Probe, probe, type Vec3 } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { RpcError } from '../transport/connection';
+import type { ProbedVertex } from '../draw/render_messages';
 import type { Window } from '../view/markers';
 import type { Store } from './store.svelte';
 
@@ -25,6 +26,8 @@ export interface ReadingsSession {
   request: (method: string, params: object) => Promise<unknown>;
   onExtremes: (extremes: Extremes | null) => void;
   onProblem: (error: unknown) => void;
+  /** The nearest vertex of what is drawn, where raw values of it are here; null where not. */
+  probeHere: (point: Vec3) => Promise<ProbedVertex | null>;
 }
 
 /** What is read of the scene: its histogram and extremes, the place under the pointer, and the one that is pinned; in the store. */
@@ -104,7 +107,7 @@ export class Readings {
       this.store.hover = null;
       return;
     }
-    if (this.store.connected) this.#hoverAsker.push(place);
+    if (this.store.connected || this.store.fusingPlace === 'here') this.#hoverAsker.push(place);
   }
 
   /** Reads the scene at a place of the canvas and keeps the reading on the screen; where nothing is, none is kept. */
@@ -115,7 +118,8 @@ export class Readings {
         this.store.pinned = null;
         return;
       }
-      const answer = probe(await this.session.request('scene.probe', { position: point }), 'scene.probe');
+      const answer = await this.#probe(point);
+      if (answer === null) return;
       this.store.pinned = { reading: { ...place, probe: answer }, place: this.picture.project(answer.position) };
     } catch (error) {
       this.session.onProblem(error);
@@ -142,11 +146,25 @@ export class Readings {
     }
   }
 
+  /** At full accuracy by the robot; without a link by what is here, if anything is. */
+  async #probe(point: Vec3): Promise<Probe | null> {
+    if (this.store.connected) return probe(await this.session.request('scene.probe', { position: point }), 'scene.probe');
+    const vertex = await this.session.probeHere(point);
+    if (vertex === null) return null;
+    const { temperature, ...rest } = vertex;
+    return {
+      ...rest,
+      vertex_index: 0,
+      temperature: Number.isFinite(temperature) ? temperature : null,
+      ...(Math.abs(temperature) === Infinity ? { temperature_range: temperature > 0 ? 'over' : 'under' } : {}),
+    };
+  }
+
   async #askHover(place: Place): Promise<void> {
     try {
       const point = await this.picture.pick(place.x, place.y);
       if (point !== null) this.picture.aimAt(point);
-      const answer = point && probe(await this.session.request('scene.probe', { position: point }), 'scene.probe');
+      const answer = point && (await this.#probe(point));
       this.store.hover = answer === null || !this.#isHovering ? null : { ...place, probe: answer };
     } catch {
       this.store.hover = null;

@@ -13,7 +13,7 @@ import {
 } from '../protocol/messages';
 import type { Insets, UpAxis, View } from '../view/first_view';
 import { FrameIntake } from '../tiles/frame_intake';
-import { TileSet } from '../tiles/tile_set';
+import { RawMismatch, TileSet } from '../tiles/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../view/viewport';
 import { mustLogIn } from '../transport/access';
 import { CatalogueLoader } from '../transport/catalogue_loader';
@@ -24,6 +24,7 @@ import { flightTo } from '../view/flight';
 import { highlightContrast } from '../view/highlight_contrast';
 import { Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
+import { Fusing, type FusingWish } from './fusing';
 import { Progress } from './progress';
 import { QualityWish } from './quality_wish';
 import { Readings } from './readings';
@@ -42,6 +43,7 @@ export class Session {
   readonly settings: Settings;
   readonly quality: QualityWish;
   readonly readings: Readings;
+  readonly fusing: Fusing;
   readonly #connection: Connection;
   readonly #catalogue: CatalogueLoader;
   readonly #subscription: Subscription;
@@ -78,7 +80,7 @@ export class Session {
         if (this.#firstColours !== null) this.#judge(this.#firstColours);
         this.readings.askFacts();
       },
-      onNotFused: (message) => say(new Error(message)),
+      onNotFused: (message) => this.fusing.failed(`Fusing here has failed: ${message}`),
       onFailure: drawing.onFailure,
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker ? takePictureWorker() : null);
@@ -91,10 +93,22 @@ export class Session {
         store.upAxis = up;
       },
     );
+    this.fusing = new Fusing(store, this.tiles, this.viewport, {
+      request,
+      resubscribe: () => void this.#subscription.channelsChanged(),
+      isBusy: () => this.settings.busy,
+      onHighlighted: (highlighted) => {
+        if (store.histogram === null) return;
+        // Of the surface only the robot knows the share.
+        const { highlighted_share: _share, ...rest } = store.histogram;
+        store.histogram = { ...rest, highlighted };
+      },
+    });
     this.readings = new Readings(store, this.viewport, {
       request,
       onExtremes: (found) => this.#markers.extremesAre(found),
       onProblem: say,
+      probeHere: async (point) => (this.fusing.isHere ? this.viewport.probe(point) : null),
     });
     this.#markers = new Markers(
       this.viewport,
@@ -144,6 +158,7 @@ export class Session {
       onChange,
       onInForce: () => this.readings.askHistogram(),
       onProblem: say,
+      fuseHere: (wanted) => this.fusing.apply(wanted),
     });
     this.quality = new QualityWish(store, {
       request,
@@ -180,6 +195,7 @@ export class Session {
       progress: this.#progress,
       look: this.#look,
       catalogue: this.#catalogue,
+      fusing: this.fusing,
     };
     this.#subscription = new Subscription(store, url, concerned, {
       request,
@@ -207,6 +223,10 @@ export class Session {
 
   setQuality(change: QualityChange): void {
     this.quality.set(change);
+  }
+
+  setFusing(wish: FusingWish): void {
+    this.fusing.setWish(wish);
   }
 
   setOutline(wish: OutlineWish): void {
@@ -303,7 +323,10 @@ export class Session {
         const { generation, fusion } = fusionState(params, method);
         // Nobody has asked for it: the scene has changed by itself.
         if (store.wanted === null && !this.settings.busy) this.tiles.isVersion(generation);
-        this.settings.inForce(generation, fusion);
+        this.fusing.factsChanged();
+        // What is fused here is what is set here.
+        if (this.fusing.isHere) store.generation = Math.max(store.generation, generation);
+        else this.settings.inForce(generation, fusion);
         break;
       }
       case 'stream.complete':
@@ -365,6 +388,7 @@ export class Session {
     this.store.shown = this.tiles.counts();
     this.#markers.update();
     this.#progress.completed(message);
+    this.fusing.completed();
   }
 
   #cameraMoved(pose: CameraPose): void {
@@ -381,6 +405,7 @@ export class Session {
     this.store.now = performance.now();
     this.#progress.tick();
     this.#sayError();
+    this.fusing.consider();
   }
 
   /** What the status says of the picture, as soon as the picture is another one. */
@@ -397,6 +422,7 @@ export class Session {
 
   #say(error: unknown): void {
     if (error instanceof ConnectionLost || error instanceof Superseded) return;
+    if (error instanceof RawMismatch) this.fusing.failed(error.message);
     const message = error instanceof Error ? error.message : String(error);
     console.warn(message);
     this.store.failure = message;

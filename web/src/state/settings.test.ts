@@ -1,4 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { FusionRefusal } from '../fusion/fusion_module';
 import type { Fusion, FusionChange } from '../protocol/messages';
 import { BUSY, ConnectionLost, RpcError } from '../transport/connection';
 import { Settings } from './settings';
@@ -32,6 +33,7 @@ function setUp() {
   const asked: Asked[] = [];
   const problems: unknown[] = [];
   const events = { changes: 0, inForce: 0 };
+  let here: (wanted: Fusion) => Fusion | null = () => null;
   const later = () => vi.advanceTimersByTimeAsync(0);
   const settings = new Settings(store, {
     request: (method, params) =>
@@ -52,9 +54,13 @@ function setUp() {
     onChange: () => (events.changes += 1),
     onInForce: () => (events.inForce += 1),
     onProblem: (error) => problems.push(error),
+    fuseHere: (wanted) => here(wanted),
   });
   expect(settings.greeted(fusionWith(0.5), false)).toBeNull();
-  return { store, settings, asked, problems, events };
+  const fuseHere = (how: typeof here) => {
+    here = how;
+  };
+  return { store, settings, asked, problems, events, fuseHere };
 }
 
 describe('Settings', () => {
@@ -255,5 +261,58 @@ describe('Settings', () => {
     await asked.at(-1)?.answer(4, { ...fusionWith(0.5), range: { mode: 'manual', min: 11, max: 28 } });
     settings.toggleRangeLock();
     expect(asked.at(-1)?.change).toEqual({ range: percentiles });
+  });
+});
+
+describe('Settings that are fused here', () => {
+  beforeEach(() => {
+    vi.useFakeTimers();
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+  });
+
+  const shownBy = (wanted: Fusion): Fusion => ({ ...wanted, params_in_force: { ...wanted.params, made: 'here' } });
+
+  it('are in force at once, and the server is told at its leisure', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere(shownBy);
+    for (let i = 0; i < 50; i += 1) {
+      settings.setParameter('alpha', i / 50, true);
+      expect(store.fusion?.params['alpha']).toBe(i / 50);
+      expect(store.wanted).toBeNull();
+      await vi.advanceTimersByTimeAsync(20);
+      await asked.at(-1)?.answer(3, fusionWith(0.4));
+    }
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(asked.length).toBeLessThanOrEqual(3);
+    expect(asked.at(-1)?.change.params).toMatchObject({ alpha: 49 / 50 });
+    // What the server says of it is known already.
+    expect(store.fusion?.params['alpha']).toBe(49 / 50);
+    expect(store.generation).toBe(3);
+  });
+
+  it('are in force without a link', () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    store.link = { phase: 'connecting', attempt: 3 };
+    fuseHere(shownBy);
+    settings.setParameter('alpha', 0.9, true);
+    expect(store.fusionInForce?.params['alpha']).toBe(0.9);
+    expect(store.wanted).toBeNull();
+    expect(asked).toHaveLength(0);
+  });
+
+  it('are refused here in the words of the library', () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere(() => {
+      throw new FusionRefusal(103, 'alpha', 'alpha must be a number');
+    });
+    settings.setParameter('alpha', 7, true);
+    expect(store.refusals).toEqual({ 'params.alpha': 'alpha must be a number' });
+    expect(store.fusion).toEqual(fusionWith(0.4));
+    expect(asked).toHaveLength(0);
   });
 });

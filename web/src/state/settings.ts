@@ -1,6 +1,7 @@
 import { type Fusion, type FusionChange, fusionState, type ParameterValue, type RangeChange } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, RpcError } from '../transport/connection';
+import { FusionRefusal } from '../fusion/fusion_module';
 import { mergedChange, rangeChange, wholeChange } from './fusion_change';
 import { unmeasuredColour } from './unmeasured';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
@@ -8,6 +9,8 @@ import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } fro
 /** Least time between two changes of the settings. */
 const CHANGE_INTERVAL_MS = 33;
 const BUSY_WAIT_MS = 300;
+/** The same of changes that are shown already: the server is told so that other things keep up. */
+const TELL_INTERVAL_MS = 1000;
 /** All but the outermost temperatures, where the server has named no others. */
 const FIRST_PERCENTILES: RangeChange = { mode: 'percentile', low: 0.5, high: 99.5 };
 
@@ -21,6 +24,8 @@ export interface SettingsSession {
   onInForce: () => void;
   /** Anything but a refusal. */
   onProblem: (error: unknown) => void;
+  /** Shows settings by what is here; null when the robot has to. Throws FusionRefusal. */
+  fuseHere: (wanted: Fusion) => Fusion | null;
 }
 
 /**
@@ -29,6 +34,8 @@ export interface SettingsSession {
  */
 export class Settings {
   readonly #sender: Coalescer<FusionChange>;
+  /** Of what is fused here. */
+  readonly #teller: Coalescer<FusionChange>;
   #rememberedParams = new Map<string, Record<string, ParameterValue>>();
   #lastFusedMethod: string | null = null;
   /** How the range followed the scene before it was held, and which percentiles it last had. */
@@ -50,11 +57,17 @@ export class Settings {
         store.wanted = null;
       },
     });
+    this.#teller = new Coalescer({
+      send: (change) => this.#tell(change),
+      merge: mergedChange,
+      interval_ms: TELL_INTERVAL_MS,
+      max_in_flight: 1,
+    });
   }
 
   /** True while a change waits or is unanswered. */
   get busy(): boolean {
-    return this.#sender.busy;
+    return this.#sender.busy || this.#teller.busy;
   }
 
   // Actions of the interface
@@ -134,6 +147,7 @@ export class Settings {
     const chosen = isReturning && this.#hasChosen ? (store.fusion ?? store.fusionInForce) : null;
     const before = chosen === null ? null : wholeChange(chosen);
     this.#sender.reset();
+    this.#teller.reset();
     store.fusionInForce = fusion;
     store.wanted = before;
     store.refusals = {};
@@ -186,10 +200,47 @@ export class Settings {
     this.#hasChosen = true;
     store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
     store.refusals = {};
-    if (!store.connected) return;
+    if (this.#isShownHere(change, isSettled) || !store.connected) return;
     this.session.onChange();
     this.#sender.push(change);
     if (isSettled) this.#sender.flush();
+  }
+
+  /** Fused here, or refused here: nothing is left to ask the server for. */
+  #isShownHere(change: FusionChange, isSettled: boolean): boolean {
+    const { store } = this;
+    if (store.fusion === null) return false;
+    try {
+      const inForce = this.session.fuseHere(store.fusion);
+      if (inForce === null) return false;
+      store.fusionInForce = inForce;
+      this.#rememberFused(inForce);
+    } catch (error) {
+      if (!(error instanceof FusionRefusal)) throw error;
+      store.wanted = null;
+      const field = error.field in (store.fusion?.params ?? {}) ? `params.${error.field}` : error.field;
+      store.refusals = { [field]: error.message };
+      return true;
+    }
+    store.wanted = null;
+    store.pictureMethod = store.fusionInForce.method;
+    if (store.connected) {
+      this.#teller.push(change);
+      if (isSettled && change.method !== undefined) this.#teller.flush();
+    }
+    return true;
+  }
+
+  /** The server keeps up with what is shown here; what it answers is known already. */
+  async #tell(change: FusionChange): Promise<void> {
+    try {
+      const { generation } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      this.store.generation = Math.max(this.store.generation, generation);
+    } catch (error) {
+      if (error instanceof RpcError && error.code === BUSY) this.#teller.push(change);
+      else if (error instanceof RpcError) this.refused(error);
+      else this.session.onProblem(error);
+    }
   }
 
   /** What is to be said of vertices without temperature beside another method or palette. */

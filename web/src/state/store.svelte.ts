@@ -47,6 +47,9 @@ export function viewModeOf(method: string): ViewMode {
 /** Whether a line is drawn around what is highlighted; automatic: where colours alone do not show it to everybody. */
 export type OutlineWish = 'automatic' | 'on' | 'off';
 
+/** Where colours are made; coming: raw layers are on their way here. */
+export type FusingPlace = 'robot' | 'coming' | 'here';
+
 /** A picture that takes longer to show another method is said to be behind it. */
 const PENDING_AFTER_MS = 500;
 
@@ -92,6 +95,13 @@ export class Store {
   /** Readings pinned by a click, newest last. */
   pinned = $state.raw<{ reading: Reading; place: { x: number; y: number } | null } | null>(null);
   probing = $state(false);
+
+  fusingWish = $state<'automatic' | 'here' | 'robot'>('automatic');
+  fusingPlace = $state<FusingPlace>('robot');
+  /** Share of the drawn tiles whose raw layers are here. */
+  rawShare = $state(0);
+  /** Why colours are not made here though they are wanted to be. */
+  fusingProblem = $state<string | null>(null);
 
   stats = $state.raw<StreamStats | null>(null);
   statuses = $state.raw<Status[]>([]);

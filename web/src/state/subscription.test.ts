@@ -32,7 +32,7 @@ function setUp() {
   let settle: () => void = () => undefined;
   const sent = { wait: false };
   const concerned = {
-    tiles: { clear: note('tiles cleared', undefined), claims: () => claims, resume: vi.fn() },
+    tiles: { clear: note('tiles cleared', undefined), rawOf: () => [] as number[], claims: () => claims, resume: vi.fn() },
     intake: { beginConnection: note('intake begins', undefined) },
     settings: {
       greeted: () => before.fusion as never,
@@ -53,6 +53,7 @@ function setUp() {
     progress: { begin: vi.fn() },
     look: { sceneIs: vi.fn() },
     catalogue: { want: vi.fn(), wantNone: vi.fn() },
+    fusing: { greeted: vi.fn(), channels: ['fused'] },
   };
   const subscription = new Subscription(store, 'ws://robot:8080/ws?hello=brief', concerned, {
     request: (method, params) =>

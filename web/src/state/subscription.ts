@@ -2,6 +2,7 @@ import type { FrameIntake } from '../tiles/frame_intake';
 import type { TileSet } from '../tiles/tile_set';
 import type { CatalogueLoader } from '../transport/catalogue_loader';
 import { type FusionChange, type Hello, type Quality, type Scene, subscribed } from '../protocol/messages';
+import type { Fusing } from './fusing';
 import type { FirstLook } from '../view/first_look';
 import { cacheBytes } from './cache_bytes';
 import type { Progress } from './progress';
@@ -15,7 +16,7 @@ const MOST_CLAIMED = 1500;
 
 /** What a connection's beginning concerns. */
 export interface Concerned {
-  tiles: Pick<TileSet, 'clear' | 'claims' | 'resume'>;
+  tiles: Pick<TileSet, 'clear' | 'claims' | 'rawOf' | 'resume'>;
   intake: Pick<FrameIntake, 'beginConnection'>;
   settings: Pick<Settings, 'greeted' | 'send' | 'busy'>;
   quality: Pick<QualityWish, 'greeted' | 'send' | 'askMarks' | 'sceneHasStep'>;
@@ -23,6 +24,7 @@ export interface Concerned {
   progress: Pick<Progress, 'begin'>;
   look: Pick<FirstLook, 'sceneIs'>;
   catalogue: Pick<CatalogueLoader, 'want' | 'wantNone'>;
+  fusing: Pick<Fusing, 'greeted' | 'channels'>;
 }
 
 /** What the subscription needs of the session it belongs to. */
@@ -43,6 +45,8 @@ export class Subscription {
   #catalogueAddress: string | null = null;
   /** Session whose server knows what the tile set claims. */
   #claimableSession: string | null = null;
+  /** The stream of this connection has been asked for. */
+  #isSubscribed = false;
 
   /** `url`: of the socket. */
   constructor(
@@ -57,6 +61,7 @@ export class Subscription {
     const { settings, quality, readings, intake, progress, catalogue } = this.concerned;
     const returning = store.scene !== undefined;
     this.#connectionNumber += 1;
+    this.#isSubscribed = false;
     readings.beginConnection();
 
     store.server = message;
@@ -76,6 +81,7 @@ export class Subscription {
     store.lostAt = null;
     store.statuses = [];
     store.complete = null;
+    this.concerned.fusing.greeted(message.capabilities);
     intake.beginConnection();
     this.#setScene(message.scene, true);
     this.session.tellCamera();
@@ -89,6 +95,17 @@ export class Subscription {
   sceneChanged(scene: Scene | null): void {
     this.#setScene(scene, false);
     this.concerned.progress.begin();
+  }
+
+  /** Other channels are wanted; nothing that is here comes again. */
+  async channelsChanged(): Promise<void> {
+    const greeting = this.store.server;
+    if (greeting === null || !this.#isSubscribed) return;
+    try {
+      await this.session.request('scene.subscribe', this.#params(greeting.capabilities));
+    } catch (error) {
+      this.session.onProblem(error);
+    }
   }
 
   /** What the first picture takes has come, or there will be none: now it is the turn of the rest. */
@@ -108,14 +125,12 @@ export class Subscription {
     if (!settings.busy) this.store.wanted = null;
     const session_id = this.#claimableSession;
     const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED) : [];
+    const raw = greeting.capabilities.includes('raw_layers') ? tiles.rawOf(claims) : [];
     try {
+      this.#isSubscribed = true;
       const answer = await this.session.request('scene.subscribe', {
-        channels: ['fused'],
-        ...(greeting.capabilities.includes('cache_bytes')
-          ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
-          : {}),
-        ...(greeting.capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
-        ...(claims.length > 0 ? { resume: { session_id, tiles: claims } } : {}),
+        ...this.#params(greeting.capabilities),
+        ...(claims.length > 0 ? { resume: { session_id, tiles: claims, ...(raw.length > 0 ? { raw } : {}) } } : {}),
       });
       if (connectionNumber !== this.#connectionNumber) return;
       const { resumed_tiles = 0 } = subscribed(answer, 'scene.subscribe');
@@ -125,6 +140,16 @@ export class Subscription {
     } catch (error) {
       this.session.onProblem(error);
     }
+  }
+
+  #params(capabilities: readonly string[]): object {
+    return {
+      channels: this.concerned.fusing.channels,
+      ...(capabilities.includes('cache_bytes')
+        ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
+        : {}),
+      ...(capabilities.includes('subtract_green') ? { colour_transform: 'subtract_green' } : {}),
+    };
   }
 
   #setScene(next: Scene | null, fresh: boolean): void {

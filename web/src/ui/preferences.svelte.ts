@@ -1,5 +1,6 @@
 /** What a person has chosen about the controls themselves; kept in this browser. */
 
+import type { FusingWish } from '../state/fusing';
 import type { OutlineWish } from '../state/store.svelte';
 
 export type Scheme = 'dark' | 'light';
@@ -8,10 +9,11 @@ interface Kept {
   letterKeys: boolean;
   scheme: Scheme;
   outline: OutlineWish;
+  fusing: FusingWish;
 }
 
 const PLACE = 'spectra.preferences';
-const DEFAULTS: Kept = { letterKeys: true, scheme: 'dark', outline: 'automatic' };
+const DEFAULTS: Kept = { letterKeys: true, scheme: 'dark', outline: 'automatic', fusing: 'automatic' };
 
 /** What was kept, with the default for whatever is not there or not readable. */
 export function keptPreferences(text: string | null): Kept {
@@ -21,6 +23,7 @@ export function keptPreferences(text: string | null): Kept {
       letterKeys: typeof found?.letterKeys === 'boolean' ? found.letterKeys : DEFAULTS.letterKeys,
       scheme: found?.scheme === 'light' || found?.scheme === 'dark' ? found.scheme : DEFAULTS.scheme,
       outline: found?.outline === 'on' || found?.outline === 'off' ? found.outline : DEFAULTS.outline,
+      fusing: found?.fusing === 'here' || found?.fusing === 'robot' ? found.fusing : DEFAULTS.fusing,
     };
   } catch {
     return DEFAULTS;
@@ -61,6 +64,14 @@ class Preferences {
   }
   set outline(outline: OutlineWish) {
     this.#keep({ ...this.#kept, outline });
+  }
+
+  /** Where colours are made. */
+  get fusing(): FusingWish {
+    return this.#kept.fusing;
+  }
+  set fusing(fusing: FusingWish) {
+    this.#keep({ ...this.#kept, fusing });
   }
 
   #keep(kept: Kept): void {

@@ -3,17 +3,18 @@ import { keptPreferences } from './preferences.svelte';
 
 describe('keptPreferences', () => {
   it('reads what was kept', () => {
-    expect(keptPreferences('{"letterKeys":false,"scheme":"light","outline":"off"}')).toEqual({
+    expect(keptPreferences('{"letterKeys":false,"scheme":"light","outline":"off","fusing":"robot"}')).toEqual({
       letterKeys: false,
       scheme: 'light',
       outline: 'off',
+      fusing: 'robot',
     });
   });
 
-  it.each([null, '', 'nonsense', 'null', '[]', '{"letterKeys":"no","scheme":"green","outline":true}'])(
+  it.each([null, '', 'nonsense', 'null', '[]', '{"letterKeys":"no","scheme":"green","outline":true,"fusing":"there"}'])(
     'takes the defaults for %j',
     (text) => {
-      expect(keptPreferences(text)).toEqual({ letterKeys: true, scheme: 'dark', outline: 'automatic' });
+      expect(keptPreferences(text)).toEqual({ letterKeys: true, scheme: 'dark', outline: 'automatic', fusing: 'automatic' });
     },
   );
 });

@@ -1,0 +1,223 @@
+// Colours that are made in the browser: by the same library, without a byte for a setting, and without a link.
+import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
+import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { startLink } from './link.mjs';
+
+const MODULE = new URL('../../build/wasm/bin/fusion.wasm', import.meta.url);
+
+/** Some pixels of the scene's part of the window. */
+function sample(image) {
+  const pixels = [];
+  for (let x = 200; x < 1100; x += 7) for (let y = 40; y < 820; y += 7) pixels.push(image.at(x, y));
+  return pixels;
+}
+
+/** Share of pixels that differ by more than `levels` in some channel. */
+const apart = (a, b, levels = 4) =>
+  a.filter((pixel, i) => pixel.some((value, channel) => Math.abs(value - b[i][channel]) > levels)).length / a.length;
+
+const isHere = (page) => page.waitForFunction(() => globalThis.spectra.store.fusingPlace === 'here', null, { timeout: 120_000 });
+const isOnRobot = (page) =>
+  page.waitForFunction(() => globalThis.spectra.store.fusingPlace === 'robot', null, { timeout: 60_000 });
+
+/** Counts what the page receives from now on: frames, and bytes of messages both ways. */
+function counter(page) {
+  const counts = { frames: 0, frame_bytes: 0, message_bytes: 0, isOn: false };
+  const count = ({ payload }, isFromServer) => {
+    if (!counts.isOn) return;
+    if (typeof payload === 'string') counts.message_bytes += payload.length;
+    else if (isFromServer) {
+      counts.frames += 1;
+      counts.frame_bytes += payload.length;
+    }
+  };
+  page.on('websocket', (socket) => {
+    socket.on('framereceived', (frame) => count(frame, true));
+    socket.on('framesent', (frame) => count(frame, false));
+  });
+  return counts;
+}
+
+const setAlpha = (page, alpha) => page.evaluate((value) => globalThis.spectra.settings.setParameter('alpha', value, true), alpha);
+const setMethod = (page, method) => page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
+
+export function addFusingTests(browser) {
+  if (!existsSync(MODULE)) {
+    console.log('skipped: fusing in the browser; deploy/build_module.sh could not make the library');
+    return;
+  }
+
+  test('Fused here: the pixels of the robot, no frame and few bytes for a hundred settings', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
+    const counts = counter(page);
+    await page.goto(server.url);
+    await settled(page, 180_000);
+    await isHere(page);
+    const robot = await openClient(browser, server.url);
+    await settled(robot.page);
+    for (const method of ['thermal_visible_blend', 'histogram_distribution', 'monochrome_threshold', 'inverse_intensity_hue']) {
+      for (const one of [page, robot.page]) {
+        await setMethod(one, method);
+        await settled(one);
+      }
+      const [own, theirs] = [sample(await screenshot(page, 'fused-here')), sample(await screenshot(robot.page, 'fused-there'))];
+      // What lies on a threshold may go either way within half a step of the temperature.
+      assert.ok(apart(own, theirs) < 0.01, `${method}: ${apart(own, theirs)} of the pixels differ`);
+      const inForce = (one) => one.evaluate(() => JSON.stringify(globalThis.spectra.store.fusion));
+      assert.equal(await inForce(page), await inForce(robot.page));
+    }
+
+    await setMethod(page, 'thermal_visible_blend');
+    await setAlpha(page, 0);
+    await page.waitForTimeout(1500);
+    const before = sample(await screenshot(page, 'alpha-0'));
+    counts.isOn = true;
+    for (let i = 1; i <= 100; i += 1) {
+      await setAlpha(page, i / 100);
+      await page.waitForTimeout(30);
+    }
+    await page.waitForTimeout(2500);
+    await drawn(page);
+    counts.isOn = false;
+    assert.equal(counts.frames, 0, `${counts.frame_bytes} bytes of frames`);
+    assert.ok(counts.message_bytes < 20_000, `${counts.message_bytes} bytes of messages`);
+    console.log(`        100 settings: ${counts.frame_bytes} bytes of frames, ${counts.message_bytes} of messages`);
+    assert.ok(apart(sample(await screenshot(page, 'alpha-1')), before) > 0.2, 'the picture has followed');
+    // The robot knows what is set here.
+    const said = await page.evaluate(() => globalThis.spectra.store.generation);
+    assert.ok(said >= 2);
+
+    assert.deepEqual(problems, []);
+    await robot.page.close();
+    await page.close();
+    await server.stop();
+  });
+
+  test('Switching where colours are made leaves no pixel of the old setting', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    await setMethod(page, 'visible_only');
+    await drawn(page);
+    const visible = sample(await screenshot(page, 'switch-visible'));
+    await page.evaluate(() => globalThis.spectra.setFusing('robot'));
+    await isOnRobot(page);
+    await settled(page);
+    assert.ok(apart(sample(await screenshot(page, 'switch-robot')), visible) < 0.002);
+    await setMethod(page, 'thermal_only');
+    await settled(page);
+    const thermal = sample(await screenshot(page, 'switch-thermal'));
+    assert.ok(apart(thermal, visible) > 0.2, 'the two settings look alike');
+    await page.evaluate(() => globalThis.spectra.setFusing('here'));
+    await isHere(page);
+    await drawn(page);
+    assert.ok(apart(sample(await screenshot(page, 'switch-here')), thermal) < 0.01);
+    // And a setting in the middle of the switch.
+    await setMethod(page, 'visible_only');
+    await page.evaluate(() => globalThis.spectra.setFusing('robot'));
+    await setMethod(page, 'thermal_only');
+    await isOnRobot(page);
+    await settled(page);
+    assert.ok(apart(sample(await screenshot(page, 'switch-amid')), thermal) < 0.002);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('Without a link the last map is turned, tuned and read, and says how old it is', async () => {
+    const server = await startServer(['--demo']);
+    const link = await startLink(server.port);
+    const { page } = await openClient(browser, link.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    await setMethod(page, 'thermal_only');
+    await drawn(page);
+    const thermal = sample(await screenshot(page, 'cut-before'));
+    link.down();
+    await page.waitForFunction(() => !globalThis.spectra.store.connected);
+    await setMethod(page, 'visible_only');
+    await drawn(page);
+    const visible = sample(await screenshot(page, 'cut-visible'));
+    assert.ok(apart(visible, thermal) > 0.2, 'the setting has come into the picture');
+    const words = await page.locator('[role="alert"]').first().innerText();
+    assert.match(words, /This picture is \d/);
+    const old = () => page.evaluate(() => globalThis.spectra.store.lostFor_s);
+    const age = await old();
+    await page.waitForTimeout(1200);
+    assert.ok((await old()) > age + 0.8, 'its age counts');
+    // A reading, by what is here.
+    const reading = await page.evaluate(async () => {
+      await globalThis.spectra.pin({ x: 640, y: 450 });
+      return globalThis.spectra.store.pinned?.reading.probe ?? null;
+    });
+    assert.ok(reading !== null && Number.isFinite(reading.temperature) && reading.visible.length === 3, JSON.stringify(reading));
+    // And turned.
+    await page.keyboard.press('ArrowLeft');
+    await page.waitForTimeout(500);
+    await drawn(page);
+    assert.ok(apart(sample(await screenshot(page, 'cut-turned')), visible) > 0.05);
+    link.up();
+    await settled(page);
+    assert.equal(await page.evaluate(() => globalThis.spectra.store.fusion.method), 'visible_only');
+    assert.equal(await page.evaluate(() => globalThis.spectra.store.fusingPlace), 'here');
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+
+  test('Memory stays flat over 500 settings, here and on the robot', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await setMethod(page, 'thermal_visible_blend');
+    const heap = async () => {
+      const session = await page.context().newCDPSession(page);
+      await session.send('HeapProfiler.collectGarbage');
+      const { usedSize } = await session.send('Runtime.getHeapUsage');
+      await session.detach();
+      return usedSize;
+    };
+    for (const place of ['here', 'robot']) {
+      await page.evaluate((wish) => globalThis.spectra.setFusing(wish), place);
+      await (place === 'here' ? isHere(page) : isOnRobot(page));
+      const change = async (count) => {
+        for (let i = 0; i < count; i += 1) {
+          await setAlpha(page, (i % 100) / 100);
+          await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+        }
+        await settled(page);
+      };
+      await change(50);
+      const before = await heap();
+      await change(500);
+      const grown = (await heap()) - before;
+      assert.ok(grown < 3e6, `${place}: ${grown} bytes more after 500 settings`);
+    }
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('A library that does not load or compile leaves colours to the robot, and the panel says so', async () => {
+    const server = await startServer(['--demo']);
+    for (const [what, fulfil] of [
+      ['missing', { status: 404, body: '' }],
+      ['broken', { status: 200, contentType: 'application/wasm', body: 'not a module' }],
+    ]) {
+      const { page } = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
+      await page.route('**/fusion-*.wasm', (route) => route.fulfill(fulfil));
+      await page.goto(server.url);
+      await settled(page, 180_000);
+      const words = page.locator('[data-fusing="robot"]', { hasText: 'could not be loaded' });
+      await words.waitFor({ timeout: 30_000 });
+      await setMethod(page, 'visible_only');
+      await settled(page);
+      assert.equal(await page.evaluate(() => globalThis.spectra.store.pictureMethod), 'visible_only', what);
+      await page.close();
+    }
+    await server.stop();
+  });
+}

@@ -1,0 +1,200 @@
+import { existsSync, readFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
+import type { Fusion } from '../protocol/messages';
+import { Fusing } from './fusing';
+import { Store } from './store.svelte';
+
+const MODULE = fileURLToPath(new URL('../../../build/wasm/bin/fusion.wasm', import.meta.url));
+const FUSION: Fusion = {
+  method: 'thermal_visible_blend',
+  params: { alpha: 0.4 },
+  params_in_force: { alpha: 0.4 },
+  palette: 'iron',
+  range: { mode: 'auto', min: 10, max: 30 },
+  missing: 'visible',
+};
+const FACTS = {
+  finite_count: 100,
+  missing_count: 0,
+  over_range_count: 0,
+  under_range_count: 0,
+  min: 10,
+  max: 30,
+  mean: 20,
+  sigma: 5,
+};
+
+const later = () => new Promise<void>((resolve) => setTimeout(resolve, 5));
+
+/** A session with a picture that is complete, on a robot that gives raw layers. */
+function setUp({
+  capabilities = ['raw_layers'],
+  load,
+}: { capabilities?: string[]; load?: () => Promise<WebAssembly.Module> } = {}) {
+  const store = new Store();
+  store.link = { phase: 'open' };
+  store.scene = { temperature: { min: 10 }, live: false } as never;
+  store.complete = {} as never;
+  store.pictureStands = true;
+  store.fusionInForce = FUSION;
+  store.stats = { throughput_bytes_per_s: 1e6 } as never;
+  store.shown = { tiles: 2, vertices: 1000, triangles: 0 };
+  const counts = { drawn: 2, raw: 0 };
+  const diary: string[] = [];
+  const asked: object[] = [];
+  const busy = { settings: false };
+  const picture = {
+    startFusing: () => diary.push('module'),
+    setFacts: () => diary.push('facts'),
+    fuse: (settings: object | null) => diary.push(settings === null ? 'fuse nothing' : 'fuse'),
+  };
+  const fusing: Fusing = new Fusing(
+    store,
+    { rawCounts: () => counts, setHere: (isHere) => diary.push(isHere ? 'here' : 'not here') },
+    picture as never,
+    {
+      request: (method, params: { bins?: number; hues?: boolean }) => {
+        asked.push({ method, ...params });
+        const { bins, hues } = params;
+        return Promise.resolve({
+          ...FACTS,
+          ...(bins === undefined ? {} : { counts: new Array<number>(bins).fill(1) }),
+          ...(hues === true ? { hues: new Array<number>(36).fill(1) } : {}),
+        });
+      },
+      resubscribe: () => diary.push(`subscribe ${fusing.channels.join('+')}`),
+      isBusy: () => busy.settings,
+      onHighlighted: () => undefined,
+    },
+    load ?? (() => WebAssembly.compile(readFileSync(MODULE))),
+    true,
+  );
+  fusing.greeted(capabilities);
+  return { store, fusing, counts, diary, asked, busy };
+}
+
+beforeEach(() => {
+  vi.stubGlobal('navigator', { hardwareConcurrency: 4 });
+});
+
+describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
+  async function here() {
+    const all = setUp();
+    all.fusing.consider();
+    await vi.waitFor(() => expect(all.diary).toContain('facts'));
+    all.counts.raw = 2;
+    all.fusing.consider();
+    expect(all.store.fusingPlace).toBe('here');
+    return all;
+  }
+
+  it('gets raw layers beside the picture, and is here when every drawn tile has them', async () => {
+    const { store, fusing, counts, diary, asked } = setUp();
+    expect(fusing.channels).toEqual(['fused']);
+    fusing.consider();
+    expect(store.fusingPlace).toBe('coming');
+    expect(diary).toEqual(['subscribe fused+temperature+visible']);
+    await vi.waitFor(() => expect(diary).toContain('facts'));
+    expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096 });
+    counts.raw = 1;
+    fusing.consider();
+    expect(store.fusingPlace).toBe('coming');
+    expect(store.rawShare).toBe(0.5);
+    expect(fusing.apply(FUSION)).toBeNull();
+    counts.raw = 2;
+    fusing.consider();
+    expect(store.fusingPlace).toBe('here');
+    expect(diary.slice(-3)).toEqual(['fuse', 'here', 'subscribe temperature+visible']);
+  });
+
+  it('makes plans as the robot does', async () => {
+    const { fusing } = await here();
+    const wanted = { ...FUSION, method: 'histogram_distribution', params: { k: 2, alpha: 1, invert: false } };
+    const inForce = fusing.apply({ ...wanted, range: { mode: 'percentile', min: 0, max: 0, low: 10, high: 90 } });
+    expect(inForce?.params_in_force).toEqual({ k: 2, alpha: 1, invert: false });
+    expect(inForce?.range).toMatchObject({ mode: 'percentile', low: 10, high: 90 });
+    expect(inForce?.range.min).toBeCloseTo(12, 2);
+    expect(inForce?.range.max).toBeCloseTo(28, 2);
+    expect(() => fusing.apply({ ...FUSION, params: { alpha: 7 } })).toThrow('alpha must be');
+  });
+
+  it('asks for facts that a plan lacks, and leaves that setting to the robot meanwhile', async () => {
+    const { fusing, asked } = await here();
+    const wanted = {
+      ...FUSION,
+      method: 'histogram_bin',
+      params: { bins: 17, n: null, alpha: 1, invert: false, ties: 'index' },
+    };
+    expect(fusing.apply(wanted)).toBeNull();
+    expect(asked.at(-1)).toEqual({ method: 'fusion.facts', bins: 17 });
+    await later();
+    expect(fusing.apply(wanted)?.params_in_force['n']).toEqual(expect.any(Number));
+  });
+
+  it('goes back to the robot when that has brought everything, and not before', async () => {
+    const { store, fusing, diary, busy } = await here();
+    fusing.setWish('robot');
+    expect(diary.at(-1)).toBe('subscribe fused');
+    expect(store.fusingPlace).toBe('here');
+    busy.settings = true;
+    fusing.completed();
+    expect(store.fusingPlace).toBe('here');
+    busy.settings = false;
+    fusing.completed();
+    expect(store.fusingPlace).toBe('robot');
+    expect(diary.slice(-2)).toEqual(['not here', 'fuse nothing']);
+  });
+
+  it('leaves to the robot what compares with temperatures of before', async () => {
+    const { store, fusing } = await here();
+    const method = 'thermal_change';
+    const threshold = { method, params: {}, palette: 'iron' };
+    expect(fusing.apply({ ...FUSION, ...threshold })).toBeNull();
+    expect(store.fusingProblem).toContain('temperatures of before');
+  });
+});
+
+describe('Fusing', () => {
+  it('stays with the robot on a tiny machine, a slow link, a map that grows, and where it is not given raw layers', () => {
+    const stays = ({ store, fusing }: ReturnType<typeof setUp>) => {
+      fusing.consider();
+      return store.fusingPlace === 'robot';
+    };
+    const slow = setUp();
+    slow.store.shown = { tiles: 1, vertices: 1e6, triangles: 0 };
+    slow.store.stats = { throughput_bytes_per_s: 10_000 } as never;
+    expect(stays(slow)).toBe(true);
+    const live = setUp();
+    live.store.scene = { ...live.store.scene, live: true } as never;
+    expect(stays(live)).toBe(true);
+    expect(stays(setUp({ capabilities: [] }))).toBe(true);
+    vi.stubGlobal('navigator', { hardwareConcurrency: 1 });
+    expect(stays(setUp())).toBe(true);
+    // Unless it is asked for.
+    slow.fusing.setWish('here');
+    expect(slow.store.fusingPlace).toBe('coming');
+  });
+
+  it.each([
+    ['does not load', () => Promise.reject(new Error('HTTP 404')), 'HTTP 404'],
+    ['does not compile', () => WebAssembly.compile(new Uint8Array([1, 2, 3])), 'could not be loaded'],
+  ])('falls back and says so when the library %s', async (_what, load, words) => {
+    const { store, fusing, diary } = setUp({ load });
+    fusing.consider();
+    await vi.waitFor(() => expect(store.fusingProblem).toContain(words));
+    expect(store.fusingPlace).toBe('robot');
+    expect(diary.at(-1)).toBe('subscribe fused');
+    fusing.consider();
+    expect(store.fusingPlace).toBe('robot');
+  });
+
+  it('falls back and says so when a tile does not fit', () => {
+    const { store, fusing, diary } = setUp({ load: () => new Promise(() => undefined) });
+    fusing.consider();
+    fusing.failed('tile 1/0/0/0: temperatures of 3 vertices for a geometry of 4');
+    expect(store.fusingPlace).toBe('robot');
+    expect(store.fusingProblem).toContain('for a geometry of 4');
+    expect(diary.at(-1)).toBe('subscribe fused');
+  });
+});
