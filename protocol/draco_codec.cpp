@@ -38,12 +38,15 @@ struct CompactTile {
   std::vector<TileTriangle> triangles;  ///< Compact indices, in the order of the input.
 };
 
+/// Draco's time for a vertex grows with the square of its triangles: beyond so many it gets a copy.
+constexpr std::uint32_t kMostTrianglesOfVertex = 1000;
+
 /// Edgebreaker drops vertices of no triangle and triangles that name a vertex twice. The former are left out here; the
 /// latter are kept by giving the repeated corner a copy of its vertex.
 CompactTile compact_tile(std::size_t position_count, std::span<const TileTriangle> triangles) {
   CompactTile tile;
   tile.triangles.reserve(triangles.size());
-  std::vector<std::uint32_t> compact_of_input(position_count, kNone);
+  std::vector<std::uint32_t> compact_of_input(position_count, kNone), triangle_count(position_count, 0);
   const auto add = [&tile](std::uint32_t input) {
     tile.input_of_compact.push_back(input);
     return static_cast<std::uint32_t>(tile.input_of_compact.size() - 1);
@@ -54,10 +57,15 @@ CompactTile compact_tile(std::size_t position_count, std::span<const TileTriangl
       const std::uint32_t input = triangle[corner];
       const bool repeated = (corner > 0 && input == triangle[0]) || (corner > 1 && input == triangle[1]);
       std::uint32_t& known = compact_of_input[input];
-      if (repeated)
+      if (repeated) {
         compact[corner] = add(input);
-      else
-        compact[corner] = known == kNone ? known = add(input) : known;
+        continue;
+      }
+      if (known == kNone || triangle_count[input]++ == kMostTrianglesOfVertex) {
+        known = add(input);
+        triangle_count[input] = 1;
+      }
+      compact[corner] = known;
     }
     tile.triangles.push_back(compact);
   }

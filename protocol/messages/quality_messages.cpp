@@ -11,6 +11,9 @@ std::span<const EnumWord<QualityMode>> words_of() {
 }
 
 static constexpr const char* kPositive = "a number above 0";
+/// A kilometre. What is asked for beyond that is a mistake.
+static constexpr double kLargestStepMm = 1e6;
+static constexpr const char* kStep = "a number above 0, at most 1000000";
 static constexpr const char* kColourBits = "an integer from 4 to 8";
 static constexpr const char* kSpeed = "an integer from 0 to 10";
 
@@ -32,7 +35,8 @@ static void describe(auto& fields, Is<QualityState> auto& message) {
 static void describe(auto& fields, Is<QualityChange> auto& message) {
   fields.optional("mode", message.mode);
   fields.optional("position_step_mm", message.position_step_mm);
-  fields.require("position_step_mm", message.position_step_mm.value_or(1) > 0, kPositive);
+  const double step_mm = message.position_step_mm.value_or(1);
+  fields.require("position_step_mm", step_mm > 0 && step_mm <= kLargestStepMm, kStep);
   fields.optional("colour_bits", message.colour_bits);
   fields.require("colour_bits", message.colour_bits.value_or(8) >= 4 && message.colour_bits.value_or(8) <= 8,
                  kColourBits);

@@ -9,18 +9,19 @@ class TokenBucket {
  public:
   TokenBucket(double rate_per_s, double burst) : rate_per_s_(rate_per_s), burst_(burst), tokens_(burst) {}
 
-  /// Takes one token; false when there is none.
-  bool take(double now_s) {
+  /// Takes so many tokens, at most `burst` of them; false when they are not there.
+  bool take(double now_s, double count = 1) {
     refill(now_s);
-    if (tokens_ < 1) return false;
-    tokens_ -= 1;
+    count = std::min(count, burst_);
+    if (tokens_ < count) return false;
+    tokens_ -= count;
     return true;
   }
 
   /// Seconds until take() succeeds; 0 = now.
-  double wait_s(double now_s) {
+  double wait_s(double now_s, double count = 1) {
     refill(now_s);
-    return tokens_ >= 1 ? 0 : (1 - tokens_) / rate_per_s_;
+    return std::max(0.0, (std::min(count, burst_) - tokens_) / rate_per_s_);
   }
 
  private:

@@ -44,23 +44,19 @@ BlockRefusal no_name() {
   return {400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"};
 }
 
-HttpReply ply_of(const fusion::MultispectralMesh& mesh, const ExportSlots::Slot& slot) {
+HttpReply ply_of(const fusion::MultispectralMesh& mesh, ExportShelf& exports) {
   SceneFileOptions options;
   options.format = SceneFileFormat::Ply;
   const std::vector<fusion::Rgb8> visible(mesh.visible().begin(), mesh.visible().end());
   auto file = scene_file(mesh, visible, options);
   if (!file) return refused({500, "not_written", "", file.error().message, ""});
-  struct Body {
-    ExportSlots::Slot slot;
-    std::string bytes;
-  };
-  const auto body = std::make_shared<Body>(Body{slot, std::move(file.value().bytes)});
-  return {200, std::string(content_type_of(SceneFileFormat::Ply)), {body, &body->bytes}, {}};
+  const auto kept = exports.keep("", {std::move(file.value().bytes), ""});
+  return {200, std::string(content_type_of(SceneFileFormat::Ply)), {kept, &kept->bytes}, {}};
 }
 
 }  // namespace
 
-BlockApi::BlockApi(ServedScene& served, MapKeeper& map, ExportSlots& exports)
+BlockApi::BlockApi(ServedScene& served, MapKeeper& map, ExportShelf& exports)
     : served_(served), map_(map), exports_(exports) {}
 
 void BlockApi::handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
@@ -174,21 +170,21 @@ void BlockApi::give(const std::string& id, const std::vector<std::pair<std::stri
   }
   const BlockRefusal unknown{404, "not_found", "id", "there is no block \"" + id + "\"", ""};
   if (!at && !map_.has(id)) return reply(refused(unknown));
-  const ExportSlots::Slot slot = exports_.take();
+  const ExportShelf::Slot slot = exports_.take();
   if (!slot) {
     return reply(
-        refused({503, "busy", "", "too many files are being made", std::to_string(ExportSlots::kMost) + " at a time"}));
+        refused({503, "busy", "", "too many files are being made", std::to_string(ExportShelf::kMost) + " at a time"}));
   }
   if (at) {
-    return map_.read_at(*at, id, [slot, reply](const std::variant<fusion::LoadedScene, BlockRefusal>& outcome) {
+    return map_.read_at(*at, id, [this, slot, reply](const std::variant<fusion::LoadedScene, BlockRefusal>& outcome) {
       if (const auto* refusal = std::get_if<BlockRefusal>(&outcome)) return reply(refused(*refusal));
-      reply(ply_of(std::get<fusion::LoadedScene>(outcome).mesh, slot));
+      reply(ply_of(std::get<fusion::LoadedScene>(outcome).mesh, exports_));
     });
   }
   served_.pool.post(
-      [slot, scene = served_.scenes.current(), id, unknown, reply] {
+      [this, slot, scene = served_.scenes.current(), id, unknown, reply] {
         const auto mesh = scene->block_mesh(id);
-        reply(mesh ? ply_of(*mesh, slot) : refused(unknown));
+        reply(mesh ? ply_of(*mesh, exports_) : refused(unknown));
       },
       kExportPriority);
 }

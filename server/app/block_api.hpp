@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/app/export_slots.hpp"
+#include "server/app/export_shelf.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/net/block_change.hpp"
@@ -17,7 +17,7 @@ namespace spectra::server {
 class BlockApi {
  public:
   /// A block that is given back takes a slot of the exports.
-  BlockApi(ServedScene& served, MapKeeper& map, ExportSlots& exports);
+  BlockApi(ServedScene& served, MapKeeper& map, ExportShelf& exports);
 
   /// The path is kBlocksPath or begins with it and a slash.
   void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
@@ -32,7 +32,7 @@ class BlockApi {
 
   ServedScene& served_;
   MapKeeper& map_;
-  ExportSlots& exports_;
+  ExportShelf& exports_;
 };
 
 }  // namespace spectra::server

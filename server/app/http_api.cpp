@@ -30,10 +30,27 @@ HttpReply no_scene_reply() {
   return reply;
 }
 
-struct ExportBody {
-  ExportSlots::Slot slot;
-  std::string bytes;
-};
+HttpReply reply_of(const ExportShelf::SharedFile& file, const RequestTarget& target, SceneFileFormat format) {
+  HttpReply reply{200, std::string(content_type_of(format)), {file, &file->bytes}, {}};
+  if (!file->losses.empty()) reply.headers.emplace_back("Spectra-Note", file->losses);
+  reply.headers.emplace_back("Content-Disposition",
+                             "attachment; filename=\"" + target.path.substr(target.path.rfind('/') + 1) + '"');
+  return reply;
+}
+
+/// What was asked for, of which version of the scene.
+std::string key_of(const RequestTarget& target, const SceneSnapshot& scene) {
+  std::string key = std::to_string(scene.revision()) + target.path;
+  for (const auto& [name, value] : target.query) key += '\n' + name + '\n' + value;
+  return key;
+}
+
+/// What was lost, on one line.
+std::string losses_of(const SceneFile& file) {
+  std::string losses;
+  for (const auto& loss : file.losses) losses += (losses.empty() ? "" : " | ") + loss.message;
+  return losses;
+}
 
 SettingsText settings_text_of(const RequestTarget& target) {
   SettingsText text;
@@ -118,31 +135,29 @@ void HttpApi::handle(const HttpRequest& request, const std::function<void(HttpRe
 void HttpApi::handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply) {
   const auto format = scene_file_format(target.path);
   if (!format || target.path.size() != kExportPrefix.size() + 3) return reply(text_reply(404, "not found\n"));
+  const RequestTarget asked = target;
   const auto file_options = file_options_of(target, *format);
   if (!file_options) return reply(json_error(400, file_options.error().field, file_options.error().message));
   const auto settings = settings_from_text(settings_text_of(target));
   if (!settings) return reply(json_error(400, settings.error().field, settings.error().message));
   const auto scene = served_.scenes.current();
   if (!scene) return reply(no_scene_reply());
-  const ExportSlots::Slot slot = exports_.take();
+  const std::string key = key_of(asked, *scene);
+  if (const auto file = exports_.find(key)) return reply(reply_of(file, asked, *format));
+  const ExportShelf::Slot slot = exports_.take();
   if (!slot) {
-    auto busy = json_error(503, "", "two exports are under way already");
+    auto busy = json_error(503, "", "two exports are being made already, or too much is being sent");
     busy.headers.emplace_back("Retry-After", "5");
     return reply(std::move(busy));
   }
   served_.pool.post(
-      [slot, scene, settings = settings.value(), options = file_options.value(), reply, path = target.path] {
+      [this, slot, scene, settings = settings.value(), options = file_options.value(), reply, asked, key] {
         try {
           auto file = fused_export(*scene, settings, options);
           if (!file) return reply(json_error(400, file.error().field, file.error().message));
-          const auto body = std::make_shared<ExportBody>(ExportBody{slot, std::move(file.value().bytes)});
-          HttpReply done{200, std::string(content_type_of(options.format)), {body, &body->bytes}, {}};
-          std::string losses;
-          for (const auto& loss : file.value().losses) losses += (losses.empty() ? "" : " | ") + loss.message;
-          if (!losses.empty()) done.headers.emplace_back("Spectra-Note", losses);
-          done.headers.emplace_back("Content-Disposition",
-                                    "attachment; filename=\"" + path.substr(path.rfind('/') + 1) + '"');
-          reply(std::move(done));
+          std::string losses = losses_of(file.value());
+          const auto kept = exports_.keep(key, {std::move(file.value().bytes), std::move(losses)});
+          reply(reply_of(kept, asked, options.format));
         } catch (const std::exception& error) {
           spdlog::error("an export failed: {}", error.what());
           reply(json_error(500, "", "the export failed"));

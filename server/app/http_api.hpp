@@ -31,7 +31,7 @@ class HttpApi {
   void handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply);
 
   ServedScene& served_;
-  ExportSlots exports_;
+  ExportShelf exports_;
   BlockApi blocks_;
   const NetMetrics* net_metrics_ = nullptr;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -29,6 +30,8 @@ namespace spectra::server {
 namespace fs = std::filesystem;
 namespace {
 
+/// From the last connection to the end of the program.
+constexpr std::chrono::milliseconds kLongestEnd{250};
 constexpr const char* kTokensVariable = "SPECTRA_TOKENS";
 constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
 
@@ -241,6 +244,12 @@ int run_serve(const ServeOptions& options) {
     spdlog::default_logger()->flush();
     std::_Exit(kDone);
   }
+  // What is being computed cannot be interrupted, and need not be ended: a store survives more than that.
+  std::thread([] {
+    std::this_thread::sleep_for(kLongestEnd);
+    spdlog::default_logger()->flush();
+    std::_Exit(kDone);
+  }).detach();
   // Whoever still answers does so to a server that is there.
   map.end();
   served->pool.stop();

@@ -49,7 +49,7 @@ struct ServedScene {
   WorkerPool pool;  ///< Last, so that it stops first: its jobs use the others.
 };
 
-/// Priorities on the pool; lower goes first. Tiles have their level, 0 and up.
+/// Priorities on the pool; lower goes first. Tiles have their level, 0 and up, or what ViewerStream gives a viewer who asks for much.
 inline constexpr int kAnswerPriority = -1;   ///< Something a person waits for and that takes milliseconds.
 inline constexpr int kExportPriority = 100;  ///< Whole files.
 

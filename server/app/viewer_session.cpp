@@ -29,6 +29,9 @@ namespace {
 /// Answers that one viewer may have computing at once, and changes it may have waiting.
 constexpr std::size_t kMaxComputing = 16;
 constexpr std::size_t kMaxWaiting = 512;
+/// Of an answer as text, at most: anything but bins, and a bin with its edge and its count.
+constexpr std::size_t kSmallAnswerBytes = 4096;
+constexpr std::size_t kBinBytes = 48;
 /// The statuses that are notes on the scene: this and the note's id.
 const std::string kNotePrefix = "scene.";
 
@@ -327,14 +330,20 @@ void ViewerSession::fusion_set(const Id& id, const json& params) {
   start_preparation();
 }
 
-void ViewerSession::answer_from_pool(const Id& id, std::function<Answer()> compute) {
+void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute) {
   if (computing_count_ >= kMaxComputing) {
     return answer(id, refusal(RpcErrorCode::Busy, "too many answers are being computed", "",
                               std::to_string(kMaxComputing) + " at once"));
   }
+  // Half of the lane stays free for what nobody asked for.
+  if (computing_bytes_ + peer_.queued_bytes() + size_bytes > limits_.control_queue_bytes / 2) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many answers wait to be sent", "",
+                              std::to_string(limits_.control_queue_bytes / 2) + " bytes at once"));
+  }
   computing_count_ += 1;
+  computing_bytes_ += size_bytes;
   served_.pool.post(
-      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, compute = std::move(compute)] {
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, size_bytes, compute = std::move(compute)] {
         Answer computed = refusal(RpcErrorCode::InternalError, "the answer could not be computed");
         try {
           computed = compute();
@@ -343,10 +352,11 @@ void ViewerSession::answer_from_pool(const Id& id, std::function<Answer()> compu
         }
         const auto peer = weak_peer.lock();
         if (!peer) return;
-        peer->post([weak_self, id, computed = std::move(computed)] {
+        peer->post([weak_self, id, size_bytes, computed = std::move(computed)] {
           const auto self = weak_self.lock();
           if (!self) return;
           self->computing_count_ -= 1;
+          self->computing_bytes_ -= size_bytes;
           self->answer(id, computed);
         });
       },
@@ -357,13 +367,15 @@ void ViewerSession::histogram(const Id& id, const json& params) {
   const auto request = protocol::from_json<protocol::HistogramRequest>(params);
   if (!request) return answer(id, refused(request.error()));
   if (!scene_) return answer(id, no_scene());
-  answer_from_pool(id, [scene = scene_, plan = *plan_, bins = request.value().bins]() -> Answer {
-    const auto& temperature = scene->temperature();
-    const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
-    const bool highlights = fusion::find_method(plan.settings().method)->highlights;
-    const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
-    return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
-  });
+  const auto bins = request.value().bins;
+  answer_from_pool(
+      id, kSmallAnswerBytes + std::size_t{bins} * kBinBytes, [scene = scene_, plan = *plan_, bins]() -> Answer {
+        const auto& temperature = scene->temperature();
+        const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
+        const bool highlights = fusion::find_method(plan.settings().method)->highlights;
+        const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
+        return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
+      });
 }
 
 void ViewerSession::facts(const Id& id, const json& params) {
@@ -390,7 +402,7 @@ void ViewerSession::probe(const Id& id, const json& params) {
   if (!scene_) return answer(id, no_scene());
   const auto& p = request.value().position;
   const fusion::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-  answer_from_pool(id, [scene = scene_, plan = *plan_, position]() -> Answer {
+  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, plan = *plan_, position]() -> Answer {
     const auto found = scene->probe(position);
     if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
     const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
@@ -404,7 +416,7 @@ void ViewerSession::extremes(const Id& id, const json& params) {
   const auto request = protocol::from_json<protocol::ExtremesRequest>(params);
   if (!request) return answer(id, refused(request.error()));
   if (!scene_) return answer(id, no_scene());
-  answer_from_pool(id, [scene = scene_, request = request.value()]() -> Answer {
+  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, request = request.value()]() -> Answer {
     return protocol::to_json(extremes_message(*scene, request));
   });
 }

@@ -82,7 +82,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void extremes(const Id& id, const nlohmann::json& params);
 
   /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
-  void answer_from_pool(const Id& id, std::function<Answer()> compute);
+  void answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute);
 
   void take_scene(const std::shared_ptr<const SceneSnapshot>& scene);
   /// Prepares the waiting changes, or the settings for a scene that has come, on the pool; one at a time.
@@ -116,6 +116,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   bool is_preparing_ = false;
   bool is_first_view_ = true;  ///< The viewer has changed nothing yet: a new scene brings its own first view.
   std::size_t computing_count_ = 0;
+  std::size_t computing_bytes_ = 0;  ///< Of those answers, at most.
 
   bool is_subscribed_ = false;
   Subscription subscription_;

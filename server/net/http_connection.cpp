@@ -95,6 +95,14 @@ bool is_block_change(const http::request<http::string_body>& request) {
          view(request.target()).starts_with(std::string(kBlocksPath) + '/');
 }
 
+/// 16 bytes in base64.
+bool is_key(std::string_view text) {
+  const auto is_digit = [](char c) {
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '+' || c == '/';
+  };
+  return text.size() == 24 && text.ends_with("==") && std::all_of(text.begin(), text.end() - 2, is_digit);
+}
+
 std::string_view path_of(std::string_view target) {
   return target.substr(0, target.find('?'));
 }
@@ -220,7 +228,9 @@ asio::awaitable<bool> HttpConnection::serve_one() {
   }
   if (!error && is_session && !refusal) std::tie(error, size) = co_await read_body(parser);
   if (!error && is_read_method && !parser.is_done()) {
-    std::tie(error, size) = co_await http::async_read(stream_, buffer_, parser, kAwait);
+    // Nobody needs it, but the next request stands behind it; all within the time for the header.
+    error = co_await ask_for_body(parser);
+    if (!error) std::tie(error, size) = co_await http::async_read(stream_, buffer_, parser, kAwait);
   }
   const bool is_syntax_error = error.category() == http::make_error_code(http::error::bad_method).category() &&
                                error != http::error::end_of_stream && error != http::error::partial_message;
@@ -321,15 +331,17 @@ asio::awaitable<void> HttpConnection::refuse_upgrade(const Request& request, con
   co_await write(reply, request.version(), request.method() == http::verb::head, false);
 }
 
+asio::awaitable<error_code> HttpConnection::ask_for_body(const http::request_parser<http::string_body>& parser) {
+  if (parser.is_done() || !beast::iequals(parser.get()[http::field::expect], "100-continue")) co_return error_code{};
+  static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+  const auto [error, size] = co_await asio::async_write(stream_, asio::buffer(kContinue), kAwait);
+  co_return error;
+}
+
 asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_body(
     http::request_parser<http::string_body>& parser) {
-  const auto expect = parser.get()[http::field::expect];
-  if (!parser.is_done() && beast::iequals(expect, "100-continue")) {
-    static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
-    stream_.expires_after(context_.options.limits.write_timeout);
-    const auto [error, size] = co_await asio::async_write(stream_, asio::buffer(kContinue), kAwait);
-    if (error) co_return std::tuple(error, size);
-  }
+  stream_.expires_after(context_.options.limits.write_timeout);
+  if (const auto error = co_await ask_for_body(parser)) co_return std::tuple(error, std::size_t{0});
   while (!parser.is_done()) {
     stream_.expires_after(context_.options.limits.body_timeout);
     const auto [error, size] = co_await http::async_read_some(stream_, buffer_, parser, kAwait);
@@ -390,6 +402,10 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
   if (origins == 0 && who_.identity->is_by_cookie) {
     return text_reply(403, "with a cookie an Origin is required; programs send Authorization: Bearer TOKEN\n");
   }
+  if (count_of(request, http::field::sec_websocket_key) != 1 ||
+      !is_key(view(request[http::field::sec_websocket_key]))) {
+    return text_reply(400, "one Sec-WebSocket-Key of 16 bytes in base64 is required\n");
+  }
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto it = begin; it != end; ++it) {
     for (const auto& offered : http::token_list(it->value())) {
@@ -443,10 +459,20 @@ asio::awaitable<bool> HttpConnection::write(const HttpReply& reply, unsigned ver
 
   http::response_serializer<http::span_body<const char>> serializer(response);
   serializer.split(is_head || reply.status == 304);
+  const NetLimits& limits = context_.options.limits;
+  const double begin_s = steady_seconds();
+  const double patience_s = std::chrono::duration<double>(limits.download_patience).count();
+  double written_bytes = 0;
   while (is_head || reply.status == 304 ? !serializer.is_header_done() : !serializer.is_done()) {
-    stream_.expires_after(context_.options.limits.write_timeout);
+    stream_.expires_after(limits.write_timeout);
     const auto [error, size] = co_await http::async_write_some(stream_, serializer, kAwait);
     if (error) co_return false;
+    written_bytes += static_cast<double>(size);
+    const double passed_s = steady_seconds() - begin_s;
+    if (passed_s > patience_s && written_bytes < passed_s * limits.download_bytes_per_s) {
+      spdlog::info("a download of {} is cut: it is too slow", peer_address_);
+      co_return false;
+    }
   }
   if (!keep_alive) {
     error_code ignored;

@@ -39,6 +39,9 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
   /// The rest of a request whose header was read and is good.
+  /// Tells who waits for it that the body may come.
+  boost::asio::awaitable<boost::beast::error_code> ask_for_body(
+      const boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
   boost::asio::awaitable<std::tuple<boost::beast::error_code, std::size_t>> read_body(
       boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
   HttpReply static_reply(const HttpRequest& request) const;

@@ -19,6 +19,8 @@
 #include <boost/asio/strand.hpp>
 #include <charconv>
 #include <csignal>
+#include <exception>
+#include <new>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -198,9 +200,13 @@ asio::awaitable<void> HttpServer::State::accept_connections() {
       continue;
     }
     set_socket_options(socket);
-    const auto executor = socket.get_executor();
-    const auto connection = std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), context);
-    asio::co_spawn(executor, connection->run(), asio::detached);
+    try {
+      const auto executor = socket.get_executor();
+      const auto connection = std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), context);
+      asio::co_spawn(executor, connection->run(), asio::detached);
+    } catch (const std::bad_alloc&) {
+      metrics.connections_refused += 1;  // It costs this connection.
+    }
   }
 }
 
@@ -216,6 +222,10 @@ asio::awaitable<void> HttpServer::State::stop_in_stages() {
   while (context.has_connections()) {
     if (std::chrono::steady_clock::now() >= deadline) {
       for (const auto& connection : context.connections()) connection->cut();
+      timer.expires_after(kStopPoll);
+      co_await timer.async_wait(kAwait);
+      // Whoever waits for an answer that is still being computed waits no longer.
+      io.stop();
       co_return;
     }
     timer.expires_after(kStopPoll);
@@ -259,11 +269,19 @@ void HttpServer::run() {
     state.reload_on_hangup();
   }
   asio::co_spawn(state.acceptor.get_executor(), state.accept_connections(), asio::detached);
+  const auto work = [&state] {
+    for (;;) {
+      try {
+        return static_cast<void>(state.io.run());
+      } catch (const std::exception& error) {
+        // Of one connection, or of none: the others go on.
+        spdlog::error("something on the network failed: {}", error.what());
+      }
+    }
+  };
   std::vector<std::jthread> threads;
-  for (unsigned i = 1; i < state.context.options.io_thread_count; ++i) {
-    threads.emplace_back([&state] { state.io.run(); });
-  }
-  state.io.run();
+  for (unsigned i = 1; i < state.context.options.io_thread_count; ++i) threads.emplace_back(work);
+  work();
 }
 
 void HttpServer::stop() {

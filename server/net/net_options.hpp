@@ -25,6 +25,7 @@ struct NetLimits {
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
   std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.
   double messages_per_s = 10'000;                 ///< Beyond it a session's reading pauses (back-pressure).
+  double message_bytes_per_s = 512 * 1024;        ///< Likewise.
   bool gives_raw_layers = true;                   ///< Temperatures and visible colours of tiles, beside fused colours.
   double requests_per_s = 300;                    ///< Beyond it requests are refused with Busy.
   double message_burst_s = 2;                     ///< How many seconds' worth of either may come at once.
@@ -33,13 +34,15 @@ struct NetLimits {
   std::chrono::milliseconds body_timeout{10'000};  ///< The body of a block may stand still for this long.
   /// A write may stand still for this long; with two ticks more, within which it is noticed, that is 15 s.
   std::chrono::milliseconds write_timeout{13'000};
+  double download_bytes_per_s = 8'000;                  ///< A long answer must move so fast, on the whole,
+  std::chrono::milliseconds download_patience{30'000};  ///< after so long.
   std::chrono::milliseconds ping_interval{4'000};
   /// A ping may go unanswered for this long while no waiting write moves either: buffers of the two kernels can take all
   /// that a viewer is owed, so that writes alone do not tell who never reads. With the interval and two ticks that is 15 s.
   std::chrono::milliseconds pong_timeout{9'000};
   std::chrono::milliseconds idle_timeout{120'000};  ///< Neither a byte read nor a byte written for this long.
-  std::chrono::milliseconds close_timeout{2'000};   ///< For the peer to answer a polite close.
-  std::chrono::milliseconds stop_timeout{4'000};    ///< From stop() until everything is cancelled.
+  std::chrono::milliseconds close_timeout{1'500};   ///< For the peer to answer a polite close.
+  std::chrono::milliseconds stop_timeout{1'500};    ///< From stop() until everything is cancelled: all ends within 2 s.
   std::chrono::milliseconds tick{1'000};            ///< How often a session looks at its deadlines.
   std::chrono::milliseconds accept_backoff{100};    ///< Pause after the descriptors ran out.
 };

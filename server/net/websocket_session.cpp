@@ -32,6 +32,8 @@ WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& conte
       reader_timer_(ws_.get_executor()),
       messages_(context.options.limits.messages_per_s,
                 context.options.limits.messages_per_s * context.options.limits.message_burst_s),
+      message_bytes_(context.options.limits.message_bytes_per_s,
+                     context.options.limits.message_bytes_per_s * context.options.limits.message_burst_s),
       hello_form_(hello_form),
       who_(std::move(who)) {}
 
@@ -53,6 +55,7 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   ws_.read_message_max(limits.message_size_bytes);
   ws_.auto_fragment(false);
   ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
+    if (kind == websocket::frame_type::close) refuse_unknown_close();
     if (kind != websocket::frame_type::pong) return;
     if (const auto round_trip = pings_.answered({payload.data(), payload.size()}, Clock::now())) {
       round_trip_ms_ = std::chrono::duration<double, std::milli>(*round_trip).count();
@@ -99,11 +102,16 @@ asio::awaitable<void> WebSocketSession::read_messages() {
     }
     buffer.consume(buffer.size());
     // A flood is slowed down by not reading on; the kernel's window then holds the sender.
-    while (!messages_.take(steady_seconds()) && !is_ended_) {
-      reader_timer_.expires_after(std::chrono::duration_cast<Clock::duration>(
-          std::chrono::duration<double>(messages_.wait_s(steady_seconds()))));
-      co_await reader_timer_.async_wait(kAwait);
-    }
+    co_await pause(messages_, 1);
+    co_await pause(message_bytes_, static_cast<double>(size));
+  }
+}
+
+asio::awaitable<void> WebSocketSession::pause(TokenBucket& bucket, double count) {
+  while (!bucket.take(steady_seconds(), count) && !is_ended_) {
+    reader_timer_.expires_after(std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(bucket.wait_s(steady_seconds(), count))));
+    co_await reader_timer_.async_wait(kAwait);
   }
 }
 
@@ -198,6 +206,14 @@ asio::awaitable<void> WebSocketSession::ping(std::string payload) {
   const auto self = shared_from_this();
   co_await ws_.async_ping(websocket::ping_data(payload), kAwait);
   pings_.written();
+}
+
+void WebSocketSession::refuse_unknown_close() {
+  constexpr std::uint16_t kLastCode = 4999;
+  if (ws_.reason().code <= kLastCode || closing_) return;
+  // Beast would send it back, but not beside a close that has begun.
+  closing_.emplace(websocket::close_code::protocol_error);
+  ws_.async_close(*closing_, [self = shared_from_this()](const error_code&) {});
 }
 
 void WebSocketSession::post(std::function<void()> job) {

@@ -47,6 +47,8 @@ class WebSocketSession final : public ViewerPeer,
   using Clock = std::chrono::steady_clock;
 
   boost::asio::awaitable<void> read_messages();
+  /// Until so much may be read.
+  boost::asio::awaitable<void> pause(TokenBucket& bucket, double count);
   boost::asio::awaitable<void> write_messages();
   boost::asio::awaitable<void> mind_deadlines();
   boost::asio::awaitable<void> ping(std::string payload);
@@ -55,6 +57,8 @@ class WebSocketSession final : public ViewerPeer,
   void close(boost::beast::websocket::close_reason reason);
   void end(bool is_cut, std::string_view why);
   void notify_writer();
+  /// Of a code that RFC 6455 does not know: answers with 1002.
+  void refuse_unknown_close();
 
   boost::beast::websocket::stream<ConnectionStream> ws_;
   ServerContext& context_;
@@ -63,6 +67,7 @@ class WebSocketSession final : public ViewerPeer,
   boost::asio::steady_timer minder_timer_;
   boost::asio::steady_timer reader_timer_;
   TokenBucket messages_;
+  TokenBucket message_bytes_;
   const HelloForm hello_form_;
   const AccessControl::Identity who_;
   std::deque<OutgoingText> control_;

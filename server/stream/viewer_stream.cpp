@@ -14,6 +14,7 @@
 #include "server/stream/sending_order.hpp"
 #include "server/stream/sending_window.hpp"
 #include "server/stream/slot_preparation.hpp"
+#include "server/stream/urgent_budget.hpp"
 #include "server/stream/view_selection.hpp"
 #include "server/stream/viewer_tiles.hpp"
 
@@ -34,6 +35,9 @@ constexpr int kRawPriority = 100;
 // How much may wait, encoded, for the window of one viewer. Enough to bridge the making of the next tile, little
 // enough that a viewer who stopped reading costs nothing.
 constexpr std::size_t kPreparedBytes = 1u << 20;
+
+// Of jobs beyond a viewer's UrgentBudget: behind every level, in order of arrival.
+constexpr int kInTurnPriority = 50;
 
 // After a change of the settings the coarse tiles whose place is taken by finer ones are coloured first, for a quick
 // answer, as long as that adds no more than this part to the whole.
@@ -659,6 +663,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
       if (!may_start(index)) continue;
       if (startable++ == 0) priority = order_.slots()[index]->tile->id.level;
     }
+    if (startable == 0) return;
+    const int level = order_.slots()[first_startable]->tile->id.level;
+    const int priority = budget_.is_left(UrgentBudget::Clock::now()) ? level : kInTurnPriority;
     while (waiting_job_count_ < startable && waiting_job_count_ + running_job_count_ < most) {
       ++waiting_job_count_;
       pool_.post(
@@ -690,8 +697,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
       finish_raw(*raw);
     }
     while (encoding) {
+      const auto begin = UrgentBudget::Clock::now();
       encode(*encoding, *cache_);
+      const auto end = UrgentBudget::Clock::now();
       const std::lock_guard lock(mutex_);
+      budget_.spend(end - begin, end);
       encoding = encoding_after(*encoding);
     }
     change([&] { --running_job_count_; });
@@ -722,6 +732,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   std::size_t raw_head_ = 0;  // Everything before it is there; two places a slot.
   SlotPreparation preparation_{*cache_, tiles_};
   SendingWindow window_;
+  UrgentBudget budget_;
   std::uint32_t generation_ = 0;
   std::uint32_t last_sequence_ = 0;
   unsigned waiting_job_count_ = 0;

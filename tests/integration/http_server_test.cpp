@@ -257,6 +257,40 @@ TEST_F(HttpServerTest, RefusesABigBody) {
   EXPECT_EQ(status_of(response), 413);
 }
 
+TEST_F(HttpServerTest, AsksForTheBodyOfAGetThatWaitsForIt) {
+  RawClient client(server_->port());
+  client.send(
+      "GET /api/x HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 3\r\nConnection: "
+      "close\r\n\r\n");
+  EXPECT_EQ(status_of(client.receive_some().value_or("")), 100);
+  client.send("abc");
+  EXPECT_EQ(status_of(client.receive_all().value_or("")), 200);
+}
+
+TEST_F(HttpServerTest, CutsWhoReadsALongAnswerTooSlowly) {
+  server::NetOptions options = quick_options();
+  options.limits.write_timeout = std::chrono::seconds(20);
+  options.limits.download_patience = std::chrono::milliseconds(300);
+  options.limits.download_bytes_per_s = 1e8;
+  const std::size_t size = std::size_t{64} << 20U;
+  const TestServer server(
+      std::move(options),
+      [body = std::make_shared<const std::string>(size, 'x')](const server::HttpRequest&,
+                                                              const std::function<void(server::HttpReply)>& reply) {
+        reply({200, "text/plain", body, {}});
+      },
+      no_viewer);
+  RawClient slow(server.port());
+  slow.send("GET /api/x HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  std::size_t read = 0;
+  while (const auto part = slow.receive_some(std::chrono::seconds(5))) {
+    read += part->size();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_GT(read, 0U);
+  EXPECT_LT(read, size);
+}
+
 TEST_F(HttpServerTest, AnswersGarbageWith400) {
   EXPECT_EQ(status_of(http_exchange(server_->port(), "\x16\x03\x01\x02\r\n\r\n")), 400);
   EXPECT_EQ(status_of(http_exchange(server_->port(), "GET / HTTP/9.9\r\nHost: localhost\r\n\r\n")), 400);

@@ -8,8 +8,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "fusion/mesh/demo_scene.hpp"
 #include "protocol/draco_codec.hpp"
 #include "protocol/tile_frame.hpp"
 #include "server/app/http_api.hpp"
@@ -179,6 +181,55 @@ TEST_F(ViewerSessionTest, TakesBlocksWhenTheMapIsOpen) {
   EXPECT_EQ(served_.scenes.current()->vertex_count(), 1U);
   map_.end();
   EXPECT_EQ(put(), 503);
+}
+
+TEST_F(ViewerSessionTest, ABurstOfLargeAnswersIsRefusedInPartAndCutsNobody) {
+  serve(fusion::demo_scene({.vertex_count = 20'000, .seed = 3}));
+  RawWebSocket viewer(server_->port());
+  viewer.client().set_receive_buffer(4096);
+  ASSERT_TRUE(viewer.receive_text());
+  constexpr int kBurst = 16;
+  for (int i = 1; i <= kBurst; ++i) {
+    viewer.send_text(
+        json{{"jsonrpc", "2.0"}, {"id", i}, {"method", "scene.histogram"}, {"params", {{"bins", 4096}}}}.dump());
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  int answered = 0, refused = 0;
+  while (answered + refused < kBurst) {
+    const auto text = viewer.receive_text();
+    ASSERT_TRUE(text) << "cut after " << answered << " answers and " << refused << " refusals";
+    const auto message = json::parse(*text);
+    if (!message.contains("id")) continue;
+    if (message.contains("result")) {
+      ++answered;
+    } else {
+      EXPECT_EQ(message["error"]["code"], -32003);
+      ++refused;
+    }
+  }
+  EXPECT_GT(answered, 0);
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(ViewerSessionTest, AFileThatIsBeingSentIsNotMadeAgainAndHindersNobody) {
+  serve(fusion::demo_scene({.vertex_count = 300'000, .seed = 3}));
+  const auto ask = [](const std::string& query) {
+    return "GET /api/v1/scene.ply?method=visible_only" + query + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  };
+  // Many who do not read on, of a few files.
+  std::vector<RawClient> slow;
+  for (int i = 0; i < 6; ++i) {
+    slow.emplace_back(server_->port());
+    slow.back().set_receive_buffer(4096);
+    slow.back().send(ask(""));
+    const auto begin = slow.back().receive_some();
+    ASSERT_TRUE(begin);
+    EXPECT_EQ(status_of(*begin), 200) << i;
+  }
+  EXPECT_EQ(status_of(get("/api/v1/scene.ply?method=thermal_only")), 200);
+  const auto whole = get("/api/v1/scene.ply?method=visible_only");
+  EXPECT_EQ(status_of(whole), 200);
+  EXPECT_GT(whole.size(), 300'000U * 12);
 }
 
 TEST_F(ViewerSessionTest, BlocksBeyondTheBoundAreRefusedBeforeTheyAreRead) {
@@ -393,6 +444,8 @@ TEST_F(ViewerSessionTest, NamesTheFieldThatIsWrong) {
       {"fusion.set", {{"range", {{"mode", "percentile"}, {"low", "few"}}}}, "range.low"},
       {"fusion.set", {{"missing", "red"}}, "missing"},
       {"scene.subscribe", {{"channels", {"temperature"}}}, "channels"},
+      {"quality.set", {{"position_step_mm", 1e300}}, "position_step_mm"},
+      {"quality.set", {{"position_step_mm", 1'000'001}}, "position_step_mm"},
       {"scene.histogram", {{"bins", 0}}, "bins"},
       {"scene.histogram", json::object(), "bins"},
       {"scene.probe", {{"position", {1, 2}}}, "position"},

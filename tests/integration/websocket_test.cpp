@@ -137,6 +137,12 @@ TEST_F(WebSocketTest, AnswersABadUpgradeWithAnError) {
                 100,
             4);
   EXPECT_EQ(status_of(http_exchange(port(), upgrade + "Sec-WebSocket-Version: 13\r\n\r\n")) / 100, 4);
+  const std::string key = "Sec-WebSocket-Key: ";
+  for (const auto& keys :
+       {key + "YWJj\r\n", key + "dGhlIHNhbXBsZSBub25jZQ==\r\n" + key + "dGhlIHNhbXBsZSBub25jZQ==\r\n",
+        key + "dGhlIHNhbXBsZSBub25jZQ!=\r\n", key + "dGhlIHNhbXBsZSBub25jZTEy\r\n", key + "\r\n"}) {
+    EXPECT_EQ(status_of(http_exchange(port(), upgrade + "Sec-WebSocket-Version: 13\r\n" + keys + "\r\n")), 400) << keys;
+  }
   EXPECT_EQ(status_of(http_exchange(port(), upgrade +
                                                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
                                                 "dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n" +
@@ -188,6 +194,9 @@ TEST_F(WebSocketTest, AnswersBrokenFramesWithTheirCloseCodes) {
       {"close with half a code", masked_frame(8, "\x03"), 1002},
       {"close with a reserved code", masked_frame(8, std::string("\x03\xed", 2)), 1002},
       {"close with a reason that is not UTF-8", masked_frame(8, std::string("\x03\xe8\xff", 3)), 1002},
+      {"close with a code beyond all", masked_frame(8, std::string("\x13\x88", 2)), 1002},
+      {"close with the largest code", masked_frame(8, std::string("\xff\xff", 2)), 1002},
+      {"close with a code of one's own", masked_frame(8, std::string("\x13\x87", 2)), 4999},
       {"close as it should be", masked_frame(8, std::string("\x03\xe8", 2)), 1000},
   };
   for (const auto& [what, bytes, code] : cases) {

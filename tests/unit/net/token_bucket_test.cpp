@@ -22,6 +22,16 @@ TEST(TokenBucket, KeepsNoMoreThanItsBurst) {
   EXPECT_EQ(bucket.wait_s(2e6), 0);
 }
 
+TEST(TokenBucket, GivesManyAtOnceAndMoreThanItHoldsWhenItIsFull) {
+  TokenBucket bucket(100, 50);
+  EXPECT_TRUE(bucket.take(10, 30));
+  EXPECT_FALSE(bucket.take(10, 30));
+  EXPECT_NEAR(bucket.wait_s(10, 30), 0.1, 1e-9);
+  EXPECT_TRUE(bucket.take(10.2, 30));
+  EXPECT_TRUE(bucket.take(20, 1000)) << "else it would never come";
+  EXPECT_FALSE(bucket.take(20, 1));
+}
+
 TEST(TokenBucket, NeverRefusesASliderAtItsPace) {
   TokenBucket bucket(300, 600);
   for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(bucket.take(i / 120.0));

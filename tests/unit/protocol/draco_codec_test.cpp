@@ -97,6 +97,17 @@ TEST(EncodedGeometry, KeepsATriangleThatNamesAVertexTwiceOrThrice) {
   expect_faithful({{{3, 4, 5}}, {{0, 0, 0}}}, 1.0F, 7);
 }
 
+TEST(EncodedGeometry, KeepsAFanOfManyTrianglesWithCopiesOfItsCentre) {
+  Input fan;
+  constexpr std::int32_t kRim = 20'001;
+  fan.positions.push_back({0, 0, 0});
+  for (std::int32_t i = 0; i < kRim; ++i) fan.positions.push_back({1 + i % 150, 1 + i / 150, i % 7});
+  for (std::uint32_t i = 1; i < kRim; ++i) fan.triangles.push_back({0, i, i + 1});
+  expect_faithful(fan, 0.001F, 7);
+  const auto encoded = encoded_geometry(fan.positions, fan.triangles, 0.001F, 7).value();
+  EXPECT_GE(std::count(encoded.input_of_decoded.begin(), encoded.input_of_decoded.end(), 0U), 20);
+}
+
 TEST(EncodedGeometry, LeavesOutVerticesOfNoTriangle) {
   Input input{{{9, 9, 9}, {0, 0, 0}, {5, 0, 0}, {8, 8, 8}, {0, 5, 0}}, {{1, 2, 4}}};
   const auto encoded = encoded_geometry(input.positions, input.triangles, 0.25F, 7);
