@@ -383,17 +383,20 @@ void ViewerSession::facts(const Id& id, const json& params) {
   if (!request) return answer(id, refused(request.error()));
   if (!scene_) return answer(id, no_scene());
   // With what plans are prepared, which follows a live map in steps.
-  answer_from_pool(id, [temperature = scene_->reference_temperature(), request = request.value()]() -> Answer {
-    protocol::FactsReply reply = facts_message(temperature->summary);
-    if (request.bins && temperature->summary.has_temperature())
-      reply.counts = temperature->histogram(*request.bins).counts;
-    if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
-    if (request.hues.value_or(false)) {
-      const auto chroma = temperature->hues().chroma;
-      reply.hues.emplace(chroma.begin(), chroma.end());
-    }
-    return protocol::to_json(reply);
-  });
+  const std::size_t size_bytes =
+      kSmallAnswerBytes + (request.value().bins.value_or(0) + fusion::Hues::kSectors) * kBinBytes;
+  answer_from_pool(id, size_bytes,
+                   [temperature = scene_->reference_temperature(), request = request.value()]() -> Answer {
+                     protocol::FactsReply reply = facts_message(temperature->summary);
+                     if (request.bins && temperature->summary.has_temperature())
+                       reply.counts = temperature->histogram(*request.bins).counts;
+                     if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
+                     if (request.hues.value_or(false)) {
+                       const auto chroma = temperature->hues().chroma;
+                       reply.hues.emplace(chroma.begin(), chroma.end());
+                     }
+                     return protocol::to_json(reply);
+                   });
 }
 
 void ViewerSession::probe(const Id& id, const json& params) {

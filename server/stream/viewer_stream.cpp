@@ -664,8 +664,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       if (startable++ == 0) priority = order_.slots()[index]->tile->id.level;
     }
     if (startable == 0) return;
-    const int level = order_.slots()[first_startable]->tile->id.level;
-    const int priority = budget_.is_left(UrgentBudget::Clock::now()) ? level : kInTurnPriority;
+    if (!budget_.is_left(UrgentBudget::Clock::now())) priority = std::max(priority, kInTurnPriority);
     while (waiting_job_count_ < startable && waiting_job_count_ + running_job_count_ < most) {
       ++waiting_job_count_;
       pool_.post(

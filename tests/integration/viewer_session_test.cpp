@@ -443,7 +443,7 @@ TEST_F(ViewerSessionTest, NamesTheFieldThatIsWrong) {
       {"fusion.set", {{"range", {{"mode", "percentile"}, {"high", 101}}}}, "range.high"},
       {"fusion.set", {{"range", {{"mode", "percentile"}, {"low", "few"}}}}, "range.low"},
       {"fusion.set", {{"missing", "red"}}, "missing"},
-      {"scene.subscribe", {{"channels", {"temperature"}}}, "channels"},
+      {"scene.subscribe", {{"channels", {"infrared"}}}, "channels"},
       {"quality.set", {{"position_step_mm", 1e300}}, "position_step_mm"},
       {"quality.set", {{"position_step_mm", 1'000'001}}, "position_step_mm"},
       {"scene.histogram", {{"bins", 0}}, "bins"},
