@@ -14,8 +14,10 @@ import {
   WebGLRenderer,
   WebGLRenderTarget,
 } from 'three';
-import type { Vec3 } from '../protocol/messages';
+import type { SceneFacts } from '../fusion/fusion_module';
+import type { FusionChange, Vec3 } from '../protocol/messages';
 import { clearSight } from './clear_sight';
+import { celsiusOf } from './codes';
 import { depthRange } from './depth_range';
 import { Outline } from './outline';
 import { PictureBuffer } from './picture_buffer';
@@ -31,7 +33,7 @@ import type {
   TileArrays,
 } from './render_messages';
 import { SlicePace, Slices } from './slices';
-import { celsiusOf, TileFuser } from './tile_fuser';
+import type { TileFuser } from './tile_fuser';
 import { TileMaterials } from './tile_materials';
 
 // Colours are sRGB bytes made by the server; nothing may convert them on their way to the screen.
@@ -90,6 +92,8 @@ export class PictureRenderer {
   #picture: Picture | null = null;
   #pointDiameter: number | null = null;
   #fuser: TileFuser | null = null;
+  #facts: SceneFacts | null = null;
+  #settings: FusionChange | null = null;
   /** Of the settings that tiles are fused with here; 0: none. */
   #fusing = 0;
   #settingsCount = 0;
@@ -179,11 +183,10 @@ export class PictureRenderer {
         break;
       }
       case 'module':
-        this.#orSay(() => {
-          this.#fuser = new TileFuser(command.module);
-        });
+        this.#load(command.module);
         break;
       case 'facts':
+        this.#facts = command.facts;
         this.#orSay(() => this.#fuser?.setFacts(command.facts));
         break;
       case 'fuse': {
@@ -192,14 +195,11 @@ export class PictureRenderer {
           // Hidden tiles, too, keep what was set last.
           this.#fuseTiles(() => true);
           this.#fusing = 0;
+          this.#settings = null;
           break;
         }
-        this.#orSay(() => {
-          if (this.#fuser === null) throw new Error('the library is not there');
-          this.#fuser.setSettings(settings);
-          this.#settingsCount += 1;
-          this.#fusing = this.#settingsCount;
-        });
+        this.#settings = settings;
+        this.#orSay(() => this.#useSettings());
         break;
       }
       case 'visible': {
@@ -232,6 +232,27 @@ export class PictureRenderer {
     }
   }
 
+  /** The library that fuses, which the first pictures do without. */
+  #load(module: WebAssembly.Module): void {
+    import('./tile_fuser')
+      .then(({ TileFuser }) => {
+        this.#fuser = new TileFuser(module);
+        if (this.#facts !== null) this.#fuser.setFacts(this.#facts);
+        this.#useSettings();
+        this.#fuseTiles(({ isShown }) => isShown);
+        this.#drawSoon();
+      })
+      .catch((error: unknown) => this.#cannotFuse(error));
+  }
+
+  /** As soon as the library is there. */
+  #useSettings(): void {
+    if (this.#settings === null || this.#fuser === null) return;
+    this.#fuser.setSettings(this.#settings);
+    this.#settingsCount += 1;
+    this.#fusing = this.#settingsCount;
+  }
+
   /** Tiles that are seen change all in the same picture, those that are not when they are. */
   #fuseTiles(isWanted: (tile: Tile) => boolean): void {
     const fuser = this.#fuser;
@@ -250,9 +271,14 @@ export class PictureRenderer {
     try {
       act();
     } catch (error) {
-      this.#fusing = 0;
-      this.reply({ kind: 'not_fused', message: error instanceof Error ? error.message : String(error) });
+      this.#cannotFuse(error);
     }
+  }
+
+  #cannotFuse(error: unknown): void {
+    this.#fusing = 0;
+    this.#settings = null;
+    this.reply({ kind: 'not_fused', message: error instanceof Error ? error.message : String(error) });
   }
 
   #nearestVertex([x, y, z]: Vec3): ProbedVertex | null {

@@ -2,18 +2,6 @@ import { FusionModule, type SceneFacts } from '../fusion/fusion_module';
 import type { FusionChange } from '../protocol/messages';
 import type { RawArrays } from './render_messages';
 
-const UNDER_RANGE = 65533;
-const OVER_RANGE = 65534;
-const MISSING = 65535;
-
-/** degC of a code; see docs/protocol.md. */
-export function celsiusOf(code: number, { scale, offset }: Pick<RawArrays, 'scale' | 'offset'>): number {
-  if (code === MISSING) return Number.NaN;
-  if (code === OVER_RANGE) return Infinity;
-  if (code === UNDER_RANGE) return -Infinity;
-  return Math.fround(Math.fround(code * scale) + offset);
-}
-
 /** Fuses tiles with the library, one after the other. What it throws says why it cannot. */
 export class TileFuser {
   readonly #module: FusionModule;

@@ -4,6 +4,7 @@
  */
 
 import type { FusionChange, ParameterValue } from '../protocol/messages';
+import { FusionRefusal } from './fusion_refusal';
 
 /** What fusion/module/module.cpp exports; addresses are bytes from the start of its memory. */
 interface Exports extends WebAssembly.Exports {
@@ -75,17 +76,6 @@ const FACTS_MISSING = -1;
 const KIND_TOGGLE = 3;
 const KIND_CHOICE = 4;
 const KIND_AUTOMATIC = 0;
-
-/** The library refuses, as the robot would: with its number, its sentence and the field it is about. */
-export class FusionRefusal extends Error {
-  constructor(
-    readonly code: number,
-    readonly field: string,
-    message: string,
-  ) {
-    super(message);
-  }
-}
 
 /** Facts of the temperatures of the whole scene. */
 export interface SceneSummary {

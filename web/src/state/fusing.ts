@@ -1,5 +1,6 @@
 import address from 'virtual:fusion-module';
-import { FusionModule, FusionRefusal, type SceneFacts, type WantedFacts } from '../fusion/fusion_module';
+import type { FusionModule, SceneFacts, WantedFacts } from '../fusion/fusion_module';
+import { FusionRefusal } from '../fusion/fusion_refusal';
 import { facts as factsReply, type Fusion, type FusionChange } from '../protocol/messages';
 import { wholeChange } from './fusion_change';
 import type { Store } from './store.svelte';
@@ -244,8 +245,9 @@ export class Fusing {
   #load(): void {
     if (this.#isLoading || this.#compiled !== null) return;
     this.#isLoading = true;
-    this.fetchModule()
-      .then(async (compiled) => {
+    // Nothing of it belongs to the first picture.
+    Promise.all([this.fetchModule(), import('../fusion/fusion_module')])
+      .then(async ([compiled, { FusionModule }]) => {
         this.#planner = await FusionModule.instantiate(compiled);
         this.#compiled = compiled;
         this.picture.startFusing(compiled);

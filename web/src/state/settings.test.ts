@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { FusionRefusal } from '../fusion/fusion_module';
+import { FusionRefusal } from '../fusion/fusion_refusal';
 import type { Fusion, FusionChange } from '../protocol/messages';
 import { BUSY, ConnectionLost, RpcError } from '../transport/connection';
 import { Settings } from './settings';

@@ -1,7 +1,7 @@
 import { type Fusion, type FusionChange, fusionState, type ParameterValue, type RangeChange } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, RpcError } from '../transport/connection';
-import { FusionRefusal } from '../fusion/fusion_module';
+import { FusionRefusal } from '../fusion/fusion_refusal';
 import { mergedChange, rangeChange, wholeChange } from './fusion_change';
 import { unmeasuredColour } from './unmeasured';
 import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } from './store.svelte';
