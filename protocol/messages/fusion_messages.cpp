@@ -23,6 +23,12 @@ std::span<const EnumWord<RangeMode>> words_of() {
   return kWords;
 }
 
+template <>
+std::span<const EnumWord<AgeMode>> words_of() {
+  static constexpr EnumWord<AgeMode> kWords[] = {{AgeMode::Off, "off"}, {AgeMode::Fade, "fade"}};
+  return kWords;
+}
+
 /// A value whose type is told by the JSON itself.
 template <>
 Result<ParameterValue> Wire<ParameterValue>::read(const nlohmann::json& value, std::string_view path) {
@@ -137,6 +143,17 @@ static void describe(auto& fields, Is<RangeChange> auto& message) {
   fields.require("max", !is_manual || message.min <= message.max, "a number not below min");
 }
 
+static void describe(auto& fields, Is<FusionAge> auto& message) {
+  fields.field("mode", message.mode);
+  fields.field("half_life_s", message.half_life_s);
+  fields.require("half_life_s", message.half_life_s > 0, "a number above 0");
+}
+
+static void describe(auto& fields, Is<AgeChange> auto& message) {
+  fields.optional("mode", message.mode);
+  fields.optional("half_life_s", message.half_life_s);
+}
+
 static void describe(auto& fields, Is<ChangeScale> auto& message) {
   fields.field("min", message.min);
   fields.field("max", message.max);
@@ -151,6 +168,7 @@ static void describe(auto& fields, Is<FusionState> auto& message) {
   fields.field("range", message.range);
   fields.field("missing", message.missing);
   fields.require("missing", is_missing_display(message.missing), kMissingDisplay);
+  fields.field("age", message.age);
   fields.optional("change_scale", message.change_scale);
 }
 
@@ -161,6 +179,7 @@ static void describe(auto& fields, Is<FusionChange> auto& message) {
   fields.optional("range", message.range);
   fields.optional("missing", message.missing);
   fields.require("missing", is_missing_display(message.missing.value_or("visible")), kMissingDisplay);
+  fields.optional("age", message.age);
 }
 
 static void describe(auto& fields, Is<FusionReply> auto& message) {
@@ -173,6 +192,8 @@ template struct Wire<MethodDescription>;
 template struct Wire<PaletteDescription>;
 template struct Wire<FusionRange>;
 template struct Wire<RangeChange>;
+template struct Wire<FusionAge>;
+template struct Wire<AgeChange>;
 template struct Wire<ChangeScale>;
 template struct Wire<FusionState>;
 template struct Wire<FusionChange>;

@@ -77,6 +77,20 @@ struct RangeChange {
   std::optional<double> high;
 };
 
+enum class AgeMode { Off, Fade };
+
+/// How the age of what was seen is shown.
+struct FusionAge {
+  AgeMode mode = AgeMode::Off;
+  double half_life_s = 300;
+};
+
+/// The same as it is set; what is absent stays.
+struct AgeChange {
+  std::optional<AgeMode> mode;
+  std::optional<double> half_life_s;
+};
+
 /// The changes of temperature at the ends of the palette, kelvin; min < max.
 struct ChangeScale {
   double min = 0;
@@ -90,7 +104,8 @@ struct FusionState {
   ParameterValues params_in_force;  ///< Automatic values as numbers; null when the scene has no temperature.
   std::string palette;
   FusionRange range;
-  std::string missing = "visible";          ///< "visible" or "#rrggbb".
+  std::string missing = "visible";  ///< "visible" or "#rrggbb".
+  FusionAge age;
   std::optional<ChangeScale> change_scale;  ///< What the palette stands for where that is not the range.
 };
 
@@ -101,6 +116,7 @@ struct FusionChange {
   std::optional<std::string> palette;
   std::optional<RangeChange> range;
   std::optional<std::string> missing;  ///< "visible" or "#rrggbb", checked.
+  std::optional<AgeChange> age;
 };
 
 /// Result of fusion.set and fusion.get; params of fusion.changed.
@@ -123,6 +139,8 @@ extern template struct Wire<MethodDescription>;
 extern template struct Wire<PaletteDescription>;
 extern template struct Wire<FusionRange>;
 extern template struct Wire<RangeChange>;
+extern template struct Wire<FusionAge>;
+extern template struct Wire<AgeChange>;
 extern template struct Wire<ChangeScale>;
 extern template struct Wire<FusionState>;
 extern template struct Wire<FusionChange>;

@@ -10,6 +10,12 @@ std::span<const EnumWord<BeyondRange>> words_of() {
   return kWords;
 }
 
+template <>
+std::span<const EnumWord<BaselineAction>> words_of() {
+  static constexpr EnumWord<BaselineAction> kWords[] = {{BaselineAction::Mark, "mark"}, {BaselineAction::Get, "get"}};
+  return kWords;
+}
+
 static void describe(auto& fields, Is<HistogramRequest> auto& message) {
   fields.field("bins", message.bins);
   fields.require("bins", message.bins >= 1 && message.bins <= 4096, "an integer from 1 to 4096");
@@ -40,6 +46,18 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.field("fused", message.fused);
   fields.field("distance", message.distance);
   fields.require("distance", message.distance >= 0, "a number not below 0");
+  fields.nullable("observed_at", message.observed_at);
+  fields.nullable("baseline", message.baseline);
+  fields.nullable("baseline_at", message.baseline_at);
+}
+
+static void describe(auto& fields, Is<BaselineRequest> auto& message) {
+  fields.field("action", message.action);
+}
+
+static void describe(auto& fields, Is<BaselineReply> auto& message) {
+  fields.nullable("marked_at", message.marked_at);
+  fields.field("revision", message.revision);
 }
 
 static void describe(auto& fields, Is<ExtremesRequest> auto& message) {
@@ -90,6 +108,8 @@ template struct Wire<HistogramRequest>;
 template struct Wire<HistogramReply>;
 template struct Wire<ProbeRequest>;
 template struct Wire<ProbeReply>;
+template struct Wire<BaselineRequest>;
+template struct Wire<BaselineReply>;
 template struct Wire<ExtremesRequest>;
 template struct Wire<Extreme>;
 template struct Wire<ExtremesReply>;

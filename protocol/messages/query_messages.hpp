@@ -43,7 +43,24 @@ struct ProbeReply {
   std::optional<BeyondRange> temperature_range;  ///< Absent where the sensor could tell the temperature, or has none.
   std::array<std::uint8_t, 3> visible{};
   std::array<std::uint8_t, 3> fused{};
-  double distance = 0;  ///< Metres.
+  double distance = 0;                ///< Metres.
+  std::optional<double> observed_at;  ///< When it was seen, Unix seconds; null = not known.
+  std::optional<double> baseline;     ///< degC; null = there is none, or it is beyond the sensor's range.
+  std::optional<double> baseline_at;  ///< The time it is of, Unix seconds; null = not known.
+};
+
+enum class BaselineAction { Mark, Get };
+
+/// Params of scene.baseline.
+struct BaselineRequest {
+  BaselineAction action = BaselineAction::Get;
+};
+
+/// Result of scene.baseline.
+struct BaselineReply {
+  std::optional<double>
+      marked_at;  ///< Unix seconds; null = never: vertices are compared with what they were when first seen.
+  std::uint32_t revision = 0;  ///< Of the scene that has it.
 };
 
 /// A place and its temperature, degC.
@@ -95,6 +112,8 @@ extern template struct Wire<HistogramRequest>;
 extern template struct Wire<HistogramReply>;
 extern template struct Wire<ProbeRequest>;
 extern template struct Wire<ProbeReply>;
+extern template struct Wire<BaselineRequest>;
+extern template struct Wire<BaselineReply>;
 extern template struct Wire<ExtremesRequest>;
 extern template struct Wire<Extreme>;
 extern template struct Wire<ExtremesReply>;

@@ -43,6 +43,10 @@ static void describe(auto& fields, Is<SceneObserved> auto& message) {
   fields.nullable("newest", message.newest);
 }
 
+static void describe(auto& fields, Is<SceneBaseline> auto& message) {
+  fields.nullable("marked_at", message.marked_at);
+}
+
 static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("name", message.name);
   fields.field("revision", message.revision);
@@ -61,6 +65,7 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.optional("metric", message.metric);
   fields.optional("live", message.live);
   fields.optional("observed", message.observed);
+  fields.optional("baseline", message.baseline);
   fields.field("notes", message.notes);
 }
 

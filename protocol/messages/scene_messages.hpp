@@ -48,6 +48,11 @@ struct SceneObserved {
   std::optional<double> newest;
 };
 
+/// What temperatures are compared with.
+struct SceneBaseline {
+  std::optional<double> marked_at;  ///< Unix seconds; null = never: with what they were when first seen.
+};
+
 /// SCENE: what is served.
 struct SceneDescription {
   std::string name;
@@ -66,7 +71,8 @@ struct SceneDescription {
   std::optional<bool> metric;  ///< Positions are known to be in metres; else they are taken for it.
   std::optional<bool> live;    ///< A map that began empty and is expected to grow.
   std::optional<SceneObserved> observed;
-  std::vector<SceneNote> notes;  ///< What loading noticed.
+  std::optional<SceneBaseline> baseline;  ///< Absent: the scene does not remember, as a file.
+  std::vector<SceneNote> notes;           ///< What loading noticed.
 };
 
 /// Params of scene.changed.

@@ -116,9 +116,10 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
   return scene;
 }
 
-std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan) {
+std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
+                                        std::span<const float> baseline_celsius) {
   std::vector<fusion::Rgb8> fused(mesh.vertex_count());
-  plan.fuse(mesh.temperature_celsius(), mesh.visible(), fused);
+  plan.fuse({mesh.temperature_celsius(), mesh.visible(), baseline_celsius}, fused);
   return fused;
 }
 

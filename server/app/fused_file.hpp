@@ -32,7 +32,8 @@ std::string_view content_type_of(SceneFileFormat format);
 fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh);
 
 /// The fused colour of every vertex, in the mesh's order.
-std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan);
+std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
+                                        std::span<const float> baseline_celsius = {});
 
 /// How a fused scene is written.
 struct SceneFileOptions {

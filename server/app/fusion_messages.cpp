@@ -203,6 +203,8 @@ protocol::FusionState to_message(const fusion::FusionPlan& plan, const fusion::T
     message.range.low = settings.range.low_percent;
     message.range.high = settings.range.high_percent;
   }
+  message.age = {settings.age.mode == fusion::AgeMode::Fade ? protocol::AgeMode::Fade : protocol::AgeMode::Off,
+                 settings.age.half_life_s};
   if (const auto& scale = plan.change_scale()) message.change_scale = {scale->minimum, scale->maximum};
   for (const auto& [name, value] : settings.params) {
     if (!scene.has_temperature() && std::holds_alternative<fusion::Automatic>(value)) {
@@ -225,6 +227,12 @@ protocol::Result<fusion::FusionChange> from_message(const protocol::FusionChange
     if (!missing) return protocol::refusal(protocol::RpcErrorCode::InvalidParams, missing.error().message, "missing");
     change.missing = missing.value();
   }
+  if (message.age) {
+    if (message.age->mode) {
+      change.age.mode = *message.age->mode == protocol::AgeMode::Fade ? fusion::AgeMode::Fade : fusion::AgeMode::Off;
+    }
+    change.age.half_life_s = message.age->half_life_s;
+  }
   return change;
 }
 
@@ -234,7 +242,7 @@ protocol::RpcError to_rpc_error(const fusion::Error& error) {
   message.message = error.message;
   const bool is_own_field = error.field.empty() || error.field == "method" || error.field == "palette" ||
                             error.field == "range" || error.field.starts_with("range.") || error.field == "missing" ||
-                            error.field.starts_with("params.");
+                            error.field.starts_with("age.") || error.field.starts_with("params.");
   message.field = is_own_field ? error.field : "params." + error.field;
   return message;
 }
@@ -287,6 +295,7 @@ protocol::SceneDescription to_message(const SceneSnapshot& scene) {
     message.observed->oldest = observed->first;
     message.observed->newest = observed->second;
   }
+  if (scene.baseline_mark()) message.baseline = protocol::SceneBaseline{scene.baseline_marked_at()};
   for (const auto& note : scene.notes()) message.notes.push_back({note.id, note.count, note.message});
   return message;
 }
@@ -334,6 +343,11 @@ protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
   message.visible = to_message(probe.visible);
   message.fused = to_message(fused);
   message.distance = probe.distance_m;
+  message.observed_at = probe.observed_at;
+  if (probe.baseline_celsius && std::isfinite(*probe.baseline_celsius)) {
+    message.baseline = double{*probe.baseline_celsius};
+  }
+  message.baseline_at = probe.baseline_at;
   return message;
 }
 

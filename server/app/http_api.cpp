@@ -102,7 +102,7 @@ fusion::Result<SceneFile> fused_export(const SceneSnapshot& scene, const fusion:
   if (is_rounded) {
     BOOST_OUTCOME_TRYV(round_for_file(scene, mesh, options));
   }
-  return scene_file(mesh, fused_colours(mesh, plan), options);
+  return scene_file(mesh, fused_colours(mesh, plan, scene.whole_baseline()), options);
 }
 
 }  // namespace

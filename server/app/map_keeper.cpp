@@ -18,6 +18,7 @@
 #include "fusion/mesh/ply_reader.hpp"
 #include "fusion/mesh/scene_survey.hpp"
 #include "server/app/block_options.hpp"
+#include "server/app/stored_baseline.hpp"
 #include "server/store/time_text.hpp"
 
 namespace spectra::server {
@@ -84,6 +85,10 @@ fusion::Result<fusion::LoadedScene> read_stored(const store::StoredBlock& stored
   BOOST_OUTCOME_TRY(auto block, incoming_block(told.id, told.read_options));
   block.ply = stored.ply;
   return loaded(block, origin);
+}
+
+double unix_seconds(std::chrono::sys_time<std::chrono::system_clock::duration> time) {
+  return std::chrono::duration<double>(time.time_since_epoch()).count();
 }
 
 BlockEntry entry_of(const store::BlockFacts& facts) {
@@ -168,7 +173,9 @@ MapKeeper::MapKeeper(ServedScene& served, std::unique_ptr<store::BlockStore> sto
                      const std::optional<store::StoreTime>& at)
     : served_(served), store_(std::move(store)), at_(at), writer_([this] { run(); }), coarse_maker_([this] {
         make_coarse();
-      }) {}
+      }) {
+  served_.mark_baseline = [this](BaselineDone done) { mark_baseline(std::move(done)); };
+}
 
 MapKeeper::~MapKeeper() {
   end();
@@ -201,7 +208,14 @@ std::optional<std::string> MapKeeper::restore() {
       if (!constants) return "the store's constants of the map cannot be read";
       origin = constants->origin;
     }
-    served_.scenes.begin(constants, at_ ? std::optional("map of " + store::utc_text(*at_)) : std::nullopt);
+    StoredMark marked;
+    if (const auto text = store_->constant(kBaselineKey)) {
+      const auto found = mark_from(*text);
+      if (!found) return "the store's mark of the baseline cannot be read";
+      // A later one says nothing of the map as it was.
+      if (!at_ || unix_seconds(*at_) >= *found->mark.marked_at) marked = *found;
+    }
+    served_.scenes.begin(constants, at_ ? std::optional("map of " + store::utc_text(*at_)) : std::nullopt, marked.mark);
     const auto visited = store_->visit(at_, [&](const store::StoredBlock& stored) {
       auto scene = read_stored(stored, origin);
       const BlockEntry entry = entry_of(stored.facts);
@@ -209,8 +223,15 @@ std::optional<std::string> MapKeeper::restore() {
         problem = "block " + entry.id + ": " + scene.error().message;
         return false;
       }
+      const bool was_marked = entry.revision <= marked.revision;
+      const std::string_view bytes = stored.baseline && !was_marked ? std::string_view(*stored.baseline) : "";
+      auto baseline = baseline_from(bytes, scene.value().mesh.vertex_count());
+      if (!baseline) {
+        problem = "block " + entry.id + ": its baseline cannot be read";
+        return false;
+      }
       entries[entry.id] = entry;
-      change.put.push_back({entry.id, std::move(scene).value(), entry.observed_at});
+      change.put.push_back({entry.id, std::move(scene).value(), entry.observed_at, std::move(baseline), was_marked});
       return true;
     });
     if (!problem && !visited) problem = visited.error().message;
@@ -261,6 +282,10 @@ void MapKeeper::remove(std::string id, RemoveDone done, WhenFull when_full) {
   enqueue(Remove{std::move(id), std::move(done)}, 0, when_full);
 }
 
+void MapKeeper::mark_baseline(BaselineDone done) {
+  enqueue(Mark{std::move(done)}, 0, WhenFull::Refuse);
+}
+
 void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
   std::optional<BlockRefusal> refusal;
   {
@@ -278,7 +303,7 @@ void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
     } else if (when_full == WhenFull::Refuse && waiting_.size() >= kWaitingChanges) {
       refusal = busy("too many changes are waiting", std::to_string(kWaitingChanges));
     } else {
-      const bool is_ready = std::holds_alternative<Remove>(change);
+      const bool is_ready = !std::holds_alternative<Put>(change);
       waiting_.push_back({.change = std::move(change), .is_ready = is_ready});
       if (is_ready) {
         has_work_.notify_one();
@@ -343,6 +368,7 @@ void MapKeeper::read_next() {
 void MapKeeper::refuse(Change& change, const BlockRefusal& refusal) {
   if (auto* put = std::get_if<Put>(&change)) put->done(refusal);
   if (auto* gone = std::get_if<Remove>(&change)) gone->done(refusal);
+  if (auto* marking = std::get_if<Mark>(&change)) marking->done(refusal);
 }
 
 const std::string& MapKeeper::id_of(const Change& change) {
@@ -356,7 +382,11 @@ void MapKeeper::run() {
     if (batch.empty()) return;
     const bool has_put =
         std::any_of(batch.begin(), batch.end(), [](const Change& c) { return std::holds_alternative<Put>(c); });
-    take(std::move(batch));
+    if (const auto* marking = std::get_if<Mark>(&batch.front())) {
+      mark(*marking);
+    } else {
+      take(std::move(batch));
+    }
     const std::lock_guard lock(mutex_);
     if (has_put && is_first_under_way_) read_next();
   }
@@ -402,6 +432,14 @@ std::vector<MapKeeper::Change> MapKeeper::next_batch() {
     std::size_t bytes = 0;
     for (auto waiting = waiting_.begin(); waiting != waiting_.end();) {
       const auto next = std::next(waiting);
+      if (std::holds_alternative<Mark>(waiting->change)) {
+        // Alone, and before all that came later.
+        if (batch.empty()) {
+          batch.push_back(std::move(waiting->change));
+          waiting_.erase(waiting);
+        }
+        break;
+      }
       const auto* put = std::get_if<Put>(&waiting->change);
       const std::size_t size = put != nullptr ? put->block.ply->size() : 0;
       if (named.insert(id_of(waiting->change)).second && waiting->is_ready) {
@@ -443,6 +481,11 @@ void MapKeeper::take(std::vector<Change> batch) {
     }
     return;
   }
+  for (Change& change : batch) {
+    auto* put = std::get_if<Put>(&change);
+    if (put == nullptr) continue;
+    put->baseline = served_.scenes.handed_on(put->block.id, put->scene.mesh, put->block.observed_at);
+  }
   const auto outcomes = stored(batch);
   std::vector<Change> taken;
   std::vector<store::Revision> revisions;
@@ -476,7 +519,8 @@ std::vector<store::StoreResult<store::Revision>> MapKeeper::stored(const std::ve
       const auto& mesh = put->scene.mesh;
       store_->put({{put->block.id, put->block.observed_at, put->block.sensor, put->block.read_text, mesh.vertex_count(),
                     mesh.triangle_count(), bounds_of_mesh(mesh)},
-                   put->block.ply},
+                   put->block.ply,
+                   std::make_shared<const std::string>(text_of(put->baseline))},
                   on_done);
     }
   }
@@ -498,7 +542,7 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
     taken[i] = {{put->block.id, revisions[i], put->block.observed_at, mesh.vertex_count(), mesh.triangle_count(),
                  bounds_of_mesh(mesh), store::to_hex(store::sha256(*put->block.ply))},
                 put->scene.notes};
-    wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at});
+    wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at, std::move(put->baseline)});
   }
   change_map(std::move(wanted));
   keep_constants();
@@ -523,6 +567,23 @@ void MapKeeper::change_map(MapChange change) {
     is_behind_ = true;
   }
   has_coarse_work_.notify_one();
+}
+
+void MapKeeper::mark(const Mark& wanted) {
+  const double now = unix_seconds(std::chrono::system_clock::now());
+  if (store_) {
+    const auto before = store_->constant(kBaselineKey);
+    const auto marked = before ? mark_from(*before) : std::nullopt;
+    const StoredMark next{{marked ? marked->mark.number + 1 : 1, now}, store_->status().last_revision};
+    std::promise<store::StoreResult<void>> promise;
+    auto outcome = promise.get_future();
+    store_->set_constant(kBaselineKey, text_of(next),
+                         [&promise](store::StoreResult<void> done) { promise.set_value(std::move(done)); });
+    if (const auto done = outcome.get(); !done) return wanted.done(refusal_of(done.error()));
+  }
+  const auto marked = served_.scenes.mark_baseline(now);
+  if (!marked) return wanted.done(busy("there is no map yet"));
+  wanted.done(BaselineMarked{now, marked->revision()});
 }
 
 void MapKeeper::keep_constants() {

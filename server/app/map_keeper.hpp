@@ -79,6 +79,10 @@ class MapKeeper {
   void put(IncomingBlock block, PutDone done, WhenFull when_full = WhenFull::Refuse);
   void remove(std::string id, RemoveDone done, WhenFull when_full = WhenFull::Refuse);
 
+  /// Makes the temperatures of all that was taken before the baseline of the map. `done` is called once, from any thread, when the
+  /// version that says so is published and the mark is durable where there is a store. Refused as the others.
+  void mark_baseline(BaselineDone done);
+
   /// Blocks in order of id, and whether there are more behind them.
   struct Page {
     std::vector<BlockEntry> blocks;
@@ -107,12 +111,16 @@ class MapKeeper {
     IncomingBlock block;
     fusion::LoadedScene scene;
     PutDone done;
+    BlockBaseline baseline = {};
   };
   struct Remove {
     std::string id;
     RemoveDone done;
   };
-  using Change = std::variant<Put, Remove>;
+  struct Mark {
+    BaselineDone done;
+  };
+  using Change = std::variant<Put, Remove, Mark>;
 
   /// A change in its place in the queue, where it waits from the call on, so that reading does not change the order.
   struct Waiting {
@@ -145,6 +153,7 @@ class MapKeeper {
   /// Publishes the map with a change; its coarse tiles follow.
   void change_map(MapChange change);
   void keep_constants();
+  void mark(const Mark& wanted);
   static void refuse(Change& change, const BlockRefusal& refusal);
   static const std::string& id_of(const Change& change);
   static Shapes shapes_of(const std::vector<Change>& batch);

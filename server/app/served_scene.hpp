@@ -7,10 +7,12 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "server/app/catalogue.hpp"
 #include "server/app/session_ids.hpp"
+#include "server/net/block_refusal.hpp"
 #include "server/scene/scene_store.hpp"
 #include "server/scene/worker_pool.hpp"
 #include "server/stream/viewer_stream.hpp"
@@ -35,6 +37,13 @@ class LoadingProgress {
   std::vector<std::weak_ptr<const Listener>> listeners_;
 };
 
+/// A moment whose temperatures have become the baseline, and the revision of the scene that says so.
+struct BaselineMarked {
+  double marked_at = 0;  ///< Unix seconds.
+  std::uint32_t revision = 0;
+};
+using BaselineDone = std::function<void(std::variant<BaselineMarked, BlockRefusal>)>;
+
 /// Everything that all sessions and requests of one server share. Outlives them.
 struct ServedScene {
   ServedScene(unsigned worker_count, std::size_t cache_capacity_bytes)
@@ -44,6 +53,8 @@ struct ServedScene {
   LoadingProgress progress;
   const SessionIds session_ids;
   const Catalogue catalogue;
+  /// MapKeeper::mark_baseline() of the map; set before there are sessions.
+  std::function<void(BaselineDone)> mark_baseline;
   std::atomic<std::uint64_t> viewer_count{0};
   FrameCache cache;
   WorkerPool pool;  ///< Last, so that it stops first: its jobs use the others.

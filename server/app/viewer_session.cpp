@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -38,6 +39,10 @@ const std::string kNotePrefix = "scene.";
 /// What settings are prepared with.
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
   return scene ? *scene->reference_temperature() : fusion::SceneTemperature{};
+}
+
+double unix_seconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 /// The error side of an answer.
@@ -132,8 +137,8 @@ void ViewerSession::opened() {
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
   hello.role = may(peer_.role(), Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
-  hello.capabilities = {"histogram", "probe",       "extremes", "extremes_in_view", "exports", "subtract_green",
-                        "resume",    "cache_bytes", "marks"};
+  hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
+                        "cache_bytes", "marks", "age",      "baseline"};
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
                   limits_.requests_per_s};
@@ -191,6 +196,7 @@ std::span<const ViewerSession::Request> ViewerSession::requests() {
       {"scene.probe", Right::Watch, Cost::Request, &Self::probe},
       {"fusion.facts", Right::Watch, Cost::Request, &Self::facts},
       {"scene.extremes", Right::Watch, Cost::Request, &Self::extremes},
+      {"scene.baseline", Right::Watch, Cost::Request, &Self::baseline},
   };
   return kRequests;
 }
@@ -410,8 +416,45 @@ void ViewerSession::probe(const Id& id, const json& params) {
     if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
     const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
     fusion::Rgb8 fused;
-    plan.fuse({&celsius, 1}, {&found->visible, 1}, {&fused, 1});
+    const float baseline = found->baseline_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
+    std::uint8_t freshness = fusion::AgeSteps::kFresh;
+    if (const auto& age = plan.settings().age; age.mode == fusion::AgeMode::Fade && found->observed_at) {
+      freshness = fusion::AgeSteps(age.half_life_s).freshness(unix_seconds() - *found->observed_at);
+    }
+    plan.fuse({{&celsius, 1}, {&found->visible, 1}, {&baseline, 1}, {&freshness, 1}}, {&fused, 1});
     return protocol::to_json(to_message(*found, fused));
+  });
+}
+
+void ViewerSession::baseline(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::BaselineRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  if (request.value().action == protocol::BaselineAction::Get) {
+    return answer(id, protocol::to_json(protocol::BaselineReply{scene_->baseline_marked_at(), scene_->revision()}));
+  }
+  if (!may(peer_.role(), Right::Operate)) {
+    return answer(
+        id, refusal(RpcErrorCode::Forbidden,
+                    "to mark the baseline is not for the role " + std::string(to_string(peer_.role())), "action"));
+  }
+  if (!served_.mark_baseline) return answer(id, refusal(RpcErrorCode::Busy, "the map is not open yet"));
+  served_.mark_baseline([weak_peer = weak_peer_, weak_self = weak_from_this(), id](const auto& outcome) {
+    const auto peer = weak_peer.lock();
+    if (!peer) return;
+    peer->post([weak_self, id, outcome] {
+      const auto self = weak_self.lock();
+      if (!self) return;
+      if (const auto* marked = std::get_if<BaselineMarked>(&outcome)) {
+        self->answer(id, protocol::to_json(protocol::BaselineReply{marked->marked_at, marked->revision}));
+      } else {
+        const auto& why = std::get<BlockRefusal>(outcome);
+        const auto code = why.status == 503   ? RpcErrorCode::Busy
+                          : why.status == 409 ? RpcErrorCode::InvalidRequest
+                                              : RpcErrorCode::InternalError;
+        self->answer(id, refusal(code, why.reason, why.field, why.limits));
+      }
+    });
   });
 }
 
@@ -470,6 +513,7 @@ void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& prepa
     scene_ = preparation->scene;
     if (preparation->plan) plan_ = preparation->plan;
     begin_stream();
+    tell_method_limits();
     notify("scene.changed", protocol::to_json(protocol::SceneChanged{to_message(*scene_)}));
     tell_notes();
   }
@@ -497,6 +541,7 @@ void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& prepa
 
 void ViewerSession::begin_stream() {
   if (stream_) {
+    stream_->set_time(unix_seconds());
     stream_->set_scene(scene_);
     return;
   }
@@ -524,9 +569,15 @@ void ViewerSession::tell_notes() {
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {
   plan_ = plan;
-  if (stream_) stream_->set_plan(std::move(plan));
+  if (stream_) {
+    stream_->set_time(unix_seconds());
+    stream_->set_plan(std::move(plan));
+  }
   peer_.wake();
+  tell_method_limits();
+}
 
+void ViewerSession::tell_method_limits() {
   const auto& settings = plan_->settings();
   const fusion::Method* method = fusion::find_method(settings.method);
   const bool lacks_temperature =
@@ -535,6 +586,12 @@ void ViewerSession::set_plan(fusion::FusionPlan plan) {
              lacks_temperature
                  ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
                  : std::nullopt);
+  const bool lacks_baseline = scene_ && method->compares_with_baseline && !scene_->baseline_mark();
+  set_status("no_baseline", protocol::StatusLevel::Warning,
+             lacks_baseline ? std::optional("This scene has no baseline: " + method->label +
+                                            " shows the visible colours. Put blocks into it, or mark a baseline: then "
+                                            "what changes afterwards is shown.")
+                            : std::nullopt);
   set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
              palette_warning(*method, fusion::find_palette(settings.palette)));
   set_status("palette_not_diverging", protocol::StatusLevel::Warning,
@@ -562,6 +619,7 @@ std::optional<OutgoingFrame> ViewerSession::next_frame() {
 
 void ViewerSession::ticked() {
   if (!is_subscribed_ || !stream_) return;
+  stream_->set_time(unix_seconds());
   const StreamStats stats = stream_->stats();
   protocol::StreamStats message;
   message.round_trip_ms = if_positive(stats.round_trip_ms);

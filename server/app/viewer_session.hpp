@@ -80,6 +80,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void facts(const Id& id, const nlohmann::json& params);
   void probe(const Id& id, const nlohmann::json& params);
   void extremes(const Id& id, const nlohmann::json& params);
+  void baseline(const Id& id, const nlohmann::json& params);
 
   /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
   void answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute);
@@ -91,6 +92,8 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void begin_stream();
   /// Says what was noticed while the scene was read, and takes back what was said of the one before.
   void tell_notes();
+  /// What the method of now cannot show in the scene of now, and what palette does not suit it.
+  void tell_method_limits();
   void set_plan(fusion::FusionPlan plan);
   protocol::FusionReply fusion_reply() const;
   StreamQuality quality() const;

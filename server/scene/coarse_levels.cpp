@@ -127,7 +127,8 @@ CoarseOptions CoarseLevels::coarse_options(const MapNode& root, const Options& o
           .median_celsius = median_celsius_,
           .span_celsius = span_celsius_,
           .is_point_cloud = root.content.triangle_count == 0,
-          .position_step_m = options.position_step_m};
+          .position_step_m = options.position_step_m,
+          .baseline_mark = options.baseline_mark};
 }
 
 std::set<TileId> CoarseLevels::update_borders(const ChangedTree& changed, WorkerPool& pool) {

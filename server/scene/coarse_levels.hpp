@@ -44,6 +44,7 @@ class CoarseLevels {
   struct Options {
     TileSizes sizes;
     float position_step_m = 0;
+    std::uint32_t baseline_mark = 0;
   };
 
   /// Gives the nodes that have been made their coarse tiles: those of before where there are some, new ones where not. `before` is the tree before.

@@ -167,6 +167,84 @@ void show(Tile& tile, const Merged& mesh, Thinning& thinning, const std::vector<
   }
 }
 
+/// What was seen of the regions of kept vertices. `place_of(child, v)` is the kept vertex that stands for one of a child, or kNone.
+template <class PlaceOf>
+void take_times(Tile& tile, const std::vector<Child>& children, const PlaceOf& place_of) {
+  const VertexTimes& first = children.front().node.tile->seen_at;
+  const bool is_one = std::all_of(children.begin(), children.end(), [&](const Child& child) {
+    const VertexTimes& times = child.node.tile->seen_at;
+    return times.of_vertex.empty() && times.distinct == first.distinct;
+  });
+  if (is_one) {
+    tile.seen_at = first;
+    return;
+  }
+  std::vector<double> newest(tile.positions.size(), kUnknownTime);
+  for (const Child& child : children) {
+    for (std::size_t v = 0; v < child.merged_of.size(); ++v) {
+      const std::uint32_t k = place_of(child, v);
+      if (k != kNone) newest[k] = later(newest[k], child.node.tile->seen_at.at(v));
+    }
+  }
+  tile.seen_at = VertexTimes::of(newest);
+}
+
+/// The same of what has changed.
+template <class PlaceOf>
+void take_baseline(Tile& tile, const std::vector<Child>& children, const CoarseOptions& options,
+                   const PlaceOf& place_of) {
+  const auto is_kept = [&](const Child& child) {
+    return !child.node.tile->baseline_celsius.empty() && child.node.tile->baseline_mark == options.baseline_mark;
+  };
+  if (std::none_of(children.begin(), children.end(), is_kept)) return;
+  struct Region {
+    double sum = 0, weight = 0;
+    float outlier = std::numeric_limits<float>::quiet_NaN();  ///< The change that differs most from the mean.
+    float outlier_baseline = std::numeric_limits<float>::quiet_NaN();
+    double mean() const { return weight > 0 ? sum / weight : 0; }
+  };
+  std::vector<Region> regions(tile.positions.size());
+  /// visit(region, temperature, baseline, weight) for what is known of the full mesh, or of its coarser copies.
+  const auto for_each_change = [&](const auto& visit) {
+    for (const Child& child : children) {
+      const Tile& below = *child.node.tile;
+      const std::span<const float> baseline = baseline_of(below, options.baseline_mark);
+      for (std::size_t v = 0; v < child.merged_of.size(); ++v) {
+        const std::uint32_t k = place_of(child, v);
+        const float celsius = below.temperature_celsius[v];
+        if (k == kNone || std::isnan(celsius) || std::isnan(baseline[v])) continue;
+        visit(regions[k], celsius, baseline[v],
+              child.node.weight.empty() ? 1.0 : static_cast<double>(child.node.weight[v]));
+      }
+    }
+  };
+  for_each_change([](Region& region, float celsius, float baseline, double weight) {
+    const double change = double{celsius} - double{baseline};
+    if (!std::isfinite(change)) return;
+    region.sum += change * weight;
+    region.weight += weight;
+  });
+  for_each_change([](Region& region, float celsius, float baseline, double) {
+    const float change = celsius - baseline;
+    if (std::isnan(change)) return;
+    const auto apart = [&](float of) { return std::fabs(double{of} - region.mean()); };
+    if (!std::isnan(region.outlier) && apart(change) <= apart(region.outlier)) return;
+    region.outlier = change;
+    region.outlier_baseline = baseline;
+  });
+  tile.baseline_mark = options.baseline_mark;
+  for (std::size_t k = 0; k < regions.size(); ++k) {
+    const Region& region = regions[k];
+    const float celsius = tile.temperature_celsius[k];
+    const bool stands_out = std::fabs(double{region.outlier} - region.mean()) >= options.span_celsius / 16;
+    const double change = stands_out ? double{region.outlier} : region.mean();
+    float baseline = static_cast<float>(double{celsius} - change);
+    if (std::isnan(region.outlier)) baseline = region.outlier;
+    if (std::isinf(celsius)) baseline = region.outlier_baseline;
+    tile.baseline_celsius.push_back(baseline);
+  }
+}
+
 /// What the children say of the tile above them.
 void take_from_children(Tile& tile, const std::vector<Child>& children) {
   TemperatureRange range;
@@ -282,6 +360,12 @@ void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, co
   Thinning thinning = options.is_point_cloud ? thinned_points(mesh, is_locked, thinning_options)
                                              : thinned_surface(mesh, fine, is_locked, thinning_options, memory);
   show(*tile, mesh, thinning, is_locked, options.median_celsius);
+  const auto place_of = [&](const Child& child, std::size_t v) {
+    const std::uint32_t m = child.merged_of[v];
+    return m == kNone ? kNone : thinning.kept_of_merged[m];
+  };
+  if (!children.empty()) take_times(*tile, children, place_of);
+  take_baseline(*tile, children, options, place_of);
   tile->owned_count = static_cast<std::uint32_t>(tile->positions.size());
   node.samples = measure(*tile, children, mesh, fine, thinning, options);
   node.weight = std::move(thinning.weight);

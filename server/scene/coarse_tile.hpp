@@ -19,7 +19,8 @@ struct CoarseOptions {
   double span_celsius = 16;
   double seen_levels = 24;  ///< A difference of colour that catches the eye.
   bool is_point_cloud = false;
-  float position_step_m = 0;  ///< The largest of the scene.
+  float position_step_m = 0;        ///< The largest of the scene.
+  std::uint32_t baseline_mark = 0;  ///< Whose baseline the tile gets.
 };
 
 /// Makes the tile of a node above the leaves from those of its branches, which are made.
@@ -28,7 +29,9 @@ struct CoarseOptions {
 /// vertices are vertices of its children. Those on edges that it shares with tiles beyond it stay as they are in the full
 /// mesh, with colour and temperature, until a tile holds both sides: tiles of any levels meet without cracks. Every other
 /// vertex stands for a region: it takes the mean visible colour, and the temperature that is furthest from the median.
-/// The lowest and the highest temperature under a tile stand on vertices of it. Of a point cloud the points of a
+/// The lowest and the highest temperature under a tile stand on vertices of it. A vertex was seen when the newest of its region was,
+/// and its baseline is such that it shows the mean change of its region, or the change that differs most from it where that catches
+/// the eye. Of a point cloud the points of a
 /// parent are chosen so that no point of its children is far from one.
 ///
 /// geometric_error_m bounds the distance between tile and full mesh, both ways: the largest one measured against the

@@ -65,6 +65,12 @@ Vec3f moved(const Vec3f& p, const fusion::Vec3d& by) {
           static_cast<float>(double{p.z} + by.z)};
 }
 
+/// By what positions that are relative to one origin move to be relative to another; nothing where both are the same.
+std::optional<fusion::Vec3d> shift_to(const fusion::Vec3d& origin, const fusion::Vec3d& from) {
+  if (from == origin) return std::nullopt;
+  return fusion::Vec3d{from.x - origin.x, from.y - origin.y, from.z - origin.z};
+}
+
 void collect_shown(const std::shared_ptr<const MapNode>& node, bool is_point_cloud, bool with_coarse,
                    std::vector<std::shared_ptr<const Tile>>& tiles) {
   const bool is_shown = node->tile && (is_point_cloud || !node->tile->triangles.empty());
@@ -100,7 +106,9 @@ bool have_quantiles_moved(const fusion::Histogram& from, const fusion::Histogram
 }  // namespace
 
 LivingMap::LivingMap(const Options& options, const std::optional<MapConstants>& constants)
-    : options_(options), constants_(constants) {}
+    : options_(options), constants_(constants), mark_(options.mark), remembers_(options.remembers) {
+  labels_.baseline_mark = mark_.number;
+}
 
 TileSizes LivingMap::sizes() const {
   TileSizes sizes{.leaf_vertex_count = std::max(1u, options_.leaf_vertex_count)};
@@ -141,10 +149,55 @@ std::optional<fusion::Error> LivingMap::refusal_of(std::span<const BlockShape> p
   return std::nullopt;
 }
 
+ReplacedVertices LivingMap::replaced_vertices(BlockNumber block) const {
+  ReplacedVertices replaced;
+  const double own_at = labels_.at(block).baseline_at;
+  for (const auto& node : leaves_of(root_)) {
+    if (!std::binary_search(node->blocks.begin(), node->blocks.end(), block)) continue;
+    const Tile& leaf = *node->tile;
+    const std::span<const float> celsius = baseline_of(leaf, mark_.number);
+    const bool is_kept = celsius.data() != leaf.temperature_celsius.data();
+    for (std::size_t v = 0; v < leaf.owned_count; ++v) {
+      if (block_of(leaf, v) != block) continue;
+      replaced.positions.push_back(leaf.positions[v]);
+      replaced.source.push_back(leaf.source_vertex[v]);
+      replaced.baseline.celsius.push_back(celsius[v]);
+      replaced.baseline.at.push_back(is_kept ? leaf.baseline_at.at(v) : own_at);
+    }
+  }
+  return replaced;
+}
+
+BlockBaseline LivingMap::handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+                                   std::optional<double> observed_at) const {
+  const auto before = blocks_.find(id);
+  if (before == blocks_.end()) return {};
+  std::vector<Vec3f> placed;
+  std::span<const Vec3f> positions = mesh.positions();
+  if (const auto by = shift_to(constants_->origin, mesh.origin)) {
+    for (const Vec3f& p : positions) placed.push_back(moved(p, *by));
+    positions = placed;
+  }
+  return server::handed_on(replaced_vertices(before->second->number), positions, mesh.temperature_celsius(),
+                           observed_at.value_or(kUnknownTime), kHandedOnSteps * double{constants_->position_step_m});
+}
+
+std::shared_ptr<const SceneSnapshot> LivingMap::mark_baseline(double marked_at, std::uint32_t revision) {
+  mark_ = {.number = mark_.number + 1, .marked_at = marked_at};
+  labels_.baseline_mark = mark_.number;
+  for (auto& [number, label] : labels_.of_block) label.baseline_at = marked_at;
+  remembers_ = true;
+  return snapshot(revision);
+}
+
 std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, std::uint32_t revision, WorkerPool& pool,
                                                       const fusion::Progress& progress) {
   fusion::report(progress, kTilingPhase, 0);
   std::vector<BlockPut>& put = change_wanted.put;
+  if (!blocks_.empty()) remembers_ = true;
+  for (BlockPut& one : put) {
+    if (!one.baseline) one.baseline = handed_on(one.id, one.scene.mesh, one.observed_at);
+  }
   std::sort(put.begin(), put.end(), [](const BlockPut& a, const BlockPut& b) { return a.id < b.id; });
   if (!constants_ && !put.empty()) {
     BlockPut first = std::move(put.front());
@@ -168,13 +221,16 @@ std::shared_ptr<const SceneSnapshot> LivingMap::snapshot(std::uint32_t revision)
 }
 
 CoarseLevels::Options LivingMap::coarse_options() const {
-  return {.sizes = sizes(), .position_step_m = constants_->position_step_m};
+  return {.sizes = sizes(), .position_step_m = constants_->position_step_m, .baseline_mark = mark_.number};
 }
 
 MapVersion LivingMap::version(std::uint32_t revision) {
   MapVersion version;
   version.revision = revision;
   version.is_live = options_.is_live;
+  if (remembers_) version.baseline_mark = mark_.number;
+  version.baseline_marked_at = mark_.marked_at;
+  for (const auto& [number, label] : labels_.of_block) version.own_baseline_at.emplace(number, label.baseline_at);
   version.position_step_m = 0x1p-10F;
   MeshFacts& facts = version.facts;
   if (constants_) {
@@ -278,10 +334,9 @@ std::shared_ptr<const MapBlock> LivingMap::taken_in(BlockPut& put) {
   fusion::MultispectralMesh& mesh = put.scene.mesh;
   std::optional<Bounds>& core = put.scene.core_bounds;
   const fusion::Vec3d& origin = constants_->origin;
-  if (mesh.origin != origin) {
-    const fusion::Vec3d by{mesh.origin.x - origin.x, mesh.origin.y - origin.y, mesh.origin.z - origin.z};
-    for (Vec3f& p : mesh.positions()) p = moved(p, by);
-    if (core) core = Bounds{moved(core->min, by), moved(core->max, by)};
+  if (const auto by = shift_to(origin, mesh.origin)) {
+    for (Vec3f& p : mesh.positions()) p = moved(p, *by);
+    if (core) core = Bounds{moved(core->min, *by), moved(core->max, *by)};
     mesh.origin = origin;
   }
   auto info = std::make_shared<MapBlock>();
@@ -317,15 +372,20 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
       PositionSteps(whole, pool, constants_->position_step_m).apply(*whole[0]);
       one.step_halvings = std::move(whole[0]->step_halvings);
     }
-    names_.emplace(info->number, block.id);
+    const double observed_at = block.observed_at.value_or(kUnknownTime);
+    labels_.of_block[info->number] = {
+        .name = block.id,
+        .observed_at = observed_at,
+        .baseline_at = block.was_marked ? mark_.marked_at.value_or(observed_at) : observed_at};
+    one.baseline = std::move(block.baseline).value_or(BlockBaseline{});
     blocks_.emplace(block.id, std::move(info));
   }
   const double leaves_share = options_.levels == LevelsOfDetail::All ? kLeavesShare : 1;
   const auto made_share = [&](double share) {
     fusion::report(progress, kTilingPhase, leaves_share * kCutShare * share);
   };
-  ChangedTree changed = changed_tree(root_, constants_->grid, sizes(), gone, added, names_, pool, made_share);
-  for (const BlockNumber number : gone) names_.erase(number);
+  ChangedTree changed = changed_tree(root_, constants_->grid, sizes(), gone, added, labels_, pool, made_share);
+  for (const BlockNumber number : gone) labels_.of_block.erase(number);
   // Memory of a large mesh is needed for the rest.
   added.clear();
   put.clear();

@@ -28,11 +28,23 @@ namespace spectra::server {
 /// tiles above them.
 inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 4;
 
+/// How far a replaced block hands its baseline on, in position steps of the map: about two edges of its first block.
+inline constexpr double kHandedOnSteps = 8;
+
 /// A part of the map under a name of its own; one of the same name takes its place.
 struct BlockPut {
   std::string id;
   fusion::LoadedScene scene;
   std::optional<double> observed_at;  ///< Unix seconds.
+  /// What its vertices are compared with; nothing: what LivingMap::handed_on() says.
+  std::optional<BlockBaseline> baseline = std::nullopt;
+  bool was_marked = false;  ///< Of a map that is restored: the block was there when the baseline was marked.
+};
+
+/// A moment whose temperatures are the baseline.
+struct BaselineMark {
+  std::uint32_t number = 0;         ///< Rises with every mark.
+  std::optional<double> marked_at;  ///< Unix seconds; nothing before the first.
 };
 
 /// What decides whether a block can be part of a map.
@@ -65,8 +77,10 @@ class LivingMap {
     std::uint32_t leaf_vertex_count = kLeafVertexCount;
     /// The level of the tile that the first block just fills: how often the map may double its extent.
     int first_level = 0;
-    bool is_live = false;   ///< Begins empty, and is expected to grow.
-    std::string name = {};  ///< Of the scene; empty: that of the first block.
+    bool is_live = false;    ///< Begins empty, and is expected to grow.
+    std::string name = {};   ///< Of the scene; empty: that of the first block.
+    bool remembers = false;  ///< From the first block on; else from the first change after it.
+    BaselineMark mark = {};
   };
 
   explicit LivingMap(const Options& options, const std::optional<MapConstants>& constants = std::nullopt);
@@ -77,6 +91,15 @@ class LivingMap {
   /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; a block without a vertex;
   /// more vertices in all than fit 32 bits. Error: Unsupported or TooLarge; `field` is the block's name.
   std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
+
+  /// What the vertices of a block that is put are compared with (see thermal_change). A block that is there hands its
+  /// baseline on, over at most kHandedOnSteps of the map's position step; else each vertex is compared with itself.
+  BlockBaseline handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+                          std::optional<double> observed_at) const;
+
+  /// From now on temperatures are compared with those of now. The next version.
+  std::shared_ptr<const SceneSnapshot> mark_baseline(double marked_at, std::uint32_t revision);
+  const BaselineMark& baseline_mark() const { return mark_; }
 
   /// The next version. Positions of blocks are taken relative to the origin of the map. The blocks that are put have different
   /// names, and there is no refusal_of() them. Coarse tiles that were there before may not show yet what has changed beneath
@@ -104,6 +127,7 @@ class LivingMap {
               const fusion::Progress& progress);
   /// Of a block that comes in, its positions relative to the origin of the map from then on.
   std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
+  ReplacedVertices replaced_vertices(BlockNumber block) const;
   /// The tree with what has changed.
   void take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress);
   TileSizes sizes() const;
@@ -113,8 +137,10 @@ class LivingMap {
   std::optional<MapConstants> constants_;
   std::string first_id_;  ///< Of the block that came first: its name and what is up in it are the scene's.
   BlocksByName blocks_;
-  BlockNames names_;
+  BlockLabels labels_;
   BlockNumber last_number_ = 0;
+  BaselineMark mark_;
+  bool remembers_;  ///< There is a before that what is put can be compared with.
   std::shared_ptr<const MapNode> root_;
   CoarseLevels coarse_;
 

@@ -66,7 +66,7 @@ void sort_along_curve(std::span<Element> elements) {
 }
 
 /// In the order of names, as their blocks have them, triangles before vertices of none.
-void put_in_order(std::vector<Element>& elements, const Pieces& pieces, const BlockNames& names) {
+void put_in_order(std::vector<Element>& elements, const Pieces& pieces, const BlockLabels& labels) {
   struct Key {
     const std::string* name;
     bool is_lone;
@@ -80,7 +80,7 @@ void put_in_order(std::vector<Element>& elements, const Pieces& pieces, const Bl
     const Piece& its = piece_of(element);
     const std::uint32_t source =
         element.is_lone_vertex() ? its.source_of_vertex(element.index) : its.source_of_triangle(element.index);
-    keys.push_back({&names.at(block_of(its, element)), element.is_lone_vertex(), source, element});
+    keys.push_back({&labels.at(block_of(its, element)).name, element.is_lone_vertex(), source, element});
   }
   std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
     if (a.name != b.name) return *a.name < *b.name;
@@ -119,6 +119,42 @@ void copy_vertices(std::span<const PieceVertex> vertices, Tile& tile) {
       tile.vertex_block[v] = vertices[v].piece->block_of_vertex(vertices[v].index);
     }
   }
+}
+
+bool is_same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
+
+/// When vertices were seen, and what they are compared with.
+void copy_memory(std::span<const PieceVertex> vertices, const BlockLabels& labels, Tile& tile) {
+  BlockNumber last_block = 0;
+  const BlockLabel* last = nullptr;
+  const auto label_of = [&](const PieceVertex& vertex) -> const BlockLabel& {
+    const BlockNumber block = vertex.piece->block_of_vertex(vertex.index);
+    if (last == nullptr || block != last_block) last = &labels.at(block);
+    last_block = block;
+    return *last;
+  };
+  std::vector<double> times(vertices.size());
+  for (std::size_t v = 0; v < vertices.size(); ++v) times[v] = label_of(vertices[v]).observed_at;
+  tile.seen_at = VertexTimes::of(times);
+  bool is_any_kept = false;
+  for (std::size_t v = 0; v < vertices.size() && !is_any_kept; ++v) {
+    const auto& [piece, index] = vertices[v];
+    if (piece->baseline_celsius.empty()) continue;
+    const double own_at = label_of(vertices[v]).baseline_at;
+    is_any_kept = !is_same(double{piece->baseline_of_vertex(index)}, double{piece->temperature_celsius[index]}) ||
+                  !is_same(piece->baseline_time_of_vertex(index, own_at), own_at);
+  }
+  if (!is_any_kept) return;
+  tile.baseline_mark = labels.baseline_mark;
+  tile.baseline_celsius.resize(vertices.size());
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const auto& [piece, index] = vertices[v];
+    tile.baseline_celsius[v] = piece->baseline_of_vertex(index);
+    times[v] = piece->baseline_time_of_vertex(index, label_of(vertices[v]).baseline_at);
+  }
+  tile.baseline_at = VertexTimes::of(times);
 }
 
 }  // namespace
@@ -168,12 +204,12 @@ std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::
 }
 
 std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>& elements, const Pieces& pieces,
-                                const BlockNames& names) {
+                                const BlockLabels& labels) {
   const bool is_of_one_new_piece =
       std::all_of(elements.begin(), elements.end(),
                   [&](const Element& element) { return element.piece == elements.front().piece; }) &&
       (elements.empty() || pieces[elements.front().piece].source_triangle.empty());
-  if (!is_of_one_new_piece) put_in_order(elements, pieces, names);
+  if (!is_of_one_new_piece) put_in_order(elements, pieces, labels);
   sort_along_curve(elements);
   auto tile = std::make_shared<Tile>();
   tile->id = id;
@@ -216,6 +252,7 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
     tile->source_triangle.push_back(its.source_of_triangle(element.index));
   }
   copy_vertices(vertices, *tile);
+  copy_memory(vertices, labels, *tile);
   tile->bounds = bounds_of(std::span<const Vec3f>(tile->positions));
   // The vertices that are drawn: all but the lone ones of a scene with triangles.
   const std::size_t lone_begin = content.triangle_count == 0 ? tile->owned_count : referenced_count;

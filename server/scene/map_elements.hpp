@@ -28,10 +28,21 @@ struct Piece {
   std::span<const std::uint32_t> source_triangle;  ///< The same.
   std::span<const BlockNumber> vertex_block;       ///< Empty: all are of `block`.
   BlockNumber block = 0;
+  /// What the vertices are compared with; empty: with themselves. The times are in one of the other two.
+  std::span<const float> baseline_celsius;
+  std::span<const double> baseline_at;
+  const VertexTimes* baseline_times = nullptr;
 
   std::uint32_t source_of_vertex(std::uint32_t v) const { return source_vertex.empty() ? v : source_vertex[v]; }
   std::uint32_t source_of_triangle(std::uint32_t t) const { return source_triangle.empty() ? t : source_triangle[t]; }
   BlockNumber block_of_vertex(std::uint32_t v) const { return vertex_block.empty() ? block : vertex_block[v]; }
+  float baseline_of_vertex(std::uint32_t v) const {
+    return baseline_celsius.empty() ? temperature_celsius[v] : baseline_celsius[v];
+  }
+  double baseline_time_of_vertex(std::uint32_t v, double own) const {
+    if (baseline_celsius.empty()) return own;
+    return baseline_times ? baseline_times->at(v) : baseline_at[v];
+  }
   BlockNumber block_of_triangle(std::uint32_t t) const { return block_of_vertex(triangles[t][0]); }
 };
 
@@ -103,6 +114,6 @@ std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::
 /// Copies a leaf out of its pieces, its elements along a space-filling curve. They are put in the order of the names of their blocks before, in each as the
 /// block has them, triangles before vertices of none: the same tile in whatever order they came. Thread-safe for different elements.
 std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>& elements, const Pieces& pieces,
-                                const BlockNames& names);
+                                const BlockLabels& labels);
 
 }  // namespace spectra::server

@@ -41,9 +41,13 @@ struct TouchedLeaf {
 
 class TreeChange {
  public:
-  TreeChange(const MapGrid& grid, const TileSizes& sizes, std::span<const BlockNumber> removed, const BlockNames& names,
-             const std::function<void(double)>& made_share)
-      : grid_(grid), sizes_(sizes), removed_(removed.begin(), removed.end()), names_(names), made_share_(made_share) {}
+  TreeChange(const MapGrid& grid, const TileSizes& sizes, std::span<const BlockNumber> removed,
+             const BlockLabels& labels, const std::function<void(double)>& made_share)
+      : grid_(grid),
+        sizes_(sizes),
+        removed_(removed.begin(), removed.end()),
+        labels_(labels),
+        made_share_(made_share) {}
 
   ChangedTree run(const std::shared_ptr<const MapNode>& root, std::span<const BlockMesh> added, WorkerPool& pool) {
     if (root && !removed_.empty()) find_touched(root, pool);
@@ -90,10 +94,14 @@ class TreeChange {
             .source_vertex = {},
             .source_triangle = {},
             .vertex_block = {},
-            .block = block.number};
+            .block = block.number,
+            .baseline_celsius = block.baseline.celsius,
+            .baseline_at = block.baseline.at,
+            .baseline_times = nullptr};
   }
 
-  static Piece piece_of(const Tile& tile) {
+  Piece piece_of(const Tile& tile) const {
+    const bool is_kept = tile.baseline_mark == labels_.baseline_mark;
     return {.positions = tile.positions,
             .visible = tile.visible,
             .temperature_celsius = tile.temperature_celsius,
@@ -102,7 +110,10 @@ class TreeChange {
             .source_vertex = tile.source_vertex,
             .source_triangle = tile.source_triangle,
             .vertex_block = tile.vertex_block,
-            .block = tile.block};
+            .block = tile.block,
+            .baseline_celsius = is_kept ? std::span<const float>(tile.baseline_celsius) : std::span<const float>(),
+            .baseline_at = {},
+            .baseline_times = &tile.baseline_at};
   }
 
   bool is_removed(BlockNumber block) const { return removed_.contains(block); }
@@ -345,7 +356,7 @@ class TreeChange {
   void make_leaf(MapNode& node, std::vector<Element>& elements) const {
     node.content = content_of(elements);
     node.bounds = bounds_of(elements);
-    auto tile = leaf_tile(node.id, elements, pieces_, names_);
+    auto tile = leaf_tile(node.id, elements, pieces_, labels_);
     node.blocks.assign(1, tile->block);
     if (!tile->vertex_block.empty()) {
       node.blocks = tile->vertex_block;
@@ -359,7 +370,7 @@ class TreeChange {
   const MapGrid& grid_;
   const TileSizes& sizes_;
   const std::set<BlockNumber> removed_;
-  const BlockNames& names_;
+  const BlockLabels& labels_;
   const std::function<void(double)>& made_share_;
   CellContent total_;  ///< Of the whole map, in the end.
 
@@ -381,8 +392,8 @@ void collect_leaves(const std::shared_ptr<const MapNode>& node, std::vector<std:
 
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
                          std::span<const BlockNumber> removed, std::span<const BlockMesh> added,
-                         const BlockNames& names, WorkerPool& pool, const std::function<void(double)>& made_share) {
-  return TreeChange(grid, sizes, removed, names, made_share).run(root, added, pool);
+                         const BlockLabels& labels, WorkerPool& pool, const std::function<void(double)>& made_share) {
+  return TreeChange(grid, sizes, removed, labels, made_share).run(root, added, pool);
 }
 
 std::vector<std::shared_ptr<const MapNode>> leaves_of(const std::shared_ptr<const MapNode>& root) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fusion/mesh/multispectral_mesh.hpp"
+#include "server/scene/block_baseline.hpp"
 #include "server/scene/cell_content.hpp"
 #include "server/scene/leaf_facts.hpp"
 #include "server/scene/map_grid.hpp"
@@ -51,6 +52,7 @@ struct BlockMesh {
   BlockNumber number = 0;
   const fusion::MultispectralMesh* mesh = nullptr;
   std::vector<StepHalvings> step_halvings;  ///< Per vertex; empty: none are halved.
+  BlockBaseline baseline;
 };
 
 /// How large tiles are.
@@ -71,11 +73,12 @@ struct ChangedTree {
 /// tiles and all that lies in a leaf are those of the tree made at once of the blocks that are in the map then. A cell that owns at most 1.25
 /// `leaf_vertex_count` vertices is a leaf; others are cut in their middle. Octants are joined with their neighbours as long as they stay within
 /// `leaf_vertex_count`, and those with less than a quarter of it always; in a map with triangles every leaf has one.
-/// The same for any number of threads. `names` has all blocks of the map, old and new: in a leaf they stand in the order of
+/// The same for any number of threads. `labels` has all blocks of the map, old and new: in a leaf they stand in the order of
 /// their names. Must not be called from a job of the pool. `made_share` is told from any thread what share is made.
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
                          std::span<const BlockNumber> removed, std::span<const BlockMesh> added,
-                         const BlockNames& names, WorkerPool& pool, const std::function<void(double)>& made_share = {});
+                         const BlockLabels& labels, WorkerPool& pool,
+                         const std::function<void(double)>& made_share = {});
 
 /// All leaves of a tree, coarse before fine.
 std::vector<std::shared_ptr<const MapNode>> leaves_of(const std::shared_ptr<const MapNode>& root);

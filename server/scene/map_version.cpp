@@ -61,4 +61,19 @@ fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const M
   return mesh;
 }
 
+std::vector<float> baseline_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves, const BlockPlaces& blocks,
+                                      std::uint64_t vertex_count, std::uint32_t baseline_mark) {
+  std::vector<float> result(static_cast<std::size_t>(vertex_count));
+  for (const auto& node : leaves) {
+    const Tile& leaf = *node->tile;
+    const std::span<const float> baseline = baseline_of(leaf, baseline_mark);
+    for (std::size_t v = 0; v < leaf.owned_count; ++v) {
+      const auto block = blocks.find(block_of(leaf, v));
+      if (block == blocks.end()) continue;
+      result[static_cast<std::size_t>(block->second.first_vertex + leaf.source_vertex[v])] = baseline[v];
+    }
+  }
+  return result;
+}
+
 }  // namespace spectra::server

@@ -51,6 +51,10 @@ using BlockPlaces = std::unordered_map<BlockNumber, BlockPlace>;
 fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves,
                                          const BlockPlaces& blocks, const MeshFacts& facts);
 
+/// What its vertices are compared with, in the same order.
+std::vector<float> baseline_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves, const BlockPlaces& blocks,
+                                      std::uint64_t vertex_count, std::uint32_t baseline_mark);
+
 /// The block of a vertex of a leaf.
 inline BlockNumber block_of(const Tile& leaf, std::size_t vertex) {
   return leaf.vertex_block.empty() ? leaf.block : leaf.vertex_block[vertex];
@@ -63,7 +67,11 @@ struct MapVersion {
   std::vector<fusion::Note> notes;
   bool is_live = false;
   std::optional<double> oldest_observed_at, newest_observed_at;  ///< Of the blocks that say so, Unix seconds.
-  std::optional<Bounds> core_bounds;                             ///< Absent: all of it.
+  std::optional<std::uint32_t> baseline_mark;                    ///< See SceneSnapshot, as the next.
+  std::optional<double> baseline_marked_at;
+  /// By block, Unix seconds or NaN: of the baseline of vertices that are compared with themselves.
+  std::unordered_map<BlockNumber, double> own_baseline_at;
+  std::optional<Bounds> core_bounds;  ///< Absent: all of it.
   BlocksByName blocks;
   std::vector<std::shared_ptr<const MapNode>> leaves;
   int top_level = 0;                               ///< Of the lowest tile that holds everything.

@@ -95,8 +95,9 @@ std::vector<float> vertex_areas(const Tile& leaf) {
 /// Which share of a scene's surface a plan highlights. The surface of each vertex is found when first asked for, and kept.
 class SurfaceShare {
  public:
-  SurfaceShare(std::span<const std::shared_ptr<const MapNode>> leaves, bool is_point_cloud)
-      : leaves_(leaves), is_point_cloud_(is_point_cloud) {}
+  SurfaceShare(std::span<const std::shared_ptr<const MapNode>> leaves, bool is_point_cloud,
+               std::optional<std::uint32_t> baseline_mark)
+      : leaves_(leaves), is_point_cloud_(is_point_cloud), baseline_mark_(baseline_mark) {}
 
   double highlighted(const fusion::FusionPlan& plan) {
     if (!is_point_cloud_) std::call_once(once_, [this] { find_areas(); });
@@ -107,7 +108,7 @@ class SurfaceShare {
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
       const Tile& leaf = *leaves_[i]->tile;
       marked.resize(leaf.temperature_celsius.size());
-      plan.mark(leaf.temperature_celsius, {}, marked);
+      plan.mark(leaf.temperature_celsius, baseline_of(leaf, baseline_mark_), marked);
       for (std::size_t v = 0; v < leaf.owned_count; ++v) marked_count += marked[v];
       count += leaf.owned_count;
       if (total_area_ > 0) {
@@ -131,6 +132,7 @@ class SurfaceShare {
 
   const std::span<const std::shared_ptr<const MapNode>> leaves_;
   const bool is_point_cloud_;
+  const std::optional<std::uint32_t> baseline_mark_;
   std::once_flag once_;
   std::vector<std::vector<float>> areas_;  ///< By leaf.
   double total_area_ = 0;
@@ -161,7 +163,7 @@ class TiledSnapshot final : public SceneSnapshot {
     temperature->hues = [source] { return source->hues(); };
     temperature_ = temperature;
     if (!version_.reference) version_.reference = temperature_;
-    share_ = std::make_unique<SurfaceShare>(version_.leaves, is_point_cloud());
+    share_ = std::make_unique<SurfaceShare>(version_.leaves, is_point_cloud(), version_.baseline_mark);
   }
 
   const std::string& name() const override { return version_.facts.name; }
@@ -180,6 +182,8 @@ class TiledSnapshot final : public SceneSnapshot {
     if (!version_.oldest_observed_at) return std::nullopt;
     return std::pair(*version_.oldest_observed_at, *version_.newest_observed_at);
   }
+  std::optional<std::uint32_t> baseline_mark() const override { return version_.baseline_mark; }
+  std::optional<double> baseline_marked_at() const override { return version_.baseline_marked_at; }
   int level_count() const override { return tiles().empty() ? 0 : tiles().back()->id.level - version_.top_level + 1; }
   std::span<const std::shared_ptr<const Tile>> tiles() const override { return version_.tiles; }
   const fusion::SceneTemperature& temperature() const override { return *temperature_; }
@@ -211,7 +215,7 @@ class TiledSnapshot final : public SceneSnapshot {
       for (std::size_t v = 0; v < tile->owned_count; ++v) {
         const double squared = squared_distance(position, tile->positions[v]);
         if (best_tile == nullptr || squared < best_squared ||
-            (squared == best_squared && vertex_index(*tile, v) < vertex_index(*best_tile, best_vertex))) {
+            (squared == best_squared && is_rather_told(*tile, v, *best_tile, best_vertex))) {
           best_tile = tile;
           best_vertex = v;
           best_squared = squared;
@@ -226,6 +230,9 @@ class TiledSnapshot final : public SceneSnapshot {
     const float temperature = best_tile->temperature_celsius[best_vertex];
     if (!std::isnan(temperature)) result.temperature_celsius = temperature;
     result.distance_m = std::sqrt(best_squared);
+    const double seen_at = best_tile->seen_at.at(best_vertex);
+    if (!std::isnan(seen_at)) result.observed_at = seen_at;
+    take_baseline(*best_tile, best_vertex, result);
     return result;
   }
 
@@ -239,12 +246,33 @@ class TiledSnapshot final : public SceneSnapshot {
     return mesh_of_blocks(version_.leaves, places_, version_.facts);
   }
 
+  std::vector<float> whole_baseline() const override {
+    if (!version_.baseline_mark) return {};
+    return baseline_of_blocks(version_.leaves, places_, version_.facts.vertex_count, *version_.baseline_mark);
+  }
+
  private:
   /// A vertex that is one.
   struct Place {
     const Tile* leaf = nullptr;
     std::uint32_t vertex = 0;
   };
+
+  /// Of two vertices at one place.
+  bool is_rather_told(const Tile& tile, std::size_t v, const Tile& other, std::size_t other_v) const {
+    const double at = tile.seen_at.at(v), other_at = other.seen_at.at(other_v);
+    if (at != other_at && !(std::isnan(at) && std::isnan(other_at))) return later(at, other_at) == at;
+    return vertex_index(tile, v) < vertex_index(other, other_v);
+  }
+
+  void take_baseline(const Tile& tile, std::size_t v, Probe& probe) const {
+    const std::span<const float> baseline = baseline_of(tile, version_.baseline_mark);
+    if (baseline.empty() || std::isnan(baseline[v])) return;
+    probe.baseline_celsius = baseline[v];
+    const bool is_kept = baseline.data() != tile.temperature_celsius.data();
+    const double at = is_kept ? tile.baseline_at.at(v) : version_.own_baseline_at.at(block_of(tile, v));
+    if (!std::isnan(at)) probe.baseline_at = at;
+  }
 
   static std::optional<Extreme> extreme(const Place& place) {
     if (place.leaf == nullptr) return std::nullopt;

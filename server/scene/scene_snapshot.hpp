@@ -18,6 +18,7 @@
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "fusion/vertex_types.hpp"
 #include "protocol/tile_frame.hpp"
+#include "server/scene/vertex_times.hpp"
 #include "server/scene/worker_pool.hpp"
 
 namespace spectra::server {
@@ -46,10 +47,16 @@ struct Tile {
   std::vector<fusion::Vec3f> positions;
   std::vector<fusion::Rgb8> visible;
   std::vector<float> temperature_celsius;
-  std::uint32_t block = 0;                     ///< The block of the map that it is of, or its first vertex.
-  std::vector<std::uint32_t> vertex_block;     ///< Per vertex; empty: all are of `block`.
-  std::vector<std::uint32_t> source_vertex;    ///< Index in its block, per vertex.
-  std::vector<StepHalvings> step_halvings;     ///< Per vertex; empty: none are halved.
+  std::uint32_t block = 0;                   ///< The block of the map that it is of, or its first vertex.
+  std::vector<std::uint32_t> vertex_block;   ///< Per vertex; empty: all are of `block`.
+  std::vector<std::uint32_t> source_vertex;  ///< Index in its block, per vertex.
+  std::vector<StepHalvings> step_halvings;   ///< Per vertex; empty: none are halved.
+  VertexTimes seen_at;  ///< When each vertex was seen; of a coarse tile the newest of what it stands for.
+  /// What each vertex is compared with, degC (NaN: nothing), as long as the newest mark of the map is `baseline_mark`; empty, or when
+  /// it is another: with its own temperature.
+  std::vector<float> baseline_celsius;
+  VertexTimes baseline_at;  ///< Of a leaf: the times they are of.
+  std::uint32_t baseline_mark = 0;
   std::vector<fusion::Triangle> triangles;     ///< Indices into this tile; empty for a point cloud.
   std::vector<std::uint32_t> source_triangle;  ///< Index in its block, per triangle (leaves).
 };
@@ -61,6 +68,10 @@ struct Probe {
   std::optional<float> temperature_celsius;  ///< Infinite where the sensor was beyond its range.
   fusion::Rgb8 visible;
   double distance_m = 0;
+  std::optional<double> observed_at;  ///< Unix seconds.
+  /// What the temperature is compared with, and the time that is of: later than that it was another, or has not been looked at.
+  std::optional<float> baseline_celsius;
+  std::optional<double> baseline_at;
 };
 
 /// Where it is hottest or coldest.
@@ -119,6 +130,10 @@ class SceneSnapshot {
   virtual bool is_live() const { return false; }
   /// When the oldest and the newest part was seen, Unix seconds; of the parts of which that is known.
   virtual std::optional<std::pair<double, double>> observed() const { return std::nullopt; }
+  /// Which mark its temperatures are compared with, 0 before the first; nothing in a scene that does not remember, as a file.
+  virtual std::optional<std::uint32_t> baseline_mark() const { return std::nullopt; }
+  /// When that was set, Unix seconds.
+  virtual std::optional<double> baseline_marked_at() const { return std::nullopt; }
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;
@@ -129,8 +144,8 @@ class SceneSnapshot {
   virtual std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const = 0;
   /// Which vertex of whole_mesh() a vertex of a leaf is.
   virtual std::uint32_t vertex_index(const Tile& leaf, std::size_t vertex) const = 0;
-  /// Of several equally near vertices the first of the input; nothing in an empty scene or at a position that is not
-  /// finite.
+  /// Of several equally near vertices the one that was seen last, and of those the first of the input; nothing in an empty scene
+  /// or at a position that is not finite.
   virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
   /// Of the finite temperatures; of several the first of the input; nothing without thermal data.
   virtual std::optional<Extreme> hottest() const = 0;
@@ -149,6 +164,15 @@ class SceneSnapshot {
   virtual std::optional<fusion::MultispectralMesh> block_mesh(std::string_view id) const = 0;
   /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
   virtual fusion::MultispectralMesh whole_mesh() const = 0;
+  /// What the vertices of whole_mesh() are compared with; empty where baseline_mark() is nothing.
+  virtual std::vector<float> whole_baseline() const { return {}; }
 };
+
+/// What the vertices of a tile are compared with in a scene with that baseline_mark(); empty: nothing.
+inline std::span<const float> baseline_of(const Tile& tile, std::optional<std::uint32_t> mark) {
+  if (!mark) return {};
+  const bool is_kept = !tile.baseline_celsius.empty() && tile.baseline_mark == *mark;
+  return is_kept ? std::span<const float>(tile.baseline_celsius) : std::span<const float>(tile.temperature_celsius);
+}
 
 }  // namespace spectra::server

@@ -13,7 +13,8 @@ LivingMap::Options live_options() {
           .leaf_vertex_count = kLiveLeafVertexCount,
           .first_level = kFirstLevel,
           .is_live = true,
-          .name = "live map"};
+          .name = "live map",
+          .remembers = true};
 }
 
 }  // namespace
@@ -64,8 +65,10 @@ void SceneStore::rest() {
   if (map_) map_->rest();
 }
 
-void SceneStore::begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name) {
+void SceneStore::begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name,
+                       const BaselineMark& mark) {
   LivingMap::Options options = live_options();
+  options.mark = mark;
   if (past_name) {
     options.is_live = false;
     options.name = *past_name;
@@ -77,6 +80,19 @@ void SceneStore::begin(const std::optional<MapConstants>& constants, const std::
 std::optional<MapConstants> SceneStore::constants() const {
   const std::lock_guard replacing(replace_mutex_);
   return map_ ? map_->constants() : std::nullopt;
+}
+
+std::shared_ptr<const SceneSnapshot> SceneStore::mark_baseline(double marked_at) {
+  const std::lock_guard replacing(replace_mutex_);
+  if (!map_) return nullptr;
+  const auto previous = current();
+  return publish(map_->mark_baseline(marked_at, previous ? previous->revision() + 1 : 1), {});
+}
+
+BlockBaseline SceneStore::handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+                                    std::optional<double> observed_at) const {
+  const std::lock_guard replacing(replace_mutex_);
+  return map_ ? map_->handed_on(id, mesh, observed_at) : BlockBaseline{};
 }
 
 std::optional<fusion::Error> SceneStore::refusal_of(std::span<const BlockShape> put,

@@ -63,7 +63,13 @@ class SceneStore {
 
   /// Begins an empty map; what is served stays until the first change(). Constants as LivingMap; a map with a name is one of the past,
   /// which does not grow.
-  void begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name = std::nullopt);
+  void begin(const std::optional<MapConstants>& constants, const std::optional<std::string>& past_name = std::nullopt,
+             const BaselineMark& mark = {});
+  /// See LivingMap::mark_baseline(). Null where there is no map yet.
+  std::shared_ptr<const SceneSnapshot> mark_baseline(double marked_at);
+  /// See LivingMap::handed_on().
+  BlockBaseline handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+                          std::optional<double> observed_at) const;
   /// Of the map, once it had a block.
   std::optional<MapConstants> constants() const;
   /// See LivingMap::refusal_of().

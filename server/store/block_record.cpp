@@ -39,12 +39,24 @@ StoreResult<void> check_record(const BlockRecord& record) {
     return failure(StoreErrorCode::TooLarge, "the reading options of block " + d.id + " are longer than " +
                                                  std::to_string(kLongestReadOptions) + " bytes");
   }
-  if (record.ply->size() > kLargestBlockBytes) {
+  if (record.ply->size() + (record.baseline ? record.baseline->size() : 0) > kLargestBlockBytes) {
     return failure(StoreErrorCode::TooLarge, "block " + d.id + " has " + std::to_string(record.ply->size()) +
                                                  " bytes; the store takes at most " +
                                                  std::to_string(kLargestBlockBytes) + " in one block");
   }
   return success();
+}
+
+SharedBytes body_of(const BlockRecord& record) {
+  if (!record.baseline || record.baseline->empty()) return record.ply;
+  std::string body;
+  body.reserve(record.ply->size() + record.baseline->size());
+  return std::make_shared<const std::string>(body.append(*record.ply).append(*record.baseline));
+}
+
+bool is_body_of(const BlockFacts& facts, std::string_view body) {
+  if (body.size() != facts.body_bytes() || sha256(body.substr(0, facts.size_bytes)) != facts.sha256) return false;
+  return facts.baseline_bytes == 0 || sha256(body.substr(facts.size_bytes)) == facts.baseline_sha256;
 }
 
 }  // namespace spectra::store

@@ -44,6 +44,8 @@ struct BlockDescription {
 struct BlockRecord {
   BlockDescription description;
   SharedBytes ply;  ///< Exactly as received.
+  SharedBytes
+      baseline;  ///< What belongs to this revision beside it; the store does not look into it. May be null: nothing.
 };
 
 /// A block as the store lists it: without its bytes.
@@ -53,6 +55,11 @@ struct BlockFacts {
   StoreTime accepted_at;
   std::uint64_t size_bytes = 0;
   Sha256 sha256{};  ///< Of the bytes.
+  std::uint64_t baseline_bytes = 0;
+  Sha256 baseline_sha256{};  ///< Where there are any.
+
+  /// What is written of it beside its row.
+  std::uint64_t body_bytes() const { return size_bytes + baseline_bytes; }
   friend bool operator==(const BlockFacts&, const BlockFacts&) = default;
 };
 
@@ -60,7 +67,13 @@ struct BlockFacts {
 struct StoredBlock {
   BlockFacts facts;
   SharedBytes ply;
+  SharedBytes baseline;  ///< Null: nothing.
 };
+
+/// The bytes that are written of a block: those of its PLY, then those of its baseline.
+SharedBytes body_of(const BlockRecord& record);
+/// Whether they are what these facts tell of.
+bool is_body_of(const BlockFacts& facts, std::string_view body);
 
 /// The largest block, bytes: SQLite's bound on a row, less room for what stands beside.
 inline constexpr std::uint64_t kLargestBlockBytes = 999'000'000;

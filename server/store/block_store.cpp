@@ -40,7 +40,8 @@ struct Reading {
 
 std::uint64_t bytes_of(const Order& order) {
   const auto* put = std::get_if<Put>(&order);
-  return put != nullptr ? put->block.ply->size() : 0;
+  if (put == nullptr) return 0;
+  return put->block.ply->size() + (put->block.baseline ? put->block.baseline->size() : 0);
 }
 
 void refuse(const Order& order, const StoreError& error) {
@@ -173,8 +174,13 @@ void BlockStore::State::write(std::vector<Order> batch) {
   for (std::size_t i = 0; i < batch.size(); ++i) {
     if (const auto* put = std::get_if<Put>(&batch[i])) {
       const auto& ply = put->block.ply;
-      changes.push_back({{put->block.description, ++revision, now, ply->size(), sha256(*ply)}, false});
-      transaction.bytes[revision] = ply;
+      BlockFacts facts{put->block.description, ++revision, now, ply->size(), sha256(*ply)};
+      if (const auto& baseline = put->block.baseline; baseline && !baseline->empty()) {
+        facts.baseline_bytes = baseline->size();
+        facts.baseline_sha256 = sha256(*baseline);
+      }
+      changes.push_back({std::move(facts), false});
+      transaction.bytes[revision] = body_of(put->block);
       is_there[put->block.description.id] = true;
       outcomes[i] = revision;
     } else if (const auto* removal = std::get_if<Removal>(&batch[i])) {
@@ -261,7 +267,12 @@ void BlockStore::State::serve(const Reading& reading) {
     // As said.
   }
   if (bytes) {
-    reading.on_done(StoredBlock{*facts, std::move(bytes).value()});
+    SharedBytes ply = std::move(bytes).value(), baseline;
+    if (facts->baseline_bytes > 0) {
+      baseline = std::make_shared<const std::string>(*ply, facts->size_bytes);
+      ply = std::make_shared<const std::string>(*ply, 0, facts->size_bytes);
+    }
+    reading.on_done(StoredBlock{*facts, std::move(ply), std::move(baseline)});
   } else {
     reading.on_done(failure(bytes.error()));
   }

@@ -39,7 +39,7 @@ void Catalogue::append_past(Pasts& past, const Change* before, const Change& nex
   const Revision end = next.facts.revision;
   const StoreTime end_at = next.facts.accepted_at;
   if (before != nullptr && !before->is_removal) {
-    past.push_back({before->facts.revision, end, end_at, before->facts.size_bytes + kRowCostBytes});
+    past.push_back({before->facts.revision, end, end_at, before->facts.body_bytes() + kRowCostBytes});
   }
   if (next.is_removal) past.push_back({end, end, end_at, kRowCostBytes});
 }

@@ -138,11 +138,11 @@ SharedBytes right_bytes(Pages& pages, const Found& found, const BlockFacts& fact
     const auto rows = rows_of(page, place->second.page == 1);
     const PageRow& row = rows[place->second.row];
     const BlobPlace blob = only_blob(row);
-    if (blob.size != facts.size_bytes) continue;
+    if (blob.size != facts.body_bytes()) continue;
     auto record = pages.record(row);
     if (!record) continue;
     record->erase(0, blob.offset);
-    if (sha256(*record) == facts.sha256) return std::make_shared<const std::string>(std::move(*record));
+    if (is_body_of(facts, *record)) return std::make_shared<const std::string>(std::move(*record));
   }
   return nullptr;
 }

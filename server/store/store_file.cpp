@@ -20,7 +20,8 @@ namespace {
 using BOOST_OUTCOME_V2_NAMESPACE::failure;
 
 constexpr std::uint64_t kApplicationId = 0x53504354;  // "SPCT"
-constexpr std::uint64_t kVersion = 1;
+/// 2: blocks may have a baseline. What is of version 1 becomes 2 when something is written.
+constexpr std::uint64_t kVersion = 2;
 constexpr std::string_view kFirstBytes{"SQLite format 3\0", 16};
 constexpr const char* kSalvage = "; spectra store salvage FILE NEW rescues what can be read";
 
@@ -35,7 +36,7 @@ constexpr const char* kMaking =
     "CREATE TABLE constant (number INTEGER PRIMARY KEY, facts BLOB NOT NULL, checksum BLOB NOT NULL);"
     "CREATE TABLE change (revision INTEGER PRIMARY KEY, facts BLOB NOT NULL, checksum BLOB NOT NULL);"
     "CREATE TABLE body (revision INTEGER PRIMARY KEY, bytes BLOB NOT NULL);"
-    "PRAGMA application_id=1397769044; PRAGMA user_version=1;";
+    "PRAGMA application_id=1397769044; PRAGMA user_version=2;";
 constexpr std::string_view kTables =
     "CREATE TABLE body (revision INTEGER PRIMARY KEY, bytes BLOB NOT NULL);"
     "CREATE TABLE change (revision INTEGER PRIMARY KEY, facts BLOB NOT NULL, checksum BLOB NOT NULL);"
@@ -213,9 +214,10 @@ StoreResult<void> StoreFile::recognise() {
   BOOST_OUTCOME_TRY(const auto page_bytes, connection_->integer("PRAGMA page_size"));
   BOOST_OUTCOME_TRY(const auto tables, connection_->text("SELECT group_concat(sql || ';', '') FROM "
                                                          "(SELECT sql FROM sqlite_schema ORDER BY name)"));
-  if (version != kVersion || page_bytes != kPageBytes || tables != kTables) {
+  if (version < 1 || page_bytes != kPageBytes || tables != kTables) {
     return failure(damage("its tables are not those of a store"));
   }
+  version_ = version;
   return success();
 }
 
@@ -254,7 +256,7 @@ StoreResult<void> StoreFile::load() {
       ++block_rows;
       sizes.bind(1, revision);
       BOOST_OUTCOME_TRY(const bool is_there, sizes.step());
-      if (!is_there || sizes.integer(0) != change->facts.size_bytes) {
+      if (!is_there || sizes.integer(0) != change->facts.body_bytes()) {
         return failure(damage("block " + change->facts.description.id + " of revision " + std::to_string(revision) +
                               " has lost its bytes"));
       }
@@ -330,6 +332,9 @@ StoreResult<void> StoreFile::write(const Transaction& transaction) {
       BOOST_OUTCOME_TRYV(connection_->run("ROLLBACK"));
     }
     BOOST_OUTCOME_TRYV(connection_->run("BEGIN IMMEDIATE"));
+    if (version_ < kVersion) {
+      BOOST_OUTCOME_TRYV(connection_->run("PRAGMA user_version=2"));
+    }
     // Rows go first, so that new ones take their pages.
     for (const Revision revision : plan.dropped) {
       for (Statement* statement : {&statements_->drop_bytes, &statements_->drop_change}) {
@@ -373,6 +378,7 @@ StoreResult<void> StoreFile::write(const Transaction& transaction) {
     if (connection_->is_in_transaction()) (void)connection_->run("ROLLBACK");
     return written;
   }
+  version_ = kVersion;
   for (const Revision revision : plan.dropped) change_checksums_.erase(revision);
   change_checksums_.insert(added.begin(), added.end());
   if (!transaction.constants.empty()) constant_rows_ = std::move(constant_rows);
@@ -386,7 +392,7 @@ StoreResult<SharedBytes> StoreFile::read(const BlockFacts& facts) {
   select.bind(1, facts.revision);
   BOOST_OUTCOME_TRY(const bool is_there, select.step());
   auto bytes = std::make_shared<const std::string>(is_there ? select.bytes(0) : std::string_view());
-  if (!is_there || bytes->size() != facts.size_bytes || sha256(*bytes) != facts.sha256) {
+  if (!is_there || !is_body_of(facts, *bytes)) {
     return failure(damage("block " + facts.description.id + " of revision " + std::to_string(facts.revision) +
                           " is not what was put"));
   }

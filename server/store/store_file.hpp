@@ -19,7 +19,7 @@ using Constants = std::map<std::string, std::string, std::less<>>;
 /// What one transaction writes.
 struct Transaction {
   Catalogue::Plan plan;
-  std::map<Revision, SharedBytes> bytes;  ///< Of every block in plan.added.
+  std::map<Revision, SharedBytes> bytes;  ///< The body of every block in plan.added.
   Constants constants;                    ///< Set anew; an empty value removes one.
 };
 
@@ -48,7 +48,7 @@ class StoreFile {
 
   /// Whole and on the disk, or not at all.
   StoreResult<void> write(const Transaction& transaction);
-  /// Damaged when they are not what was put.
+  /// The body of a block; Damaged when it is not what was put.
   StoreResult<SharedBytes> read(const BlockFacts& facts);
 
   /// Moves what is in the log into the file. Until then the log grows.
@@ -80,6 +80,7 @@ class StoreFile {
   std::string path_;
   std::unique_ptr<Connection> connection_;
   bool is_read_only_;
+  std::uint64_t version_ = 0;
   std::unique_ptr<Statements> statements_;
   StoreState state_;
   std::map<Revision, Checksum> change_checksums_;

@@ -81,7 +81,7 @@ class Reader {
   bool is_good_ = true;
 };
 
-constexpr std::uint64_t kIsRemoval = 1, kHasObservedAt = 2, kHasSensor = 4;
+constexpr std::uint64_t kIsRemoval = 1, kHasObservedAt = 2, kHasSensor = 4, kHasBaseline = 8;
 
 }  // namespace
 
@@ -105,7 +105,7 @@ std::string encode(const Change& change) {
   const auto& d = facts.description;
   Writer writer;
   writer.integer((change.is_removal ? kIsRemoval : 0) | (d.observed_at ? kHasObservedAt : 0) |
-                 (d.sensor ? kHasSensor : 0));
+                 (d.sensor ? kHasSensor : 0) | (facts.baseline_bytes > 0 ? kHasBaseline : 0));
   writer.time(facts.accepted_at);
   writer.text(d.id);
   if (change.is_removal) return writer.take();
@@ -118,6 +118,10 @@ std::string encode(const Change& change) {
   writer.integer(facts.size_bytes);
   writer.raw(facts.sha256);
   writer.text(d.read_options);
+  if (facts.baseline_bytes > 0) {
+    writer.integer(facts.baseline_bytes);
+    writer.raw(facts.baseline_sha256);
+  }
   return writer.take();
 }
 
@@ -143,6 +147,10 @@ std::optional<Change> decode_change(Revision revision, std::string_view bytes) {
     facts.size_bytes = reader.integer();
     facts.sha256 = reader.raw<32>();
     d.read_options = reader.text();
+    if ((flags & kHasBaseline) != 0) {
+      facts.baseline_bytes = reader.integer();
+      facts.baseline_sha256 = reader.raw<32>();
+    }
   }
   if (!reader.is_whole() || !is_block_id(d.id)) return std::nullopt;
   return change;

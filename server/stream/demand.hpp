@@ -37,13 +37,19 @@ struct Demand {
   bool marks = false;                              ///< Of what is highlighted are wanted beside the colours.
   std::shared_ptr<const fusion::FusionPlan> plan;  ///< Null before there are settings.
   std::shared_ptr<const PlanIdentity> plan_identity;
+  LookRules look_rules;
 
   GeometryKey geometry_key(const std::shared_ptr<const Tile>& tile) const {
     return {Identity(tile), position_step_m, encoder_speed};
   }
   /// `bits` is one of the two above.
-  ColourKey colour_key(const EncodedTile& geometry, int bits) const {
-    return {geometry.revision, plan_identity, bits, colour_transform, carries_marks()};
+  ColourKey colour_key(const EncodedTile& geometry, int bits, const TileLook& look) const {
+    return {.revision = geometry.revision,
+            .plan = plan_identity,
+            .colour_bits = bits,
+            .transform = colour_transform,
+            .has_marks = carries_marks(),
+            .look = look};
   }
   ColourKey raw_key(std::uint32_t revision, Layer layer) const {
     const bool is_visible = layer == Layer::Visible;

@@ -33,7 +33,10 @@ void append_exact(std::string& text, double value) {
 }
 
 std::string picture_text(const fusion::FusionPlan& plan) {
-  std::string text = fusion::cache_key(plan.settings()) + '\n';
+  // How old what is: the look of a tile says that.
+  fusion::FusionSettings settings = plan.settings();
+  settings.age = {};
+  std::string text = fusion::cache_key(settings) + '\n';
   append_exact(text, plan.range_minimum());
   append_exact(text, plan.range_maximum());
   for (const auto& [name, value] : plan.params_in_force()) {

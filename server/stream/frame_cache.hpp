@@ -65,9 +65,10 @@ struct ColourKey {
   bool has_marks = false;
   Layer layer = Layer::Fused;
   double step_celsius = 0;  ///< Of Temperature.
+  TileLook look = {};       ///< Of Fused.
   friend bool operator<(const ColourKey& a, const ColourKey& b) {
-    return std::tie(a.revision, a.plan, a.colour_bits, a.transform, a.has_marks, a.layer, a.step_celsius) <
-           std::tie(b.revision, b.plan, b.colour_bits, b.transform, b.has_marks, b.layer, b.step_celsius);
+    return std::tie(a.revision, a.plan, a.colour_bits, a.transform, a.has_marks, a.layer, a.step_celsius, a.look) <
+           std::tie(b.revision, b.plan, b.colour_bits, b.transform, b.has_marks, b.layer, b.step_celsius, b.look);
   }
 };
 

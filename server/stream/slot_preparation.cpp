@@ -22,11 +22,13 @@ std::string encode_geometry(Encoding& encoding, FrameCache::State& cache) {
 
 std::string encode_colours(Encoding& encoding, FrameCache::State& cache) {
   const Demand& demand = encoding.demand;
-  auto result = encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, encoding.colour_bits,
-                                     demand.encoder_speed, demand.colour_transform, demand.carries_marks());
+  auto result =
+      encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, encoding.look, encoding.colour_bits,
+                           demand.encoder_speed, demand.colour_transform, demand.carries_marks());
   if (!result) return result.error().message;
   encoding.made_colours = std::move(result).value();
-  cache.store_colours(demand.colour_key(*encoding.geometry, encoding.colour_bits), encoding.made_colours);
+  cache.store_colours(demand.colour_key(*encoding.geometry, encoding.colour_bits, encoding.look),
+                      encoding.made_colours);
   return {};
 }
 
@@ -41,7 +43,7 @@ void encode(Encoding& encoding, FrameCache::State& cache) {
     reason = exception.what();
   }
   if (encoding.geometry) {
-    cache.abandon_colours(encoding.demand.colour_key(*encoding.geometry, encoding.colour_bits));
+    cache.abandon_colours(encoding.demand.colour_key(*encoding.geometry, encoding.colour_bits, encoding.look));
   } else {
     cache.abandon_geometry(encoding.demand.geometry_key(encoding.tile));
   }
@@ -59,13 +61,13 @@ void SlotPreparation::look_up(TileSlot& slot, const Demand& demand) {
     return;
   }
   const int bits = slot.wanted_colour_bits(demand);
-  auto colours = cache_.find_colours(demand.colour_key(*geometry, bits));
+  auto colours = cache_.find_colours(demand.colour_key(*geometry, bits, slot.look));
   if (colours) tiles_.make_ready(slot, std::move(geometry), std::move(colours), bits);
 }
 
 std::optional<Encoding> SlotPreparation::advance(const std::shared_ptr<TileSlot>& slot, const Demand& demand,
                                                  const std::weak_ptr<CacheWaiter>& waiter) {
-  Encoding encoding{slot, slot->tile, demand, slot->wanted_colour_bits(demand)};
+  Encoding encoding{slot, slot->tile, demand, slot->wanted_colour_bits(demand), slot->look};
   auto geometry = cache_.claim_geometry(demand.geometry_key(slot->tile), waiter);
   switch (geometry.kind) {
     case Claim<EncodedTile>::Kind::Ready:
@@ -89,7 +91,7 @@ std::optional<Encoding> SlotPreparation::advance_colours(Encoding encoding, std:
   }
   encoding.geometry = std::move(geometry);
   const int bits = encoding.colour_bits;
-  auto colours = cache_.claim_colours(encoding.demand.colour_key(*encoding.geometry, bits), waiter);
+  auto colours = cache_.claim_colours(encoding.demand.colour_key(*encoding.geometry, bits, encoding.look), waiter);
   switch (colours.kind) {
     case Claim<std::vector<std::byte>>::Kind::Ready:
       tiles_.make_ready(slot, std::move(encoding.geometry), std::move(colours.value), bits);
@@ -107,10 +109,10 @@ std::optional<Encoding> SlotPreparation::advance_colours(Encoding encoding, std:
 std::optional<Encoding> SlotPreparation::advance_after(const Encoding& done, const Demand& demand,
                                                        const std::weak_ptr<CacheWaiter>& waiter) {
   if (done.demand.geometry_epoch == demand.geometry_epoch) {
-    const Encoding next{done.slot, done.tile, demand, done.slot->wanted_colour_bits(demand)};
+    const Encoding next{done.slot, done.tile, demand, done.slot->wanted_colour_bits(demand), done.slot->look};
     if (done.made_geometry) return advance_colours(next, done.made_geometry, waiter);
     if (done.made_colours && demand.fused && done.demand.colour_epoch == demand.colour_epoch &&
-        done.colour_bits == next.colour_bits) {
+        done.colour_bits == next.colour_bits && done.look == next.look) {
       tiles_.make_ready(*done.slot, done.geometry, done.made_colours, done.colour_bits);
       return std::nullopt;
     }

@@ -13,6 +13,7 @@ struct Encoding {
   std::shared_ptr<const Tile> tile;
   Demand demand;  ///< When it was claimed, as is the next.
   int colour_bits = 8;
+  TileLook look;
   std::shared_ptr<const EncodedTile> geometry = nullptr;  ///< Null: it is to be made; else the colours for it.
   std::shared_ptr<const EncodedTile> made_geometry = nullptr;
   Payload made_colours = nullptr;

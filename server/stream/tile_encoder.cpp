@@ -24,16 +24,9 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
 }
 
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
-                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed,
-                                               protocol::ColourTransform transform, bool has_marks) {
-  std::vector<float> no_temperature;
-  std::span<const float> temperature = tile.temperature_celsius;
-  if (temperature.empty()) {
-    no_temperature.assign(tile.visible.size(), std::numeric_limits<float>::quiet_NaN());
-    temperature = no_temperature;
-  }
-  std::vector<fusion::Rgb8> fused(tile.visible.size());
-  plan.fuse(temperature, tile.visible, fused);
+                                               const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
+                                               int encoder_speed, protocol::ColourTransform transform, bool has_marks) {
+  const std::vector<fusion::Rgb8> fused = fused_colours(tile, plan, look);
   std::vector<protocol::ColourBytes> colours(geometry.input_of_decoded.size());
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];
@@ -41,8 +34,7 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
   }
   std::vector<std::uint8_t> marks;
   if (has_marks) {
-    std::vector<std::uint8_t> marked(temperature.size());
-    plan.mark(temperature, {}, marked);
+    const std::vector<std::uint8_t> marked = highlight_marks(tile, plan, look);
     for (const std::uint32_t input : geometry.input_of_decoded) marks.push_back(marked[input]);
   }
   BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));

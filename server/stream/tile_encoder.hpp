@@ -10,6 +10,7 @@
 #include "protocol/rpc_error.hpp"
 #include "protocol/tile_frame.hpp"
 #include "server/scene/scene_snapshot.hpp"
+#include "server/stream/tile_look.hpp"
 
 namespace spectra::server {
 
@@ -27,10 +28,11 @@ struct EncodedTile {
 /// Encodes the geometry of a tile of a scene whose largest step is to be `position_step_m`; the revision is left to the cache.
 protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed);
 
-/// Fuses a tile and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile; with
+/// Fuses a tile under a look of it and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile; with
 /// which vertices are highlighted where it `has_marks`.
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
-                                               const fusion::FusionPlan& plan, int colour_bits, int encoder_speed,
+                                               const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
+                                               int encoder_speed,
                                                protocol::ColourTransform transform = protocol::ColourTransform::None,
                                                bool has_marks = false);
 

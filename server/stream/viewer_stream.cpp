@@ -151,6 +151,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       demand_.plan_identity = cache_->plan_identity(*shared_plan, scene_->reference_temperature());
       demand_.plan = std::move(shared_plan);
       ++demand_.colour_epoch;
+      take_looks();
       is_complete_due_ = true;
       window_.on_overtaken();
       answer_first();
@@ -161,6 +162,18 @@ class Stream final : public ViewerStream, public CacheWaiter {
   std::uint32_t generation() const override {
     const std::lock_guard lock(mutex_);
     return generation_;
+  }
+
+  void set_time(double now_s) override {
+    {
+      const std::lock_guard lock(mutex_);
+      demand_.look_rules.now_s = now_s;
+      if (now_s <= tiles_.next_look_s()) return;
+    }
+    change([&] {
+      // What is drawn stays complete; a new answer is one only where something is another.
+      if (take_looks() > 0) is_complete_due_ = true;
+    });
   }
 
   void set_quality(const StreamQuality& quality) override {
@@ -347,8 +360,21 @@ class Stream final : public ViewerStream, public CacheWaiter {
     order_.clear();
     raw_order_.clear();
     tiles_.adopt(*scene_);
+    take_looks();
     is_complete_due_ = true;
     answer_first();
+  }
+
+  // How many of the tiles that are wanted look otherwise now.
+  std::size_t take_looks() {
+    LookRules& rules = demand_.look_rules;
+    rules.baseline_mark = scene_->baseline_mark();
+    rules.age.reset();
+    rules.compares_with_baseline = demand_.plan && demand_.plan->compares_with_baseline();
+    if (demand_.plan && demand_.plan->settings().age.mode == fusion::AgeMode::Fade) {
+      rules.age = fusion::AgeSteps(demand_.plan->settings().age.half_life_s);
+    }
+    return tiles_.set_looks(rules);
   }
 
   // Something has changed: the first answer may be coarser than the last; see StreamQuality.

@@ -143,6 +143,9 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   /// A plan made (on a worker) with the reference_temperature() of the current scene; returns the generation its colours will carry, from 1.
   virtual std::uint32_t set_plan(fusion::FusionPlan plan) = 0;
   virtual std::uint32_t generation() const = 0;
+  /// What time it is, Unix seconds: called before everything else, and now and then. What is faded by its age is sent anew, in the
+  /// same generation, where a step of it has passed; without such a step it costs nothing.
+  virtual void set_time(double now_s) = 0;
   virtual void set_quality(const StreamQuality& quality) = 0;
   virtual const StreamQuality& quality() const = 0;
   /// Chooses the tiles: see selected_tiles(). A camera that makes no sense (not finite, no direction) is ignored.

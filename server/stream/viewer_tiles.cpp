@@ -19,6 +19,7 @@ void TileSlot::forget_held() {
   held_geometry_epoch = 0;
   held_colour_epoch = 0;
   held_colour_bits = 0;
+  held_look.clear();
   forget_raw();
 }
 
@@ -99,6 +100,21 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
 void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
   slot.held_colour_epoch = colour_epoch;
   slot.held_colour_bits = slot.colour_bits;
+  slot.held_look = slot.look;
+}
+
+std::size_t ViewerTiles::set_looks(const LookRules& rules) {
+  std::size_t changed_count = 0;
+  next_look_s_ = std::numeric_limits<double>::infinity();
+  for (const auto& slot : slots_) {
+    TileLook look = look_of(*slot->tile, rules);
+    next_look_s_ = std::min(next_look_s_, server::next_look_s(*slot->tile, rules));
+    if (look == slot->look) continue;
+    slot->look = std::move(look);
+    put_down(*slot);
+    if (slot->is_wanted) ++changed_count;
+  }
+  return changed_count;
 }
 
 std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {

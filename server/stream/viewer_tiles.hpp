@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -37,6 +38,7 @@ struct TileSlot {
   std::shared_ptr<const EncodedTile> geometry;  ///< While Ready.
   Payload colours;                              ///< While Ready.
   int colour_bits = 0;                          ///< Of `colours`.
+  TileLook look;                                ///< That is to be shown, and that `colours` have.
 
   /// What was given out last; 0 = nothing. The name of a geometry is its revision on the wire: it rises with each
   /// geometry of the tile, even when an encoding comes back that the viewer had before.
@@ -48,6 +50,7 @@ struct TileSlot {
   std::uint64_t held_geometry_epoch = 0;
   std::uint64_t held_colour_epoch = 0;
   int held_colour_bits = 0;
+  TileLook held_look;
   float held_position_step_m = 0;  ///< The coarsest of the tile.
   std::array<float, 3> held_origin_m{};
   /// A raw layer on its way to the viewer.
@@ -67,7 +70,8 @@ struct TileSlot {
   /// Holds the newest colours, as exact as the tile's part in the picture asks for.
   bool has_colours(const Demand& demand) const {
     if (!demand.fused) return true;
-    return held_colour_epoch == demand.colour_epoch && held_colour_bits >= wanted_colour_bits(demand);
+    return held_colour_epoch == demand.colour_epoch && held_colour_bits >= wanted_colour_bits(demand) &&
+           held_look == look;
   }
   /// With colours, or with what the viewer makes them of.
   bool is_drawable() const { return held_geometry_epoch != 0 && (held_colour_epoch != 0 || has_raw_layers()); }
@@ -104,6 +108,11 @@ class ViewerTiles {
   void make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours, int colour_bits);
   /// Ready -> Idle; anything else stays as it is.
   void put_down(TileSlot& slot);
+  /// What tiles are to look like from now on; what is Ready and looks otherwise is put down. Returns how many wanted ones are concerned.
+  std::size_t set_looks(const LookRules& rules);
+  /// When a look will be another, Unix seconds; infinite: never by time alone.
+  double next_look_s() const { return next_look_s_; }
+
   /// The geometry of a Ready slot goes out under that name.
   void give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch);
   /// The colours of a Ready slot go out.
@@ -146,6 +155,7 @@ class ViewerTiles {
   std::vector<std::shared_ptr<TileSlot>> slots_;
   std::deque<protocol::TileFrameHeader> removals_;
   std::size_t prepared_bytes_ = 0;
+  double next_look_s_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace spectra::server

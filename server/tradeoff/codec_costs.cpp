@@ -145,7 +145,7 @@ fusion::Result<ColourPoint> draco_colours(const Tiles& tiles, const std::vector<
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const auto payload = [&] {
       const Stopwatch watch(point.encode_ms);
-      return encoded_tile_colours(*tiles[i], geometry[i], plan, point.colour_bits, 7, transform);
+      return encoded_tile_colours(*tiles[i], geometry[i], plan, {}, point.colour_bits, 7, transform);
     }();
     if (!payload) return failure(fusion::ErrorCode::BadValue, payload.error().message, "colours");
     point.size_bytes += payload.value()->size();

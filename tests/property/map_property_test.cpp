@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -233,6 +234,173 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
   for (const auto& [id, patch] : in_it) all.put.push_back({.id = id, .scene = scene_of(patch), .observed_at = {}});
   const auto whole = at_once.apply(std::move(all), 1, pool);
   expect_same_full_accuracy(*scene, *whole);
+}
+
+/// A block as the plain rule has it: what each of its vertices is compared with, and since when.
+struct ModelBlock {
+  fusion::LoadedScene scene;
+  double observed_at = 0;
+  std::vector<float> baseline;
+  std::vector<double> baseline_at;
+};
+using Model = std::map<std::string, ModelBlock>;
+
+/// Puts a block: by place it takes over the baseline of the one of its name.
+void put(Model& model, const std::string& id, const Patch& patch, double observed_at, double reach_m) {
+  ModelBlock block{scene_of(patch), observed_at, {}, {}};
+  const auto& mesh = block.scene.mesh;
+  const auto before = model.find(id);
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    float baseline = mesh.temperature_celsius()[v];
+    double at = observed_at;
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t from = 0;
+    for (std::size_t w = 0; before != model.end() && w < before->second.baseline.size(); ++w) {
+      const Vec3f &a = mesh.positions()[v], &b = before->second.scene.mesh.positions()[w];
+      const double dx = double{a.x} - double{b.x}, dy = double{a.y} - double{b.y}, dz = double{a.z} - double{b.z};
+      const double squared = dx * dx + dy * dy + dz * dz;
+      if (squared < nearest) from = w;
+      nearest = std::min(nearest, squared);
+    }
+    if (nearest <= reach_m * reach_m && !std::isnan(before->second.baseline[from])) {
+      baseline = before->second.baseline[from];
+      at = before->second.baseline_at[from];
+    }
+    block.baseline.push_back(baseline);
+    block.baseline_at.push_back(at);
+  }
+  model.insert_or_assign(id, std::move(block));
+}
+
+/// The same place or nearly, measured anew; or another one.
+Patch again(const Patch& patch) {
+  if (*rc::gen::inRange(0, 4) == 0) return *patches();
+  Patch next = patch;
+  next.celsius += static_cast<float>(*rc::gen::inRange(-3, 4));
+  next.height += 0.25F * static_cast<float>(*rc::gen::inRange(0, 12));
+  if (*rc::gen::inRange(0, 3) == 0) next.side = *rc::gen::inRange(2, 18);
+  return next;
+}
+
+void expect_remembered(const SceneSnapshot& scene, const Model& model) {
+  const std::vector<float> baseline = scene.whole_baseline();
+  std::vector<float> expected;
+  std::vector<double> expected_at, seen_at;
+  for (const auto& [id, block] : model) {
+    expected.insert(expected.end(), block.baseline.begin(), block.baseline.end());
+    expected_at.insert(expected_at.end(), block.baseline_at.begin(), block.baseline_at.end());
+    seen_at.insert(seen_at.end(), block.baseline.size(), block.observed_at);
+  }
+  RC_ASSERT(same(baseline, expected));
+  std::size_t known = 0;
+  for (const auto& tile : scene.tiles()) {
+    if (tile->child_mask != 0) continue;
+    for (std::size_t v = 0; v < tile->owned_count; ++v) {
+      RC_ASSERT(tile->seen_at.at(v) == seen_at[scene.vertex_index(*tile, v)]);
+    }
+    // Some vertices are looked at as a viewer would.
+    const auto probe = scene.probe(tile->positions[++known % tile->positions.size()]);
+    RC_ASSERT(probe.has_value() && probe->observed_at == seen_at[probe->vertex_index]);
+    const float its = expected[probe->vertex_index];
+    RC_ASSERT(probe->baseline_celsius.has_value() == !std::isnan(its));
+    if (std::isnan(its)) continue;
+    RC_ASSERT(*probe->baseline_celsius == its);
+    RC_ASSERT(probe->baseline_at == expected_at[probe->vertex_index]);
+  }
+}
+
+RC_GTEST_PROP(LivingMap, RemembersAsThePlainRuleSays, ()) {
+  WorkerPool pool(2);
+  LivingMap map({.leaf_vertex_count = kLeafSize, .first_level = 6, .remembers = true});
+  Model model;
+  std::map<std::string, Patch> in_it;
+  double now = 1000;
+  std::uint32_t revision = 0;
+  std::shared_ptr<const SceneSnapshot> scene;
+  const int steps = *rc::gen::inRange(1, 10);
+  for (int step = 0; step < steps; ++step) {
+    now += 1;
+    if (scene && *rc::gen::inRange(0, 5) == 0) {
+      scene = map.mark_baseline(now, ++revision);
+      for (auto& [id, block] : model) {
+        const auto celsius = block.scene.mesh.temperature_celsius();
+        block.baseline.assign(celsius.begin(), celsius.end());
+        block.baseline_at.assign(celsius.size(), now);
+      }
+      RC_ASSERT(scene->baseline_marked_at() == now);
+    } else {
+      const double reach_m = map.constants() ? kHandedOnSteps * double{map.constants()->position_step_m} : 0;
+      MapChange change;
+      std::set<std::string> named;
+      const int count = *rc::gen::inRange(1, 4);
+      for (int i = 0; i < count; ++i) {
+        const std::string id = name_of(*rc::gen::inRange(0, 4));
+        if (!named.insert(id).second) continue;
+        if (in_it.contains(id) && *rc::gen::inRange(0, 5) == 0) {
+          change.removed.push_back(id);
+          in_it.erase(id);
+          model.erase(id);
+          continue;
+        }
+        const Patch patch = in_it.contains(id) ? again(in_it[id]) : *patches();
+        const double observed_at = now - *rc::gen::inRange(0, 3);
+        change.put.push_back({.id = id, .scene = scene_of(patch), .observed_at = observed_at});
+        put(model, id, patch, observed_at, reach_m);
+        in_it[id] = patch;
+      }
+      scene = map.apply(std::move(change), ++revision, pool);
+    }
+    expect_remembered(*scene, model);
+    const int followed = *rc::gen::inRange(0, 6);
+    for (int i = 0; i < followed; ++i) {
+      auto work = map.next_coarse();
+      if (!work) break;
+      work->run();
+      if (auto next = map.take_coarse(*work, ++revision)) scene = std::move(next);
+    }
+    expect_remembered(*scene, model);
+  }
+}
+
+TEST(LivingMap, ACoarseTileShowsTheMeanChangeAndTheNewestTime) {
+  WorkerPool pool(2);
+  LivingMap map({.leaf_vertex_count = kLeafSize, .first_level = 6, .remembers = true});
+  MapChange change;
+  for (int i = 0; i < 4; ++i) {
+    change.put.push_back({.id = name_of(i), .scene = scene_of({.column = i, .celsius = 20}), .observed_at = 100});
+  }
+  static_cast<void>(map.apply(std::move(change), 1, pool));
+  MapChange warmer;
+  warmer.put.push_back({.id = name_of(1), .scene = scene_of({.column = 1, .celsius = 25}), .observed_at = 200});
+  auto scene = map.apply(std::move(warmer), 2, pool);
+  std::uint32_t revision = 2;
+  while (auto work = map.next_coarse()) {
+    work->run();
+    if (auto next = map.take_coarse(*work, ++revision)) scene = std::move(next);
+  }
+  const Tile& top = *scene->tiles().front();
+  ASSERT_NE(top.child_mask, 0);
+  const auto baseline = baseline_of(top, scene->baseline_mark());
+  int old_count = 0, new_count = 0;
+  for (std::size_t v = 0; v < top.positions.size(); ++v) {
+    if (std::isnan(top.temperature_celsius[v])) continue;
+    const float x = top.positions[v].x;
+    // Away from where the regions of vertices may hold some of both.
+    if (x > 20 && x < 28) {
+      EXPECT_NEAR(top.temperature_celsius[v] - baseline[v], 5, 0.01) << x;
+      EXPECT_EQ(top.seen_at.at(v), 200) << x;
+    }
+    if (x < 10 || x > 38) {
+      EXPECT_NEAR(top.temperature_celsius[v] - baseline[v], 0, 0.01) << x;
+      // Of what a vertex stands for the newest counts, however little it is.
+      (top.seen_at.at(v) == 100 ? old_count : new_count) += 1;
+    }
+  }
+  EXPECT_GT(old_count, 0);
+  EXPECT_GE(old_count, new_count);
+  EXPECT_EQ(scene->tiles().front(), map.mark_baseline(300, ++revision)->tiles().front()) << "a mark makes no tile anew";
+  const auto marked = baseline_of(top, map.baseline_mark().number);
+  EXPECT_TRUE(same(marked, top.temperature_celsius));
 }
 
 }  // namespace

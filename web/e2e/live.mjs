@@ -41,6 +41,91 @@ const placeOf = (page, column, row, height = 0) =>
 const near = (a, b, levels) => a.every((value, channel) => Math.abs(value - b[channel]) <= levels);
 
 export function addLiveTests(browser) {
+  test('What has become warmer since the baseline was marked is shown where it is; a probe says how long ago and since when; what is old fades', async () => {
+    const server = await startServer(['--live']);
+    let revision = 0;
+    for (let i = 0; i < 4; i += 1) revision = await put(server, i, 0, { age_s: 400 });
+    const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 800 });
+    await shows(page, revision);
+    await page.getByRole('radio', { name: 'Thermal change' }).click();
+    await settled(page);
+    const scale = page.locator('[data-change-scale]');
+    const plain = async (locator) => (await locator.innerText()).replaceAll('\u202f', ' ').replaceAll(/\s+/g, ' ').trim();
+    assert.equal(await plain(scale), 'change, K \u22125.0 0 +5.0');
+    assert.equal(await page.locator('[data-handle="range.max"]').count(), 0, 'the range is no part of this picture');
+    await page.getByText('has no neutral middle').waitFor();
+    await page.getByRole('radio', { name: /^Blue to red/ }).click();
+    await page.getByText('has no neutral middle').waitFor({ state: 'detached' });
+
+    // Where it was first seen is where it is compared with, until somebody marks now.
+    const since = page.locator('[data-baseline]');
+    assert.equal(await plain(since), 'Changes are since a place was first seen');
+    await page.getByRole('button', { name: 'Mark baseline' }).press('Enter');
+    await page.waitForFunction(() => globalThis.spectra.store.scene.baseline.marked_at !== null);
+    assert.match(await plain(since), /^Changes are since \d\d:\d\d$/);
+    const marked = (await plain(since)).slice(-5);
+    // The camera is the viewer's, from above.
+    await page.evaluate((size) => {
+      const { viewport, store } = globalThis.spectra;
+      const { origin } = store.scene;
+      const target = [2 * size - origin[0], size / 2 - origin[1], -origin[2]];
+      viewport.lookAlong([0, 0, 1]);
+      globalThis.spectra.setView({ eye: [target[0], target[1] - 0.01, target[2] + 5 * size], target });
+    }, STEP_M);
+    await settled(page);
+    const places = [];
+    for (let i = 0; i < 4; i += 1) places.push(await placeOf(page, i, 0));
+    const before = await screenshot(page, 'change-before');
+    await shows(page, await put(server, 2, 0, { celsius: 24, age_s: 250 }));
+    const after = await screenshot(page, 'change-after');
+    const at = (image, [x, y]) => image.at(Math.round(x), Math.round(y));
+    for (let i = 0; i < 4; i += 1) {
+      const isSame = near(at(before, places[i]), at(after, places[i]), 3);
+      assert.equal(isSame, i !== 2, `block ${i}: ${at(before, places[i])} to ${at(after, places[i])}`);
+    }
+    const [red, , blue] = at(after, places[2]);
+    assert.ok(red > blue + 40, `warmer is red: ${at(after, places[2])}`);
+    assert.match(await plain(page.locator('[data-highlight]')), /^2\d % of the surface\.$/);
+
+    await page.mouse.click(...places[2]);
+    const probe = page.locator('[data-probe]');
+    await probe.waitFor();
+    assert.match(await plain(probe), new RegExp(`^2[345]\\.\\d °C, 4 min ago, \\+4\\.0 since ${marked}$`));
+    await page.keyboard.press('Escape');
+    await screenshot(page, 'change-panel');
+
+    // In the visible view only age is shown: what is older than four half-lives is grey, and what is new is not.
+    await shows(page, await put(server, 3, 0, { celsius: 20, age_s: 0 }));
+    await page.keyboard.press('2');
+    await settled(page);
+    const coloured = await screenshot(page, 'age-off');
+    await page.getByRole('radio', { name: 'fades' }).click();
+    const half_life = page.getByRole('spinbutton', { name: 'Half-life' });
+    await half_life.fill('60');
+    await half_life.press('Enter');
+    await settled(page);
+    const faded = await screenshot(page, 'age-fade');
+    const spread = (colour) => Math.max(...colour.slice(0, 3)) - Math.min(...colour.slice(0, 3));
+    for (let i = 0; i < 4; i += 1) assert.ok(spread(at(coloured, places[i])) > 20, `block ${i} has colours`);
+    assert.deepEqual(
+      places.map((place) => spread(at(faded, place)) < 8),
+      [true, true, true, false],
+    );
+    // A step of it comes by itself.
+    await half_life.fill('3');
+    await half_life.press('Enter');
+    await settled(page);
+    await page.waitForTimeout(14_000);
+    await settled(page);
+    assert.ok(spread(at(await screenshot(page, 'age-later'), places[3])) < 8, 'after four half-lives all is grey');
+    await half_life.fill('0');
+    await half_life.press('Enter');
+    await page.getByText('must be of at least 1').waitFor();
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
   test('A live map grows on the screen: it is said how new it is, all of it stays in view, and a range that moves is announced and can be held', async () => {
     const server = await startServer(['--live']);
     const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 800 });

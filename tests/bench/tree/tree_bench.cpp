@@ -127,7 +127,7 @@ void print_wire_bytes(const SceneSnapshot& scene) {
                    geometry.error().message.c_str());
       std::exit(1);
     }
-    const auto colours = encoded_tile_colours(*tile, geometry.value(), plan, 8, 7).value();
+    const auto colours = encoded_tile_colours(*tile, geometry.value(), plan, {}, 8, 7).value();
     const std::size_t bytes = geometry.value().payload->size() + colours->size();
     if (tile->id.level == 0) {
       std::printf("\nroot on the wire (step %g m, speed 7, 8-bit colours): geometry %zu + colours %zu = %zu bytes\n",

@@ -150,7 +150,7 @@ TEST(MapKeeper, MakesTheCoarseTilesOfWhatItRestores) {
   for (const std::string id : {"a", "b", "c"}) {
     const auto ply = std::make_shared<const std::string>(square(120, id == "a" ? 0 : id == "b" ? 119 : 238));
     std::promise<bool> is_stored;
-    store->put({{id, std::nullopt, std::nullopt, "", 120 * 120, 2 * 119 * 119, {}}, ply},
+    store->put({{id, std::nullopt, std::nullopt, "", 120 * 120, 2 * 119 * 119, {}}, ply, nullptr},
                [&](const store::StoreResult<store::Revision>& outcome) { is_stored.set_value(outcome.has_value()); });
     ASSERT_TRUE(is_stored.get_future().get());
   }

@@ -70,6 +70,7 @@ const std::map<std::string, MethodPassages> kMethods{
     {"quality.set", {through<QualityChange>(), through<QualityReply>()}},
     {"scene.histogram", {through<HistogramRequest>(), through<HistogramReply>()}},
     {"scene.probe", {through<ProbeRequest>(), through<ProbeReply>()}},
+    {"scene.baseline", {through<BaselineRequest>(), through<BaselineReply>()}},
     {"scene.extremes", {through<ExtremesRequest>(), through<ExtremesReply>()}},
     {"camera.set", {through<CameraSet>(), unchanged}},
     {"stream.ack", {through<StreamAck>(), unchanged}},

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/store/salvage.hpp"
 #include "tests/unit/store/store_fixture.hpp"
 
 namespace spectra::store {
@@ -28,6 +29,18 @@ void run_sql(const std::string& file, const char* sql) {
   ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
   EXPECT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
   sqlite3_close(database);
+}
+
+std::uint64_t number_in(const std::string& file, const char* sql) {
+  sqlite3* database = nullptr;
+  sqlite3_stmt* statement = nullptr;
+  EXPECT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_prepare_v2(database, sql, -1, &statement, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
+  EXPECT_EQ(sqlite3_step(statement), SQLITE_ROW);
+  const auto number = static_cast<std::uint64_t>(sqlite3_column_int64(statement, 0));
+  sqlite3_finalize(statement);
+  sqlite3_close(database);
+  return number;
 }
 
 std::vector<std::string> ids_of(const BlockPage& page) {
@@ -297,10 +310,55 @@ TEST(BlockStore, RefusesWhatIsNoStoreAndLeavesItAlone) {
   EXPECT_EQ(refusal(), StoreErrorCode::Foreign);
   std::filesystem::remove(here.file());
   opened(here.file());
-  run_sql(here.file(), "PRAGMA user_version=2");
+  run_sql(here.file(), "PRAGMA user_version=3");
   EXPECT_EQ(refusal(), StoreErrorCode::NewerVersion);
   run_sql(here.file(), "PRAGMA user_version=1; CREATE INDEX i ON change(facts)");
   EXPECT_EQ(refusal(), StoreErrorCode::Damaged);
+}
+
+TEST(BlockStore, KeepsWhatBelongsToARevisionBesideItsBytes) {
+  const StoreFixture here;
+  const std::string told = "what was before";
+  {
+    const auto store = opened(here.file());
+    auto block = made_block("a", 1, 5000);
+    block.baseline = std::make_shared<const std::string>(told);
+    ASSERT_TRUE(put(*store, std::move(block)));
+    ASSERT_TRUE(put(*store, made_block("b", 2, 5000)));
+  }
+  const auto expect_both = [&](const std::string& file) {
+    const auto store = opened(file);
+    const auto with = read(*store, 1), without = read(*store, 2);
+    ASSERT_TRUE(with && without);
+    ASSERT_TRUE(with.value().baseline);
+    EXPECT_EQ(*with.value().baseline, told);
+    EXPECT_EQ(*with.value().ply, made_bytes(1, 5000));
+    EXPECT_EQ(with.value().facts.sha256, sha256(made_bytes(1, 5000)));
+    EXPECT_EQ(with.value().facts.size_bytes, 5000U);
+    EXPECT_FALSE(without.value().baseline);
+    EXPECT_EQ(*without.value().ply, made_bytes(2, 5000));
+  };
+  expect_both(here.file());
+  const std::string rescued = (here.folder() / "rescued").string();
+  ASSERT_TRUE(salvage(here.file(), rescued, [](double) {}));
+  expect_both(rescued);
+}
+
+TEST(BlockStore, OneOfVersion1IsReadAndBecomesVersion2WhenSomethingIsWritten) {
+  const StoreFixture here;
+  ASSERT_TRUE(put(*opened(here.file()), made_block("a", 1, 100)));
+  run_sql(here.file(), "PRAGMA user_version=1");
+  ASSERT_TRUE(read(*opened(here.file(), {.is_read_only = true}), 1));
+  const auto version = [&] { return number_in(here.file(), "PRAGMA user_version"); };
+  EXPECT_EQ(version(), 1U);
+  {
+    const auto store = opened(here.file());
+    auto block = made_block("a", 2, 100);
+    block.baseline = std::make_shared<const std::string>("before");
+    ASSERT_TRUE(put(*store, std::move(block)));
+  }
+  EXPECT_EQ(version(), 2U);
+  EXPECT_EQ(*read(*opened(here.file()), 2).value().baseline, "before");
 }
 
 TEST(BlockStore, MissesRowsThatAreGoneOrExchanged) {

@@ -1,5 +1,7 @@
 // Made by `npm run generate` from protocol/schema. Not to be edited.
 
+export type AgeMode = "off" | "fade";
+export type BaselineAction = "mark" | "get";
 export type BeyondRange = "over" | "under";
 /**
  * x, y, z in metres.
@@ -60,6 +62,11 @@ export type RpcId = number | string;
 export type StatusLevel = "info" | "warning" | "error";
 
 export interface ProtocolDefinitions {
+  AgeChange: AgeChange;
+  AgeMode: AgeMode;
+  BaselineAction: BaselineAction;
+  BaselineReply: BaselineReply;
+  BaselineRequest: BaselineRequest;
   BeyondRange: BeyondRange;
   Bounds: Bounds;
   CameraSet: CameraSet;
@@ -75,6 +82,7 @@ export interface ProtocolDefinitions {
   ExtremesRequest: ExtremesRequest;
   FactsReply: FactsReply;
   FactsRequest: FactsRequest;
+  FusionAge: FusionAge;
   FusionChange: FusionChange;
   FusionRange: FusionRange;
   FusionReply: FusionReply;
@@ -111,6 +119,7 @@ export interface ProtocolDefinitions {
   RpcNotification: RpcNotification;
   RpcRequest: RpcRequest;
   RpcResult: RpcResult;
+  SceneBaseline: SceneBaseline1;
   SceneChanged: SceneChanged;
   SceneDescription: SceneDescription;
   SceneNote: SceneNote;
@@ -127,6 +136,35 @@ export interface ProtocolDefinitions {
   SubscribeRequest: SubscribeRequest;
   UpAxis: UpAxis;
   Vector3: Vector3;
+}
+/**
+ * The same as it is set; what is absent stays.
+ */
+export interface AgeChange {
+  mode?: AgeMode;
+  /**
+   * 1 to 10,000,000.
+   */
+  half_life_s?: number;
+}
+/**
+ * Result of scene.baseline.
+ */
+export interface BaselineReply {
+  /**
+   * When the temperatures of that moment became the baseline, Unix seconds; null = never: each vertex is compared with what it was when first seen.
+   */
+  marked_at: number | null;
+  /**
+   * Of the scene that has it.
+   */
+  revision: number;
+}
+/**
+ * Params of scene.baseline.
+ */
+export interface BaselineRequest {
+  action: BaselineAction;
 }
 /**
  * Smallest and largest coordinates, metres relative to the scene origin.
@@ -313,6 +351,16 @@ export interface FactsRequest {
   hues?: boolean;
 }
 /**
+ * How the age of what was seen is shown.
+ */
+export interface FusionAge {
+  mode: AgeMode;
+  /**
+   * After so many seconds half of the colour is left.
+   */
+  half_life_s: number;
+}
+/**
  * Params of fusion.set: any part of FUSION; what is absent stays.
  */
 export interface FusionChange {
@@ -321,6 +369,7 @@ export interface FusionChange {
   palette?: string;
   range?: RangeChange;
   missing?: MissingDisplay;
+  age?: AgeChange;
 }
 /**
  * Parameter name to value.
@@ -380,6 +429,7 @@ export interface FusionState {
   palette: string;
   range: FusionRange;
   missing: MissingDisplay;
+  age?: FusionAge;
   change_scale?: ChangeScale1;
 }
 /**
@@ -483,6 +533,7 @@ export interface SceneDescription {
    */
   live?: boolean;
   observed?: SceneObserved;
+  baseline?: SceneBaseline;
   /**
    * What loading noticed.
    */
@@ -518,6 +569,15 @@ export interface SceneTemperature {
 export interface SceneObserved {
   oldest: number | null;
   newest: number | null;
+}
+/**
+ * Absent in a scene that does not remember, as a file.
+ */
+export interface SceneBaseline {
+  /**
+   * When the baseline was marked, Unix seconds; null = never: each vertex is compared with what it was when first seen.
+   */
+  marked_at: number | null;
 }
 /**
  * Something that was repaired, left out or interpreted while the scene was read.
@@ -693,6 +753,18 @@ export interface ProbeReply {
    * Metres.
    */
   distance: number;
+  /**
+   * When the vertex was seen, Unix seconds; null = not known.
+   */
+  observed_at?: number | null;
+  /**
+   * What its temperature is compared with, degC; null = nothing, or beyond the sensor's range.
+   */
+  baseline?: number | null;
+  /**
+   * The time that is of, Unix seconds; null = not known.
+   */
+  baseline_at?: number | null;
 }
 /**
  * Params of scene.probe.
@@ -792,6 +864,15 @@ export interface RpcResult {
   jsonrpc: "2.0";
   id: RpcId;
   result: {};
+}
+/**
+ * What temperatures are compared with.
+ */
+export interface SceneBaseline1 {
+  /**
+   * When the baseline was marked, Unix seconds; null = never: each vertex is compared with what it was when first seen.
+   */
+  marked_at: number | null;
 }
 /**
  * Params of the notification scene.changed.

@@ -22,6 +22,7 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
   'scene.probe.': messages.probe,
   'scene.extremes.': messages.extremes,
   'fusion.facts.': messages.facts,
+  'scene.baseline.': messages.baseline,
   'fusion.': messages.fusionState,
   'quality.set.': messages.qualityState,
   'stream.complete.': messages.streamComplete,
@@ -42,6 +43,11 @@ const optionalFields = new Set([
   'over_range',
   'under_range',
   'hues',
+  'age',
+  'change_scale',
+  'baseline',
+  'baseline_at',
+  'observed_at',
 ]);
 /** What a viewer sends, or only a sender of blocks is sent. */
 const notForViewers = ['camera.set', 'stream.ack', 'ingest.'];

@@ -30,6 +30,7 @@ export type ParameterValue = wire.ParameterValue;
 export type Palette = wire.PaletteDescription;
 export type Range = wire.FusionRange;
 export type RangeChange = wire.RangeChange;
+export type AgeChange = wire.AgeChange;
 export type Fusion = wire.FusionState;
 export type FusionState = wire.FusionReply;
 /** A partial change for fusion.set; what is absent stays, parameters merge. */
@@ -42,6 +43,7 @@ export type Hello = Omit<wire.Hello, 'methods' | 'palettes' | 'catalogue'> & (Ca
 export type Facts = wire.FactsReply;
 export type Histogram = wire.HistogramReply;
 export type Probe = wire.ProbeReply;
+export type Baseline = wire.BaselineReply;
 export type Extreme = wire.Extreme;
 export type Extremes = wire.ExtremesReply;
 export type StreamComplete = wire.StreamComplete;
@@ -80,6 +82,7 @@ export const scene: Decoder<Scene> = object({
   metric: optional(boolean),
   live: optional(boolean),
   observed: optional(object({ oldest: nullable(number), newest: nullable(number) })),
+  baseline: optional(object({ marked_at: nullable(number) })),
   notes: array(object({ id: string, count, message: string })),
 });
 
@@ -138,6 +141,7 @@ export const fusion: Decoder<Fusion> = object({
   palette: string,
   range,
   missing: string,
+  age: optional(object({ mode: oneOf('off', 'fade'), half_life_s: number })),
   change_scale: optional(object({ min: number, max: number })),
 });
 
@@ -211,7 +215,12 @@ export const probe: Decoder<Probe> = object({
   visible: triple(number),
   fused: triple(number),
   distance: number,
+  observed_at: optional(nullable(number)),
+  baseline: optional(nullable(number)),
+  baseline_at: optional(nullable(number)),
 });
+
+export const baseline: Decoder<Baseline> = object({ marked_at: nullable(number), revision: count });
 
 const extreme = object({ position: triple(number), temperature: number });
 export const extremes: Decoder<Extremes> = object({

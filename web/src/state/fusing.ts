@@ -198,6 +198,10 @@ export class Fusing {
       this.failed(`${this.store.method?.label ?? wanted.method} compares with temperatures of before, which the robot has.`);
       return null;
     }
+    if (wanted.age?.mode === 'fade') {
+      this.failed('What is old fades by the time when it was seen, which the robot has.');
+      return null;
+    }
     this.events.onHighlighted(plan.highlighted);
     const range = { ...wanted.range, min: plan.range_minimum, max: plan.range_maximum };
     return { ...wanted, params: plan.params, params_in_force: plan.params_in_force, range };

@@ -35,12 +35,28 @@ describe('mergedChange', () => {
     expect(mergedChange({ params: { alpha: 1 } }, { method: 'b', params: { k: 2 } })).toEqual({ method: 'b', params: { k: 2 } });
   });
 
+  it('merges what is said of age', () => {
+    expect(mergedChange({ age: { mode: 'fade' } }, { age: { half_life_s: 60 } })).toEqual({
+      age: { mode: 'fade', half_life_s: 60 },
+    });
+    expect(mergedChange({ age: { mode: 'fade' } }, { palette: 'a' })).toEqual({ age: { mode: 'fade' }, palette: 'a' });
+  });
+
   it('adds parameters to a new method', () => {
     expect(mergedChange({ method: 'b' }, { params: { k: 2 } })).toEqual({ method: 'b', params: { k: 2 } });
   });
 });
 
 describe('withChange', () => {
+  it('keeps of age what is not changed, and forgets what the palette of another method stands for', () => {
+    const change = { ...fusion, age: { mode: 'off' as const, half_life_s: 60 }, change_scale: { min: -5, max: 5 } };
+    expect(withChange(change, { age: { mode: 'fade' } }, methods).age).toEqual({ mode: 'fade', half_life_s: 60 });
+    expect(withChange(fusion, { age: { mode: 'fade' } }, methods).age).toEqual({ mode: 'fade', half_life_s: 300 });
+    expect(withChange(change, { palette: 'b' }, methods).change_scale).toEqual({ min: -5, max: 5 });
+    expect(withChange(change, { method: 'other' }, methods).change_scale).toBeUndefined();
+    expect(wholeChange(change).age).toEqual({ mode: 'off', half_life_s: 60 });
+  });
+
   it('starts a new method at its defaults', () => {
     expect(withChange(fusion, { method: 'other' }, methods).params).toEqual({ k: 1 });
     expect(withChange(fusion, { method: 'other', params: { k: 3 } }, methods).params).toEqual({ k: 3 });

@@ -1,11 +1,15 @@
 import type { Fusion, FusionChange, Method, ParameterValue, Range, RangeChange } from '../protocol/messages';
 
+/** Of a server that does not know of age. */
+const NO_AGE = { mode: 'off', half_life_s: 300 } as const;
+
 /** The change that has the effect of `earlier` followed by `later`. */
 export function mergedChange(earlier: FusionChange, later: FusionChange): FusionChange {
   const merged: FusionChange = { ...earlier, ...later };
   if (later.method === undefined && (earlier.params ?? later.params) !== undefined) {
     merged.params = { ...earlier.params, ...later.params };
   }
+  if (earlier.age !== undefined && later.age !== undefined) merged.age = { ...earlier.age, ...later.age };
   // A new method starts at its defaults: parameters of the one before mean nothing to it.
   if (later.method !== undefined && later.params === undefined) delete merged.params;
   return merged;
@@ -23,10 +27,13 @@ export function withChange(fusion: Fusion, change: FusionChange | null, methods:
     next.method = change.method;
     next.params = defaultParams(methods.find((method) => method.id === change.method));
     next.params_in_force = {};
+    // Only the server knows what the palette of another method stands for.
+    delete next.change_scale;
   }
   if (change.params !== undefined) next.params = { ...next.params, ...change.params };
   if (change.palette !== undefined) next.palette = change.palette;
   if (change.missing !== undefined) next.missing = change.missing;
+  if (change.age !== undefined) next.age = { ...(fusion.age ?? NO_AGE), ...change.age };
   if (change.range !== undefined) {
     const { mode, min, max } = change.range;
     // Which temperatures a range that follows the scene comes to, only the server knows.
@@ -38,8 +45,9 @@ export function withChange(fusion: Fusion, change: FusionChange | null, methods:
 
 /** Everything of the settings, as a change: what a new connection is told. */
 export function wholeChange(fusion: Fusion): FusionChange {
-  const { method, params, palette, range, missing } = fusion;
+  const { method, params, palette, range, missing, age } = fusion;
   return {
+    ...(age === undefined ? {} : { age }),
     method,
     params,
     palette,

@@ -13,8 +13,13 @@ export class MapAge {
     if (newest_s !== null) this.#behind_s = Math.max(this.#behind_s, newest_s - now_s);
   }
 
+  /** The time that whoever sees the map has, Unix seconds. */
+  clock(now_s: number): number {
+    return now_s + this.#behind_s;
+  }
+
   /** Seconds; null where nothing is known. */
   at(now_s: number): number | null {
-    return this.#newest_s === null ? null : Math.max(0, now_s + this.#behind_s - this.#newest_s);
+    return this.#newest_s === null ? null : Math.max(0, this.clock(now_s) - this.#newest_s);
   }
 }

@@ -1,4 +1,13 @@
-import { type CameraPose, type Extremes, extremes, histogram, type Probe, probe, type Vec3 } from '../protocol/messages';
+import {
+  baseline,
+  type CameraPose,
+  type Extremes,
+  extremes,
+  histogram,
+  type Probe,
+  probe,
+  type Vec3,
+} from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { RpcError } from '../transport/connection';
 import type { ProbedVertex } from '../draw/render_messages';
@@ -123,6 +132,21 @@ export class Readings {
       this.store.pinned = { reading: { ...place, probe: answer }, place: this.picture.project(answer.position) };
     } catch (error) {
       this.session.onProblem(error);
+    }
+  }
+
+  /** Makes the temperatures of now those that later ones are compared with; the scene says when that is done. */
+  async markBaseline(): Promise<void> {
+    const { store } = this;
+    store.baselineRefusal = null;
+    store.isMarkingBaseline = true;
+    try {
+      baseline(await this.session.request('scene.baseline', { action: 'mark' }), 'scene.baseline');
+    } catch (error) {
+      if (error instanceof RpcError) store.baselineRefusal = error.message;
+      else this.session.onProblem(error);
+    } finally {
+      store.isMarkingBaseline = false;
     }
   }
 

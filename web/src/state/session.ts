@@ -301,6 +301,10 @@ export class Session {
     return this.readings.pin(place);
   }
 
+  markBaseline(): Promise<void> {
+    return this.readings.markBaseline();
+  }
+
   unpin(): void {
     this.readings.unpin();
   }

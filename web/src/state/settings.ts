@@ -1,4 +1,11 @@
-import { type Fusion, type FusionChange, fusionState, type ParameterValue, type RangeChange } from '../protocol/messages';
+import {
+  type AgeChange,
+  type Fusion,
+  type FusionChange,
+  fusionState,
+  type ParameterValue,
+  type RangeChange,
+} from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
 import { BUSY, RpcError } from '../transport/connection';
 import { FusionRefusal } from '../fusion/fusion_refusal';
@@ -109,6 +116,11 @@ export class Settings {
       const change = this.#missingFor(this.store.fusion.method, this.store.fusion.palette);
       if (change.missing !== undefined) this.#change(change, settled);
     }
+  }
+
+  /** How what was seen long ago is shown; `settled` false while a slider is being dragged. */
+  setAge(age: AgeChange, settled: boolean): void {
+    this.#change({ age }, settled);
   }
 
   setRange(min: number, max: number, settled: boolean): void {

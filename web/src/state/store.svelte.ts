@@ -137,6 +137,10 @@ export class Store {
   panelsHidden = $state(false);
   panelOpen = $state(true);
   helpOpen = $state(false);
+  /** The baseline is being marked. */
+  isMarkingBaseline = $state(false);
+  /** Why it could not be marked the last time. */
+  baselineRefusal = $state<string | null>(null);
   /** All notes are shown, closed ones too. */
   notesOpen = $state(false);
   /** Keys of the notes that the user has closed. */
@@ -163,13 +167,20 @@ export class Store {
     ),
   );
   readonly #mapAge = new MapAge();
+  readonly #now_s = $derived((performance.timeOrigin + this.now) / 1000);
   /** How long ago the newest part of a live map was seen, seconds; null where nobody has said when. */
   readonly mapAge_s = $derived.by(() => {
     const newest = this.scene?.live === true ? (this.scene.observed?.newest ?? null) : null;
-    const now_s = (performance.timeOrigin + this.now) / 1000;
+    const now_s = this.#now_s;
     this.#mapAge.newestIs(newest, now_s);
     return this.#mapAge.at(now_s);
   });
+  /** What time it is, Unix seconds, as whoever sees the map has it. */
+  readonly mapNow_s = $derived(this.mapAge_s === null ? this.#now_s : this.#mapAge.clock(this.#now_s));
+  /** The palette stands for changes of temperature, not for the range. */
+  readonly changeScale = $derived(this.fusion?.change_scale ?? null);
+  /** The scene has a baseline, and when it was marked (Unix seconds; null: never); undefined: it has none. */
+  readonly baseline = $derived(this.scene?.baseline);
   readonly connected = $derived(this.link.phase === 'open');
   /** All that was asked for has come. */
   readonly settled = $derived(this.complete !== null && this.behindSince === null);

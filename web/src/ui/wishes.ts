@@ -30,6 +30,8 @@ export function wishWords(
     const { mode, min, max } = change.range;
     words.push(mode === 'manual' ? `range ${celsius(min)} to ${celsius(max)}` : 'range by itself');
   }
+  if (change.age?.mode !== undefined) words.push(change.age.mode === 'fade' ? 'fading by age' : 'no fading by age');
+  if (change.age?.half_life_s !== undefined) words.push(`half-life ${figures(change.age.half_life_s, 3)} s`);
   if (change.missing !== undefined) words.push('colour of what has no temperature');
   return words;
 }
