@@ -407,7 +407,8 @@ test('Coarser quality is in force and said in words', async () => {
   await page.waitForFunction(() => globalThis.spectra.store.stats?.accuracy.colour_levels === 64, null, { timeout: 20_000 });
   const { quality, shown, scene } = await state();
   assert.equal(quality.colour_bits, 6);
-  assert.match(await page.locator('.words').innerText(), /, 2\slevels/);
+  const words = page.getByText('On the screen:');
+  assert.match(await words.innerText(), /, 2\slevels/);
   await settled(page);
   assert.equal(shown.triangles > 0.9 * scene.triangle_count, true);
   // Coarser still: what is there stays, the next change is answered with less.
