@@ -1,21 +1,25 @@
 import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
+import { brotliCompressSync, constants } from 'node:zlib';
+import { gzipAsync } from '@gfx/zopfli';
 import type { Plugin } from 'vite';
 
-/** Beside every asset that it makes smaller: the same in Brotli (.br) and in gzip (.gz), for the server to choose from. */
+/**
+ * Beside every asset that it makes smaller: the same in Brotli (.br) and in gzip (.gz), for the server to choose from. Over plain HTTP browsers
+ * take no Brotli, so gzip is made by Zopfli: a twentieth smaller than zlib's.
+ */
 export function precompressed(): Plugin {
   return {
     name: 'precompressed',
     apply: 'build',
-    writeBundle({ dir }) {
+    async writeBundle({ dir }) {
       const folder = join(dir!, 'assets');
       for (const name of readdirSync(folder)) {
         const path = join(folder, name);
         const plain = readFileSync(path);
         const versions = {
           br: brotliCompressSync(plain, { params: { [constants.BROTLI_PARAM_SIZE_HINT]: plain.length } }),
-          gz: gzipSync(plain, { level: constants.Z_BEST_COMPRESSION }),
+          gz: await gzipAsync(plain, { numiterations: 5 }),
         };
         for (const [ending, version] of Object.entries(versions)) {
           if (version.length < plain.length) writeFileSync(`${path}.${ending}`, version);
