@@ -11,7 +11,14 @@ export default defineConfig({
   plugins: [leanThree(), fusionModule(), svelte(), programPreload(), precompressed()],
   base: './',
   // One style sheet and plain imports: the page itself says what is to be loaded early.
-  build: { target: 'es2022', chunkSizeWarningLimit: 900, assetsInlineLimit: 0, cssCodeSplit: false, modulePreload: false },
+  build: {
+    target: 'es2022',
+    chunkSizeWarningLimit: 900,
+    assetsInlineLimit: 0,
+    cssCodeSplit: false,
+    modulePreload: false,
+    minify: 'terser',
+  },
   worker: { format: 'es', plugins: () => [leanThree()] },
   // By number: a machine without /etc/hosts does not know "localhost".
   server: {
