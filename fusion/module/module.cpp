@@ -255,11 +255,6 @@ SPECTRA_MODULE_EXPORT(wants_hues) std::int32_t module_wants_hues() {
   return state().wanted_hues ? 1 : 0;
 }
 
-/// 1 when the plan compares with temperatures of before, which are not given here: it shows no vertex as changed.
-SPECTRA_MODULE_EXPORT(compares_with_baseline) std::int32_t module_compares_with_baseline() {
-  return state().plan && state().plan->compares_with_baseline() ? 1 : 0;
-}
-
 SPECTRA_MODULE_EXPORT(range_minimum) double module_range_minimum() {
   return state().plan ? state().plan->range_minimum() : 0;
 }

@@ -127,6 +127,37 @@ export function addFusingTests(browser) {
     await server.stop();
   });
 
+  test('What only the robot knows it shows, and nothing of before stays; afterwards it is here again', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    await setMethod(page, 'thermal_only');
+    await drawn(page);
+    const here = sample(await screenshot(page, 'robot-only-before'));
+    // Without a past nothing has changed: it shows what is visible.
+    await setMethod(page, 'thermal_change');
+    await isOnRobot(page);
+    await settled(page);
+    const change = sample(await screenshot(page, 'robot-only-change'));
+    const robot = await openClient(browser, server.url);
+    await settled(robot.page);
+    await setMethod(robot.page, 'thermal_change');
+    await settled(robot.page);
+    const theirs = sample(await screenshot(robot.page, 'robot-only-theirs'));
+    assert.ok(apart(theirs, here) > 0.2, 'the two settings look alike');
+    assert.ok(apart(change, theirs) < 0.002, `${apart(change, theirs)} of the pixels are not the robot's`);
+    await page.locator('[data-fusing="robot"]', { hasText: 'temperatures of before' }).waitFor({ timeout: 10_000 });
+    await setMethod(page, 'thermal_only');
+    await isHere(page);
+    await drawn(page);
+    assert.ok(apart(sample(await screenshot(page, 'robot-only-after')), here) < 0.01);
+    assert.deepEqual(problems, []);
+    await robot.page.close();
+    await page.close();
+    await server.stop();
+  });
+
   test('Without a link the last map is turned, tuned and read, and says how old it is', async () => {
     const server = await startServer(['--demo']);
     const link = await startLink(server.port);

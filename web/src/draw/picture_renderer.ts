@@ -49,6 +49,8 @@ interface Tile {
   isShown: boolean;
   colours: BufferAttribute;
   raw: RawArrays | null;
+  /** Colours that came while others were made here: those of the robot's settings, or of settings of before. */
+  arrived: Uint8Array | null;
   /** Number of the settings that its colours were fused with here; 0: they came as they are. */
   fusedWith: number;
   arrays: Omit<TileArrays, 'rgba'>;
@@ -64,6 +66,13 @@ interface Picture {
   isInParts: boolean;
   /** What is drawn now is drawn within a frame of the browser's. */
   isInFrame: boolean;
+}
+
+function showColours(tile: Tile, rgba: Uint8Array): void {
+  tile.colours.array = rgba;
+  tile.colours.needsUpdate = true;
+  tile.arrived = null;
+  tile.fusedWith = 0;
 }
 
 /** Draws pictures on a canvas. It owns everything that is on the GPU; the page tells it what to draw by messages. */
@@ -170,11 +179,8 @@ export class PictureRenderer {
       case 'colours': {
         const tile = this.#tiles.get(command.tile);
         if (tile === undefined) break;
-        // While tiles are fused here, these may be of settings of before.
-        if (this.#fusing !== 0 && tile.raw !== null) break;
-        tile.colours.array = command.rgba;
-        tile.colours.needsUpdate = true;
-        tile.fusedWith = 0;
+        if (this.#fusing !== 0 && tile.raw !== null) tile.arrived = command.rgba;
+        else showColours(tile, command.rgba);
         break;
       }
       case 'raw': {
@@ -194,11 +200,12 @@ export class PictureRenderer {
         if (settings === null) {
           // Hidden tiles, too, keep what was set last.
           this.#fuseTiles(() => true);
-          this.#fusing = 0;
-          this.#settings = null;
+          this.#stopFusing();
           break;
         }
         this.#settings = settings;
+        // What came before is of other settings.
+        for (const tile of this.#tiles.values()) tile.arrived = null;
         this.#orSay(() => this.#useSettings());
         break;
       }
@@ -275,9 +282,14 @@ export class PictureRenderer {
     }
   }
 
-  #cannotFuse(error: unknown): void {
+  #stopFusing(): void {
     this.#fusing = 0;
     this.#settings = null;
+    for (const tile of this.#tiles.values()) if (tile.arrived !== null) showColours(tile, tile.arrived);
+  }
+
+  #cannotFuse(error: unknown): void {
+    this.#stopFusing();
     this.reply({ kind: 'not_fused', message: error instanceof Error ? error.message : String(error) });
   }
 
@@ -337,6 +349,7 @@ export class PictureRenderer {
       isShown: false,
       colours,
       raw: null,
+      arrived: null,
       fusedWith: 0,
       arrays: { positions, indices, centre, radius, point_spacing },
     };

@@ -48,7 +48,6 @@ interface Exports extends WebAssembly.Exports {
   prepare_with_palette(): number;
   wanted_bins(): number;
   wants_hues(): number;
-  compares_with_baseline(): number;
   range_minimum(): number;
   range_maximum(): number;
   highlighted_count(): number;
@@ -109,8 +108,6 @@ export interface PlanInForce {
   range_minimum: number;
   range_maximum: number;
   highlighted: [number, number][];
-  /** Temperatures are compared with those of before, which are not here. */
-  compares_with_baseline: boolean;
 }
 
 export class FusionModule {
@@ -249,7 +246,6 @@ export class FusionModule {
       range_minimum: module.range_minimum(),
       range_maximum: module.range_maximum(),
       highlighted,
-      compares_with_baseline: module.compares_with_baseline() !== 0,
     };
   }
 

@@ -36,6 +36,10 @@ function setUp({
   store.link = { phase: 'open' };
   store.scene = { temperature: { min: 10 }, live: false } as never;
   store.complete = {} as never;
+  store.methods = [
+    { id: 'thermal_visible_blend', label: 'Blend' },
+    { id: 'thermal_change', label: 'Change', compares_with_baseline: true },
+  ] as never;
   store.pictureStands = true;
   store.fusionInForce = FUSION;
   store.stats = { throughput_bytes_per_s: 1e6 } as never;
@@ -146,12 +150,29 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(diary.slice(-2)).toEqual(['not here', 'fuse nothing']);
   });
 
-  it('leaves to the robot what compares with temperatures of before', async () => {
-    const { store, fusing } = await here();
-    const method = 'thermal_change';
-    const threshold = { method, params: {}, palette: 'iron' };
-    expect(fusing.apply({ ...FUSION, ...threshold })).toBeNull();
-    expect(store.fusingProblem).toContain('temperatures of before');
+  it.each([
+    ['a comparison with temperatures of before', { method: 'thermal_change', params: {} }, 'temperatures of before'],
+    ['what fades by its age', { age: { mode: 'fade', fade_s: 600 } }, 'the time when it was seen'],
+  ])('leaves %s to the robot, and makes the next setting here again', async (_what, change, words) => {
+    const { store, fusing, diary } = await here();
+    const wanted: Fusion = { ...FUSION, ...(change as Partial<Fusion>) };
+    expect(fusing.apply(wanted)).toBeNull();
+    expect(diary.at(-1)).toBe('subscribe fused');
+    store.fusionInForce = wanted;
+    fusing.completed();
+    expect(store.fusingPlace).toBe('robot');
+    expect(diary.slice(-2)).toEqual(['not here', 'fuse nothing']);
+    expect(store.fusingProblem).toBeNull();
+    expect(fusing.leftToRobot).toContain(words);
+    fusing.consider();
+    expect(store.fusingPlace).toBe('robot');
+    store.fusionInForce = FUSION;
+    expect(fusing.leftToRobot).toBeNull();
+    fusing.consider();
+    expect(diary.at(-1)).toBe('subscribe fused+temperature+visible');
+    await vi.waitFor(() => expect(diary.at(-1)).toBe('facts'));
+    fusing.consider();
+    expect(store.fusingPlace).toBe('here');
   });
 });
 

@@ -149,8 +149,12 @@ export class Fusing {
    */
   apply(wanted: Fusion): Fusion | null {
     if (!this.isHere || this.store.fusingProblem !== null || this.#planner === null || this.#facts === null) return null;
-    const change = wholeChange(wanted);
     try {
+      if (this.#leftToRobot(wanted) !== null) {
+        this.#leave();
+        return null;
+      }
+      const change = wholeChange(wanted);
       const inForce = this.#planned(wanted, change);
       if (inForce === null) return null;
       this.picture.fuse(change);
@@ -165,10 +169,24 @@ export class Fusing {
   #isWanted(): boolean {
     const { store } = this;
     if (store.fusingProblem !== null || store.fusingWish === 'robot' || !store.hasThermal || !this.isPossible) return false;
+    if (this.leftToRobot !== null) return false;
     return store.fusingWish === 'here' || this.#isFit();
   }
 
-  /** There is a library, and nothing that only the robot knows is shown. */
+  /** Why the settings that are shown are the robot's; null: they can be made here. */
+  get leftToRobot(): string | null {
+    const { fusion } = this.store;
+    return fusion === null ? null : this.#leftToRobot(fusion);
+  }
+
+  #leftToRobot({ method, age }: Fusion): string | null {
+    const description = this.store.methods.find(({ id }) => id === method);
+    if (description?.compares_with_baseline === true)
+      return `${description.label} compares with temperatures of before, which the robot has.`;
+    return age?.mode === 'fade' ? 'What is old fades by the time when it was seen, which the robot has.' : null;
+  }
+
+  /** There is a library, and the robot gives what it needs. */
   get isPossible(): boolean {
     return this.isBuilt && this.#isOfferedRaw && typeof WebAssembly === 'object';
   }
@@ -194,14 +212,6 @@ export class Fusing {
       return null;
     }
     const plan = planner.plan();
-    if (plan.compares_with_baseline) {
-      this.failed(`${this.store.method?.label ?? wanted.method} compares with temperatures of before, which the robot has.`);
-      return null;
-    }
-    if (wanted.age?.mode === 'fade') {
-      this.failed('What is old fades by the time when it was seen, which the robot has.');
-      return null;
-    }
     this.events.onHighlighted(plan.highlighted);
     const range = { ...wanted.range, min: plan.range_minimum, max: plan.range_maximum };
     return { ...wanted, params: plan.params, params_in_force: plan.params_in_force, range };
