@@ -40,6 +40,8 @@ export async function serveDecoder() {
   const loader = createRequire(import.meta.url).resolve("three/examples/jsm/loaders/DRACOLoader.js");
   const decoders = path.join(path.dirname(loader), "../libs/draco");
   const server = http.createServer((request, response) => {
+    // A connection that is kept may be closed from here just as the next request comes.
+    response.setHeader("Connection", "close");
     response.end(readFileSync(path.join(decoders, path.basename(request.url))));
   });
   await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
