@@ -12,16 +12,10 @@ cmake --build --preset ci
 
 status=0
 (cd web && npm run --silent lint) || status=1
-# The browser's tests wait for much: what does not depend on time runs beside them, at a low priority, and is shown when it is done.
-timed='^integration\.(access|change|ingest|interruption|progress|push|radio_link|refusals|resume)$'
-log=build/release/ctest.log
-nice -n 10 ctest --preset ci -j "$(nproc)" -E "$timed" >"$log" 2>&1 &
-others=$!
-trap 'kill $others 2>/dev/null || true' EXIT
+# What depends on time mostly waits; the rest keeps every processor busy, and so does the browser.
+timed='^integration\.(access|change|ingest|interruption|progress|push|radio_link|refusals|resume|tls)$'
+ctest --preset ci -j "$(nproc)" -E "$timed" || status=1
 (cd web && npm run --silent e2e) || status=1
 (cd web && npm test --silent) || status=1
-wait $others || status=1
-cat "$log"
-# These mostly wait.
 ctest --preset ci -j 4 -R "$timed" || status=1
 exit $status
