@@ -1,14 +1,14 @@
 #include "server/access/token_file.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+
+#include "server/access/private_file.hpp"
 
 namespace spectra::server {
 namespace {
@@ -90,18 +90,7 @@ std::optional<std::string> write_tokens(const std::filesystem::path& file, const
   for (const AccessToken& token : list.tokens) {
     text += std::string(to_string(token.role)) + ' ' + token.name + ' ' + to_hex(token.digest) + '\n';
   }
-  std::string draft = file.string() + ".XXXXXX";
-  const int descriptor = mkstemp(draft.data());  // readable by the owner alone
-  if (descriptor < 0) return system_error(file, " cannot be written");
-  const bool is_written = ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                          fsync(descriptor) == 0 && rename(draft.c_str(), file.c_str()) == 0;
-  std::optional<std::string> problem;
-  if (!is_written) {
-    problem = system_error(file, " cannot be written");
-    unlink(draft.c_str());
-  }
-  ::close(descriptor);
-  return problem;
+  return write_private_file(file, text);
 }
 
 AccessResult<TokenList> tokens_of_text(std::string_view text) {

@@ -29,6 +29,7 @@ struct ServeOptions {
   std::string listen = "127.0.0.1:8080";
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> tokens;  ///< Whom to let in; absent: what the environment says.
+  std::optional<std::filesystem::path> certificate, key;  ///< PEM; both: connections are encrypted.
   bool is_insecure = false;                     ///< Others are let in without a token.
   std::optional<AccessRole> invited;            ///< Print a link that lets one browser in.
   bool is_fused_only = false;                   ///< Viewers get no raw layers.
@@ -85,14 +86,24 @@ struct PushOptions {
   std::string to;               ///< The server's address, http://HOST:PORT.
   std::string id;               ///< Of the block of one file; empty: its name.
   std::optional<double> blocks_per_s;
+  std::optional<std::filesystem::path> trusted;     ///< PEM; absent: whom this machine trusts.
   std::optional<std::filesystem::path> token_file;  ///< Holds a token in its first line; absent: the environment's.
   std::string observed_at = "file";                 ///< "file", "now" or Unix seconds.
   fusion::ReadOptions read;
 };
 
+struct CertificateOptions {
+  std::filesystem::path certificate;  ///< Files to write.
+  std::filesystem::path key;
+  std::vector<std::string> names;  ///< Empty: the names and addresses of this machine.
+  int days = 365;
+  bool replaces = false;  ///< Files that are there.
+};
+
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
 int run_token(const TokenOptions& options);
+int run_certificate(const CertificateOptions& options);
 int run_fuse(const FuseOptions& options);
 int run_info(const InfoOptions& options);
 int run_methods(bool as_json);

@@ -73,6 +73,8 @@ std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
   out.counter("spectra_connections_total", "TCP connections accepted.", as_double(net.connections_accepted));
   out.counter("spectra_connections_refused_total", "TCP connections over the limit.",
               as_double(net.connections_refused));
+  out.counter("spectra_tls_handshakes_failed_total", "TLS handshakes that came to nothing.",
+              as_double(net.handshakes_failed));
   out.counter("spectra_accept_failures_total", "Times that no descriptor was left for a connection.",
               as_double(net.accept_failures));
   out.counter("spectra_http_requests_total", "HTTP requests, upgrades included.", as_double(net.requests));

@@ -84,6 +84,12 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--allow-host", options.allowed_hosts, "A further host name to answer to (may be repeated)")
       ->allow_extra_args(false);
   command->add_option("--tokens", options.tokens, "Let in whom this file names; made by spectra token");
+  auto* certificate =
+      command->add_option("--certificate", options.certificate,
+                          "Encrypt every connection (TLS): certificate in PEM form, with those that vouch "
+                          "for it after it; spectra certificate makes one");
+  command->add_option("--key", options.key, "The private key of the certificate, PEM")->needs(certificate);
+  certificate->needs("--key");
   command
       ->add_flag(
           "--insecure", options.is_insecure,
@@ -193,8 +199,28 @@ void add_push(CLI::App& app, PushOptions& options, Run& run) {
       ->check(CLI::Validator(is_time, ""));
   command->add_option("--token-file", options.token_file,
                       "A file that holds the token of the role ingest; else SPECTRA_TOKEN in the environment");
+  command->add_option(
+      "--ca", options.trusted,
+      "With https://: whose certificates are trusted, or the server's own (PEM); else whom this machine trusts");
   add_reading(*command, options.read);
   command->final_callback([&options, &run] { run = [&options] { return run_push(options); }; });
+}
+
+void add_certificate(CLI::App& app, CertificateOptions& options, Run& run) {
+  auto* command =
+      app.add_subcommand("certificate", "Make a certificate that vouches for itself, and print its fingerprint");
+  command->add_option("certificate", options.certificate, "The file to write it to, PEM")->required();
+  command->add_option("key", options.key, "The file to write its private key to, PEM")->required();
+  command
+      ->add_option("--name", options.names,
+                   "A host name or IP address of the server (may be repeated); else those of this machine")
+      ->allow_extra_args(false);
+  constexpr int kMostDays = 3650;
+  command->add_option("--days", options.days, "How long it is good")
+      ->check(CLI::Range(1, kMostDays))
+      ->capture_default_str();
+  command->add_flag("--replace", options.replaces, "Write over files that are there");
+  command->final_callback([&options, &run] { run = [&options] { return run_certificate(options); }; });
 }
 
 void add_token(CLI::App& app, TokenOptions& options, Run& run) {
@@ -240,6 +266,7 @@ int parse_and_run(int argc, const char* const* argv) {
   TradeoffCommandOptions tradeoff;
   PushOptions push;
   TokenOptions token;
+  CertificateOptions certificate;
   std::filesystem::path checked_store;
   StoreSalvageOptions salvage;
   Run run;
@@ -253,6 +280,7 @@ int parse_and_run(int argc, const char* const* argv) {
   add_push(app, push, run);
   add_store(app, checked_store, salvage, run);
   add_token(app, token, run);
+  add_certificate(app, certificate, run);
   bool is_quiet = false;
   constexpr auto* kQuietHelp = "No progress on the terminal";
   app.add_flag("--quiet", is_quiet, kQuietHelp);

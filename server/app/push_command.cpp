@@ -134,6 +134,7 @@ class Push {
     SendingLimits limits;
     limits.blocks_per_s = options_.blocks_per_s;
     limits.token = token_;
+    if (options_.trusted) limits.trusted = options_.trusted->string();
     const auto problem = send_blocks(to_, blocks, limits);
     line_.end();
     print_notes(notes());

@@ -24,6 +24,7 @@
 #include "server/app/served_scene.hpp"
 #include "server/app/viewer_session.hpp"
 #include "server/net/http_server.hpp"
+#include "server/net/tls_identity.hpp"
 #include "server/stream/first_picture.hpp"
 
 namespace spectra::server {
@@ -89,6 +90,15 @@ void reload_tokens(const std::filesystem::path& file, AccessControl& access) {
   auto& list = std::get<TokenList>(read);
   spdlog::info("the tokens are read again: {}", list.tokens.size());
   access.replace(std::move(list));
+}
+
+/// The certificate and key are read again; what is wrong with them is said, and nothing changes.
+void reload_certificate(TlsIdentity& tls) {
+  if (const auto problem = tls.load()) {
+    spdlog::error("the certificate stays as it was: {}", *problem);
+  } else {
+    spdlog::info("the certificate is read again");
+  }
 }
 
 void print_invitation(const HttpServer& server, AccessControl& access, AccessRole role) {
@@ -194,9 +204,16 @@ int run_serve(const ServeOptions& options) {
   NetOptions net;
   if (list) {
     net.access = std::make_shared<AccessControl>(std::move(*list), "spectra_" + std::to_string(listen->port));
-    if (options.tokens) {
-      net.reload = [file = *options.tokens, access = net.access] { reload_tokens(file, *access); };
-    }
+  }
+  if (options.certificate) {
+    net.tls = std::make_shared<TlsIdentity>(*options.certificate, *options.key);
+    if (const auto problem = net.tls->load()) return fail(kJobFailed, *problem);
+  }
+  if (options.tokens || net.tls) {
+    net.reload = [file = options.tokens, access = net.access, tls = net.tls] {
+      if (file) reload_tokens(*file, *access);
+      if (tls) reload_certificate(*tls);
+    };
   }
   net.address = listen->address;
   net.port = listen->port;

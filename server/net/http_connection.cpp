@@ -7,6 +7,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/core/detect_ssl.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/error.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -26,6 +27,7 @@
 #include "server/net/request_right.hpp"
 #include "server/net/session_api.hpp"
 #include "server/net/steady_seconds.hpp"
+#include "server/net/tls_identity.hpp"
 #include "server/net/websocket_session.hpp"
 
 namespace spectra::server {
@@ -114,6 +116,16 @@ bool is_session_change(const http::request<http::string_body>& request) {
          (path == kSessionPath || path == kCodesPath);
 }
 
+/// What was sent in the clear to a server whose connections are encrypted.
+HttpReply encrypted_elsewhere(const http::request<http::string_body>& request, std::string_view host) {
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    return text_reply(403, "this server is spoken to with https:// and wss://\n");
+  }
+  auto reply = text_reply(308, "this server is spoken to with https:// and wss://\n");
+  reply.headers.emplace_back("Location", "https://" + std::string(host) + std::string(view(request.target())));
+  return reply;
+}
+
 /// A token or a role.
 constexpr std::size_t kSessionBodyBytes = 1024;
 
@@ -166,36 +178,54 @@ class ReplyOnce {
 }  // namespace
 
 HttpConnection::HttpConnection(ConnectionStream stream, ServerContext& context)
-    : stream_(std::move(stream)), context_(context), buffer_(64 * 1024) {}
+    : stream_(std::move(stream)), executor_(stream_.get_executor()), context_(context), buffer_(64 * 1024) {}
 
 asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();
   error_code error;
-  local_address_ = stream_.socket().local_endpoint(error).address().to_string();
-  const auto peer = stream_.socket().remote_endpoint(error).address();
+  const auto& socket = stream_.next_layer().socket();
+  local_address_ = socket.local_endpoint(error).address().to_string();
+  const auto peer = socket.remote_endpoint(error).address();
   peer_address_ = peer.to_string();
   is_from_here_ = is_loopback(peer);
   context_.metrics.connections_open += 1;
   if (context_.add(self)) {
     try {
-      while (co_await serve_one()) {
-      }
+      stream_.next_layer().expires_after(context_.options.limits.header_timeout);
+      bool goes_on = co_await begin_encryption();
+      for (bool is_first = true; goes_on; is_first = false) goes_on = co_await serve_one(is_first);
     } catch (const std::exception& failure) {
       spdlog::error("a connection failed: {}", failure.what());
     }
     context_.remove(this);
   }
-  stream_.close();
+  if (!is_handed_over_) stream_.next_layer().close();
   context_.metrics.connections_open -= 1;
 }
 
-asio::awaitable<bool> HttpConnection::serve_one() {
+asio::awaitable<bool> HttpConnection::begin_encryption() {
+  if (!context_.options.tls) co_return true;
+  is_waiting_for_request_ = true;
+  const auto [error, is_tls] = co_await beast::async_detect_ssl(stream_.next_layer(), buffer_, kAwait);
+  is_waiting_for_request_ = false;
+  if (error || is_stopping_) co_return false;
+  is_bare_ = !is_tls;
+  if (is_bare_) co_return true;
+  const auto failure = co_await stream_.accept_handshake(context_.options.tls->current(), buffer_.data());
+  buffer_.clear();
+  if (!failure) co_return !is_stopping_;
+  context_.metrics.handshakes_failed += 1;
+  spdlog::debug("{}: no encryption: {}", peer_address_, failure.message());
+  co_return false;
+}
+
+asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
   const NetLimits& limits = context_.options.limits;
   http::request_parser<http::string_body> parser;
   parser.header_limit(static_cast<std::uint32_t>(limits.header_size_bytes));
   parser.body_limit(std::max(limits.body_size_bytes, limits.block_size_bytes));
 
-  stream_.expires_after(limits.header_timeout);
+  if (!is_first) stream_.next_layer().expires_after(limits.header_timeout);
   is_waiting_for_request_ = true;
   auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
   is_waiting_for_request_ = false;
@@ -272,7 +302,8 @@ asio::awaitable<bool> HttpConnection::serve_one() {
                                          : request.method() == http::verb::delete_ ? Method::Delete
                                                                                    : Method::Get,
                                .body = request.body(),
-                               .address = peer_address_};
+                               .address = peer_address_,
+                               .is_secure = stream_.is_encrypted()};
     const HttpReply reply = session_reply(*context_.options.access, who_.identity, asked, steady_seconds());
     if (reply.status >= 400) {
       context_.metrics.requests_refused += 1;
@@ -303,6 +334,7 @@ asio::awaitable<void> HttpConnection::serve_viewer(Request request, const Reques
     co_await refuse_upgrade(request, *refused);
     co_return;
   }
+  is_handed_over_ = true;
   const auto session = std::make_shared<WebSocketSession>(std::move(stream_), context_, *form, *who_.identity);
   context_.remove(this);
   co_await session->run(std::move(request));
@@ -321,6 +353,7 @@ asio::awaitable<void> HttpConnection::serve_sender(Request request) {
     co_await refuse_upgrade(request, *refused);
     co_return;
   }
+  is_handed_over_ = true;
   const auto session = std::make_shared<IngestSession>(std::move(stream_), context_, *who_.identity);
   context_.remove(this);
   co_await session->run(std::move(request));
@@ -340,10 +373,10 @@ asio::awaitable<error_code> HttpConnection::ask_for_body(const http::request_par
 
 asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_body(
     http::request_parser<http::string_body>& parser) {
-  stream_.expires_after(context_.options.limits.write_timeout);
+  stream_.next_layer().expires_after(context_.options.limits.write_timeout);
   if (const auto error = co_await ask_for_body(parser)) co_return std::tuple(error, std::size_t{0});
   while (!parser.is_done()) {
-    stream_.expires_after(context_.options.limits.body_timeout);
+    stream_.next_layer().expires_after(context_.options.limits.body_timeout);
     const auto [error, size] = co_await http::async_read_some(stream_, buffer_, parser, kAwait);
     if (error) co_return std::tuple(error, size);
   }
@@ -356,6 +389,7 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) {
   if (!context_.hosts.allows_host(host, local_address_)) {
     return text_reply(403, "this server does not answer to that host name; see --allow-host\n");
   }
+  if (is_bare_) return encrypted_elsewhere(request, host);
   const bool is_change = is_block_change(request);
   if (is_change || is_session_change(request)) {
     // Pages of other origins may not write.
@@ -464,7 +498,7 @@ asio::awaitable<bool> HttpConnection::write(const HttpReply& reply, unsigned ver
   const double patience_s = std::chrono::duration<double>(limits.download_patience).count();
   double written_bytes = 0;
   while (is_head || reply.status == 304 ? !serializer.is_header_done() : !serializer.is_done()) {
-    stream_.expires_after(limits.write_timeout);
+    stream_.next_layer().expires_after(limits.write_timeout);
     const auto [error, size] = co_await http::async_write_some(stream_, serializer, kAwait);
     if (error) co_return false;
     written_bytes += static_cast<double>(size);
@@ -475,14 +509,13 @@ asio::awaitable<bool> HttpConnection::write(const HttpReply& reply, unsigned ver
     }
   }
   if (!keep_alive) {
-    error_code ignored;
-    stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
     // Reading what is still coming lets the peer see the answer instead of a reset.
-    stream_.expires_after(context_.options.limits.close_timeout);
+    stream_.next_layer().expires_after(context_.options.limits.close_timeout);
+    co_await stream_.end_writing();
     std::array<char, 4096> rest;
     std::size_t drained = 0;
     while (drained < context_.options.limits.body_size_bytes) {
-      const auto [error, size] = co_await stream_.async_read_some(asio::buffer(rest), kAwait);
+      const auto [error, size] = co_await stream_.next_layer().async_read_some(asio::buffer(rest), kAwait);
       if (error) break;
       drained += size;
     }
@@ -491,14 +524,16 @@ asio::awaitable<bool> HttpConnection::write(const HttpReply& reply, unsigned ver
 }
 
 void HttpConnection::begin_stop() {
-  asio::post(stream_.get_executor(), [self = shared_from_this()] {
+  asio::post(executor_, [self = shared_from_this()] {
     self->is_stopping_ = true;
-    if (self->is_waiting_for_request_) self->stream_.cancel();
+    if (self->is_waiting_for_request_) self->stream_.next_layer().cancel();
   });
 }
 
 void HttpConnection::cut() {
-  asio::post(stream_.get_executor(), [self = shared_from_this()] { self->stream_.close(); });
+  asio::post(executor_, [self = shared_from_this()] {
+    if (!self->is_handed_over_) self->stream_.next_layer().close();
+  });
 }
 
 }  // namespace spectra::server

@@ -13,6 +13,7 @@
 #include "server/access/access_control.hpp"
 #include "server/net/connection_stream.hpp"
 #include "server/net/server_context.hpp"
+#include "server/net/transport.hpp"
 
 namespace spectra::server {
 
@@ -31,7 +32,10 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
  private:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
-  boost::asio::awaitable<bool> serve_one();
+  /// Where connections are encrypted: what this peer begins with. False: the connection is of no use.
+  boost::asio::awaitable<bool> begin_encryption();
+  /// `is_first`: its time runs since the connection began.
+  boost::asio::awaitable<bool> serve_one(bool is_first);
   /// The connection becomes a session, or the upgrade is refused; it ends in any case.
   boost::asio::awaitable<void> serve_viewer(Request request, const RequestTarget& target);
   boost::asio::awaitable<void> serve_sender(Request request);
@@ -49,13 +53,16 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   std::optional<HttpReply> refusal_of(const Request& request);
   std::optional<HttpReply> upgrade_refusal_of(const Request& request, const std::string& subprotocol) const;
 
-  ConnectionStream stream_;
+  Transport stream_;
+  const ConnectionStream::executor_type executor_;  ///< Of the stream, which a session may have taken over.
   ServerContext& context_;
   boost::beast::flat_buffer buffer_;
   std::string local_address_;
   std::string peer_address_;
-  AccessControl::Outcome who_;  ///< Asks now.
-  bool is_from_here_ = false;   ///< The peer is on this machine.
+  AccessControl::Outcome who_;   ///< Asks now.
+  bool is_from_here_ = false;    ///< The peer is on this machine.
+  bool is_bare_ = false;         ///< Not encrypted where connections are to be.
+  bool is_handed_over_ = false;  ///< The stream is a session's.
   bool is_stopping_ = false;
   bool is_waiting_for_request_ = false;
 };

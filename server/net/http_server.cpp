@@ -1,7 +1,5 @@
 #include "server/net/http_server.hpp"
 
-#include <ifaddrs.h>
-#include <net/if.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <spdlog/spdlog.h>
@@ -27,6 +25,7 @@
 
 #include "server/net/connection_stream.hpp"
 #include "server/net/http_connection.hpp"
+#include "server/net/interface_addresses.hpp"
 #include "server/net/server_context.hpp"
 #include "server/net/static_files.hpp"
 
@@ -44,35 +43,9 @@ constexpr int kUserTimeoutMs = 20'000;
 /// How often the staged stop looks whether everybody has gone.
 constexpr std::chrono::milliseconds kStopPoll{20};
 
-std::string url_of(const asio::ip::address& address, std::uint16_t port) {
+std::string url_of(std::string_view scheme, const asio::ip::address& address, std::uint16_t port) {
   const std::string host = address.is_v6() ? '[' + address.to_string() + ']' : address.to_string();
-  return "http://" + host + ':' + std::to_string(port);
-}
-
-/// The addresses of all interfaces that are up, loopback first; link-local IPv6 ones are left out, for no browser takes
-/// them without a zone.
-std::vector<asio::ip::address> interface_addresses(bool with_v6) {
-  std::vector<asio::ip::address> addresses;
-  ifaddrs* list = nullptr;
-  if (getifaddrs(&list) != 0) return addresses;
-  for (const bool loopback : {true, false}) {
-    for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
-      if (entry->ifa_addr == nullptr || (entry->ifa_flags & IFF_UP) == 0) continue;
-      if (((entry->ifa_flags & IFF_LOOPBACK) != 0) != loopback) continue;
-      const void* raw = entry->ifa_addr;
-      if (entry->ifa_addr->sa_family == AF_INET) {
-        addresses.push_back(asio::ip::address_v4(ntohl(static_cast<const sockaddr_in*>(raw)->sin_addr.s_addr)));
-      } else if (entry->ifa_addr->sa_family == AF_INET6 && with_v6) {
-        asio::ip::address_v6::bytes_type bytes;
-        const auto& from = static_cast<const sockaddr_in6*>(raw)->sin6_addr.s6_addr;
-        std::copy(std::begin(from), std::end(from), bytes.begin());
-        const asio::ip::address_v6 address(bytes);
-        if (!address.is_link_local()) addresses.push_back(address);
-      }
-    }
-  }
-  freeifaddrs(list);
-  return addresses;
+  return std::string(scheme) + "://" + host + ':' + std::to_string(port);
 }
 
 bool is_shortage(const error_code& error) {
@@ -294,10 +267,11 @@ std::uint16_t HttpServer::port() const {
 
 std::vector<std::string> HttpServer::urls() const {
   const auto& endpoint = state_->endpoint;
-  if (!endpoint.address().is_unspecified()) return {url_of(endpoint.address(), endpoint.port())};
+  const std::string_view scheme = state_->context.options.tls ? "https" : "http";
+  if (!endpoint.address().is_unspecified()) return {url_of(scheme, endpoint.address(), endpoint.port())};
   std::vector<std::string> urls;
   for (const auto& address : interface_addresses(endpoint.address().is_v6())) {
-    urls.push_back(url_of(address, endpoint.port()));
+    urls.push_back(url_of(scheme, address, endpoint.port()));
   }
   return urls;
 }

@@ -6,6 +6,8 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/field.hpp>
@@ -21,11 +23,12 @@
 
 #include "protocol/ingest_message.hpp"
 #include "protocol/jsonrpc.hpp"
-#include "server/net/connection_stream.hpp"
+#include "server/net/transport.hpp"
 
 namespace spectra::server {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
+namespace ssl = boost::asio::ssl;
 namespace websocket = boost::beast::websocket;
 using asio::ip::tcp;
 using boost::system::error_code;
@@ -76,7 +79,7 @@ class Sending {
   }
 
  private:
-  using Stream = websocket::stream<ConnectionStream>;
+  using Stream = websocket::stream<Transport>;
 
   asio::awaitable<std::optional<std::string>> send_all() {
     bool was_connected = false;
@@ -107,7 +110,7 @@ class Sending {
   }
 
   asio::awaitable<void> connect() {
-    const std::string where = "http://" + to_.authority();
+    const std::string where = to_.url();
     tcp::resolver resolver(io_);
     const auto [resolve_error, endpoints] = co_await resolver.async_resolve(to_.host, to_.port, kAwait);
     if (resolve_error) {
@@ -123,9 +126,10 @@ class Sending {
                   false};
       co_return;
     }
-    socket.expires_never();
     error_code ignored;
     socket.socket().set_option(tcp::no_delay(true), ignored);
+    if (to_.is_encrypted && !co_await encrypt(where)) co_return;
+    socket.expires_never();
     websocket::stream_base::timeout timeouts{};
     timeouts.handshake_timeout = limits_.connect_timeout;
     timeouts.idle_timeout = websocket::stream_base::none();  // it does not count the server's pings
@@ -154,6 +158,31 @@ class Sending {
     } else if (error) {
       failure_ = {where + to_.path + " does not answer as a server should: " + error.message(), false};
     }
+  }
+
+  asio::awaitable<bool> encrypt(const std::string& where) {
+    const auto context = std::make_shared<ssl::context>(ssl::context::tls_client);
+    SSL_CTX_set_min_proto_version(context->native_handle(), TLS1_2_VERSION);
+    error_code error;
+    if (limits_.trusted.empty()) {
+      context->set_default_verify_paths(error);
+    } else {
+      context->load_verify_file(limits_.trusted, error);
+    }
+    if (error) {
+      failure_ = {limits_.trusted + ": no certificate in PEM form can be read from it (" + error.message() + ')', true};
+      co_return false;
+    }
+    const auto outcome = co_await ws_->next_layer().begin_handshake(context, to_.host);
+    if (!outcome.error) co_return true;
+    if (!outcome.distrust.empty()) {
+      failure_ = {where + " is not trusted: " + outcome.distrust + "; --ca FILE names the certificate that is", true};
+    } else if (outcome.error.category() == asio::error::get_ssl_category()) {
+      failure_ = {where + " does not speak TLS as it should: " + outcome.error.message(), true};
+    } else {
+      failure_ = {where + " cannot be reached: " + outcome.error.message(), false};
+    }
+    co_return false;
   }
 
   asio::awaitable<void> serve_link() {
@@ -338,22 +367,24 @@ std::string IngestAddress::authority() const {
   return (host.find(':') == std::string::npos ? host : '[' + host + ']') + ':' + port;
 }
 
+std::string IngestAddress::url() const {
+  return (is_encrypted ? "https://" : "http://") + authority();
+}
+
 std::variant<IngestAddress, std::string> parsed_ingest_address(std::string_view url) {
   const std::string wrong = std::string(url) + " is not an address such as http://127.0.0.1:8080";
   const auto scheme_end = url.find("://");
   if (scheme_end == std::string_view::npos) return wrong;
   const std::string_view scheme = url.substr(0, scheme_end);
-  if (scheme == "https" || scheme == "wss") {
-    return std::string(url) + ": blocks are sent over http:// alone, from the robot's own machine";
-  }
-  if (scheme != "http" && scheme != "ws") return wrong;
+  const bool is_encrypted = scheme == "https" || scheme == "wss";
+  if (!is_encrypted && scheme != "http" && scheme != "ws") return wrong;
   url.remove_prefix(scheme_end + 3);
   const auto slash = std::min(url.find('/'), url.size());
   std::string_view authority = url.substr(0, slash);
   std::string path(url.substr(slash));
   while (path.ends_with('/')) path.pop_back();
   if (!path.ends_with("/ingest")) path += "/ingest";
-  IngestAddress address{"", "80", std::move(path)};
+  IngestAddress address{"", is_encrypted ? "443" : "80", std::move(path), is_encrypted};
   const bool is_bracketed = authority.starts_with('[');
   const auto host_end = is_bracketed ? authority.find(']') : std::min(authority.rfind(':'), authority.size());
   if (host_end == std::string_view::npos) return wrong;

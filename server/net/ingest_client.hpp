@@ -18,11 +18,13 @@ struct IngestAddress {
   std::string host;  ///< Without brackets.
   std::string port;
   std::string path;  ///< Ends in /ingest.
+  bool is_encrypted = false;
 
+  std::string url() const;        ///< Without the path.
   std::string authority() const;  ///< As in a URL.
 };
 
-/// Reads http://HOST[:PORT][/FOLDER]; ws:// is the same. A sentence when it is none.
+/// Reads http://HOST[:PORT][/FOLDER] or https://; ws:// and wss:// are the same. A sentence when it is none.
 std::variant<IngestAddress, std::string> parsed_ingest_address(std::string_view url);
 
 /// A block that is about to be sent.
@@ -45,6 +47,8 @@ struct BlocksToSend {
 struct SendingLimits {
   std::optional<double> blocks_per_s;
   std::string token;  ///< Shown to the server; empty: none.
+  /// PEM file of those whose certificates are trusted, or of the server's own; empty: whom this machine trusts.
+  std::string trusted;
   std::chrono::milliseconds connect_timeout{10'000};
   std::chrono::milliseconds silence{15'000};   ///< The server pings every 4 s.
   std::chrono::milliseconds patience{30'000};  ///< A broken link is tried again for this long.

@@ -37,7 +37,7 @@ BlockRefusal bad_request(std::string field, std::string reason, std::string limi
 
 }  // namespace
 
-IngestSession::IngestSession(ConnectionStream stream, ServerContext& context, AccessControl::Identity who)
+IngestSession::IngestSession(Transport stream, ServerContext& context, AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),
       who_(std::move(who)),

@@ -14,9 +14,9 @@
 #include "protocol/messages/ingest_messages.hpp"
 #include "server/net/block_change.hpp"
 #include "server/net/block_room.hpp"
-#include "server/net/connection_stream.hpp"
 #include "server/net/ping_watch.hpp"
 #include "server/net/server_context.hpp"
+#include "server/net/transport.hpp"
 
 namespace spectra::server {
 
@@ -28,7 +28,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  IngestSession(ConnectionStream stream, ServerContext& context, AccessControl::Identity who);
+  IngestSession(Transport stream, ServerContext& context, AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -73,7 +73,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   void close(std::uint16_t code, std::string_view reason);
   void end(bool is_cut, std::string_view why);
 
-  boost::beast::websocket::stream<ConnectionStream> ws_;
+  boost::beast::websocket::stream<Transport> ws_;
   ServerContext& context_;
   const AccessControl::Identity who_;
   boost::asio::steady_timer writer_signal_;

@@ -11,6 +11,7 @@ struct NetMetrics {
   std::atomic<std::int64_t> connections_open{0};
   std::atomic<std::uint64_t> accept_failures{0};      ///< Descriptors or memory ran out.
   std::atomic<std::uint64_t> connections_refused{0};  ///< Over max_connections.
+  std::atomic<std::uint64_t> handshakes_failed{0};    ///< Of TLS.
   std::atomic<std::uint64_t> requests{0};             ///< HTTP, upgrades included.
   std::atomic<std::uint64_t> requests_refused{0};     ///< Answered with 4xx.
   std::atomic<std::int64_t> viewers{0};               ///< WebSocket sessions now.

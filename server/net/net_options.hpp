@@ -12,6 +12,8 @@
 
 namespace spectra::server {
 
+class TlsIdentity;
+
 /// Every bound the network side keeps. The defaults are what is shipped; tests shorten the times.
 struct NetLimits {
   std::size_t header_size_bytes = 8 * 1024;
@@ -53,6 +55,7 @@ struct NetOptions {
   std::uint16_t port = 8080;               ///< 0 picks a free one.
   std::vector<std::string> allowed_hosts;  ///< Host names beside loopback and the addresses listened on.
   std::shared_ptr<AccessControl> access = std::make_shared<AccessControl>();
+  std::shared_ptr<TlsIdentity> tls;  ///< Loaded; every connection is encrypted. Null: none is.
   unsigned io_thread_count = 1;
   bool stop_on_signals = false;       ///< SIGINT and SIGTERM begin stop().
   std::function<void()> reload = {};  ///< What SIGHUP does; empty: what the system does.

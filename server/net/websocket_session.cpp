@@ -23,7 +23,7 @@ namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
-WebSocketSession::WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form,
+WebSocketSession::WebSocketSession(Transport stream, ServerContext& context, HelloForm hello_form,
                                    AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),

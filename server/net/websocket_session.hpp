@@ -12,9 +12,9 @@
 #include <string>
 
 #include "server/access/token_bucket.hpp"
-#include "server/net/connection_stream.hpp"
 #include "server/net/ping_watch.hpp"
 #include "server/net/server_context.hpp"
+#include "server/net/transport.hpp"
 
 namespace spectra::server {
 
@@ -27,7 +27,7 @@ class WebSocketSession final : public ViewerPeer,
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  WebSocketSession(ConnectionStream stream, ServerContext& context, HelloForm hello_form, AccessControl::Identity who);
+  WebSocketSession(Transport stream, ServerContext& context, HelloForm hello_form, AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -60,7 +60,7 @@ class WebSocketSession final : public ViewerPeer,
   /// Of a code that RFC 6455 does not know: answers with 1002.
   void refuse_unknown_close();
 
-  boost::beast::websocket::stream<ConnectionStream> ws_;
+  boost::beast::websocket::stream<Transport> ws_;
   ServerContext& context_;
   std::shared_ptr<ViewerClient> client_;
   boost::asio::steady_timer writer_signal_;

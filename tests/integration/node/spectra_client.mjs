@@ -153,13 +153,14 @@ export class DracoReader {
 
 /** One connection: requests, notifications, tiles. Frames are decoded as they come and acknowledged. */
 export class SpectraClient {
-  static async connect(httpUrl, { decode = true, acknowledge = true, hello: form } = {}) {
+  static async connect(httpUrl, { decode = true, acknowledge = true, hello: form, ca } = {}) {
     const client = new SpectraClient();
     client.draco = await DracoReader.create();
     client.decode = decode;
     client.acknowledge = acknowledge;
     client.socket = new WebSocket(`${httpUrl.replace(/^http/, "ws").replace(/\/$/, "")}/ws${form ? `?hello=${form}` : ""}`, "spectra.v1", {
       perMessageDeflate: false,
+      ca,
     });
     client.socket.binaryType = "nodebuffer";
     const hello = client.notification("hello", 30_000);

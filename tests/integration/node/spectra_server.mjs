@@ -32,7 +32,7 @@ export async function serve(args, { ready = true } = {}) {
   const url = await new Promise((resolve, reject) => {
     process_.stdout.on("data", (chunk) => {
       output += chunk;
-      const match = /listening on (http:\/\/[^\s/]+)/.exec(output);
+      const match = /listening on (https?:\/\/[^\s/]+)/.exec(output);
       if (match) resolve(match[1]);
     });
     exited.then((code) => reject(new Error(`spectra serve: exit ${code}: ${errors}`)));
