@@ -28,11 +28,11 @@ struct ServeOptions {
   std::optional<store::StoreTime> at;  ///< The map of the store is shown as it was then, and takes no blocks.
   std::string listen = "127.0.0.1:8080";
   std::vector<std::string> allowed_hosts;
-  std::optional<std::filesystem::path> tokens;  ///< Whom to let in; absent: what the environment says.
+  std::optional<std::filesystem::path> tokens;            ///< Whom to let in; absent: what the environment says.
   std::optional<std::filesystem::path> certificate, key;  ///< PEM; both: connections are encrypted.
-  bool is_insecure = false;                     ///< Others are let in without a token.
-  std::optional<AccessRole> invited;            ///< Print a link that lets one browser in.
-  bool is_fused_only = false;                   ///< Viewers get no raw layers.
+  bool is_insecure = false;                               ///< Others are let in without a token.
+  std::optional<AccessRole> invited;                      ///< Print a link that lets one browser in.
+  bool is_fused_only = false;                             ///< Viewers get no raw layers.
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
   fusion::ReadOptions read;
