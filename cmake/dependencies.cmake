@@ -12,6 +12,7 @@ find_package(OpenMesh REQUIRED)  # Debian 12 ships 9.0; its package config state
 find_package(meshoptimizer 0.18 REQUIRED)
 find_package(hwy 1.0 REQUIRED)
 find_package(CLI11 2.1 REQUIRED)
+find_package(tomlplusplus 3.3 REQUIRED)
 find_package(prometheus-cpp REQUIRED)  # 1.0; likewise
 find_package(fmt 9.1 REQUIRED)
 find_package(zstd 1.5 REQUIRED)

@@ -11,7 +11,7 @@ beside=$(cd "$(dirname "$0")/.." && pwd)/build/packages
 
 build_packages=(
   g++ cmake ninja-build ccache ca-certificates
-  libboost1.81-dev nlohmann-json3-dev libspdlog-dev libcli11-dev
+  libboost1.81-dev nlohmann-json3-dev libspdlog-dev libcli11-dev libtomlplusplus-dev
   libdraco-dev libopenmesh-dev libmeshoptimizer-dev libhwy-dev
   prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev zlib1g-dev
   libsqlite3-dev libssl-dev libqrencode-dev

@@ -34,7 +34,8 @@ struct ServeOptions {
   std::optional<AccessRole> invited;                      ///< Print a link that lets one browser in.
   bool is_fused_only = false;                             ///< Viewers get no raw layers.
   std::optional<std::filesystem::path> web;
-  unsigned thread_count = 0;  ///< Of the worker pool; 0 = as many as processors.
+  unsigned thread_count = 0;     ///< Of the worker pool; 0 = as many as processors.
+  bool has_config_file = false;  ///< They come from one, in part at least.
   fusion::ReadOptions read;
 };
 
@@ -102,6 +103,8 @@ struct CertificateOptions {
 
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
+/// Says whether `run_serve` could begin with them; they come from `file`.
+int run_check_config(const std::filesystem::path& file, const ServeOptions& options);
 int run_token(const TokenOptions& options);
 int run_certificate(const CertificateOptions& options);
 int run_fuse(const FuseOptions& options);

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,7 @@
 #include "fusion/mesh/demo_scene.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
+#include "server/app/config_file.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/version.hpp"
 #include "server/store/time_text.hpp"
@@ -19,6 +21,7 @@ namespace spectra::server {
 namespace {
 
 using Run = std::function<int()>;
+constexpr const char* kQuietHelp = "No progress on the terminal";
 
 /// The options of every command that reads a scene: what a person knows of the file.
 void add_reading(CLI::App& command, fusion::ReadOptions& options) {
@@ -250,12 +253,49 @@ void add_store(CLI::App& app, std::filesystem::path& checked, StoreSalvageOption
   rescue->final_callback([&salvage, &run] { run = [&salvage] { return run_store_salvage(salvage); }; });
 }
 
+/// What went wrong with the arguments or a config file, in one line; the exit status.
+int fail_to_parse(const CLI::ParseError& error, const std::string& hint) {
+  const bool is_file = dynamic_cast<const CLI::FileError*>(&error) != nullptr;
+  const bool is_placed = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ConfigError);
+  if (is_file) return fail(kJobFailed, error.what());
+  return fail(kWrongUsage, is_placed ? error.what() : error.what() + hint);
+}
+
+/// The options of serve that a config file holds. Throws CLI::ParseError.
+ServeOptions options_of_file(const std::filesystem::path& file) {
+  CLI::App app("", "spectra");
+  ServeOptions options;
+  bool is_demo = false;
+  Run run;
+  add_serve(app, options, is_demo, run);
+  auto* command = app.get_subcommand("serve");
+  command->add_flag("--quiet", kQuietHelp);
+  add_config_file(app, *command);
+  const std::array arguments{"spectra", "serve", "--config", file.c_str()};
+  app.parse(static_cast<int>(arguments.size()), arguments.data());
+  options.has_config_file = true;
+  return options;
+}
+
+void add_check_config(CLI::App& app, std::filesystem::path& file, Run& run) {
+  auto* command = app.add_subcommand("check-config", "Say whether a config file of serve is good");
+  command->add_option("file", file, "The file, TOML")->required();
+  command->final_callback([&file, &run] {
+    run = [&file] {
+      try {
+        return run_check_config(file, options_of_file(file));
+      } catch (const CLI::ParseError& error) {
+        return fail_to_parse(error, " (in " + file.string() + ')');
+      }
+    };
+  });
+}
+
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
   app.set_version_flag("--version", "spectra " + std::string(kVersion));
   app.require_subcommand(1);
-  app.set_config("--config", "", "A TOML file; its section [serve] holds options of serve by their long names");
-  app.allow_config_extras(false);
+  app.set_help_all_flag("--help-all", "Print the help of every command and exit");
   ServeOptions serve;
   FuseOptions fuse;
   std::vector<std::string> sets;
@@ -268,10 +308,13 @@ int parse_and_run(int argc, const char* const* argv) {
   TokenOptions token;
   CertificateOptions certificate;
   std::filesystem::path checked_store;
+  std::filesystem::path checked_config;
   StoreSalvageOptions salvage;
   Run run;
   bool is_demo = false;  // what is served without a scene anyway
   add_serve(app, serve, is_demo, run);
+  add_config_file(app, *app.get_subcommand("serve"));
+  add_check_config(app, checked_config, run);
   add_fuse(app, fuse, sets, keep, run);
   add_info(app, info, run);
   add_methods(app, methods_as_json, run);
@@ -282,7 +325,6 @@ int parse_and_run(int argc, const char* const* argv) {
   add_token(app, token, run);
   add_certificate(app, certificate, run);
   bool is_quiet = false;
-  constexpr auto* kQuietHelp = "No progress on the terminal";
   app.add_flag("--quiet", is_quiet, kQuietHelp);
   for (auto* command : app.get_subcommands({})) {
     command->add_flag("--quiet", is_quiet, kQuietHelp);
@@ -297,12 +339,14 @@ int parse_and_run(int argc, const char* const* argv) {
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::FileError& error) {
-    return fail(kJobFailed, error.what());
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return fail(kWrongUsage, std::string(error.what()) + " (see: spectra --help)");
+    const bool has_file = app.get_config_ptr()->count() > 0;
+    return fail_to_parse(error, has_file
+                                    ? " (with " + app.get_config_ptr()->as<std::string>() + "; see: spectra --help)"
+                                    : " (see: spectra --help)");
   }
+  serve.has_config_file = app.get_config_ptr()->count() > 0;
   if (is_quiet) ProgressLine::keep_quiet();
   return run();
 }

@@ -21,6 +21,7 @@
 #include "server/app/invitation.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/app/serve_setup.hpp"
 #include "server/app/served_scene.hpp"
 #include "server/app/viewer_session.hpp"
 #include "server/net/http_server.hpp"
@@ -33,19 +34,7 @@ namespace {
 
 /// From the last connection to the end of the program.
 constexpr std::chrono::milliseconds kLongestEnd{250};
-constexpr const char* kTokensVariable = "SPECTRA_TOKENS";
 constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
-
-/// The built web client: as asked for, installed beside the program, or in the source tree it was built from.
-fs::path web_root(const ServeOptions& options) {
-  if (options.web) return *options.web;
-  std::error_code error;
-  const auto program = fs::read_symlink("/proc/self/exe", error);
-  for (const fs::path& candidate : {program.parent_path() / "../share/spectra/web", fs::path(SPECTRA_WEB_DIST)}) {
-    if (fs::exists(candidate / "index.html", error)) return candidate;
-  }
-  return fs::path(SPECTRA_WEB_DIST);
-}
 
 /// Standard error, where the line of progress makes way.
 class LogSink final : public spdlog::sinks::stderr_color_sink_mt {
@@ -63,21 +52,6 @@ void raise_descriptor_limit() {
     limit.rlim_cur = limit.rlim_max;
     setrlimit(RLIMIT_NOFILE, &limit);
   }
-}
-
-/// Whom to let in: as options and environment say. Nothing: nobody needs a token.
-AccessResult<std::optional<TokenList>> token_list(const ServeOptions& options) {
-  AccessResult<TokenList> list;
-  if (options.tokens) {
-    list = read_tokens(*options.tokens);
-  } else if (const char* text = std::getenv(kTokensVariable); text != nullptr && !options.is_insecure) {
-    list = tokens_of_text(text);
-    if (auto* problem = std::get_if<std::string>(&list)) return std::string(kTokensVariable) + ": " + *problem;
-  } else {
-    return std::optional<TokenList>();
-  }
-  if (auto* problem = std::get_if<std::string>(&list)) return std::move(*problem);
-  return std::optional(std::get<TokenList>(std::move(list)));
 }
 
 /// Reads the file again; what is wrong with it is said, and nothing changes.
@@ -179,44 +153,27 @@ class SceneLoader {
 int run_serve(const ServeOptions& options) {
   spdlog::set_default_logger(std::make_shared<spdlog::logger>("spectra", std::make_shared<LogSink>()));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
-  const auto listen = parsed_listen_address(options.listen);
-  if (!listen) {
-    return fail(kWrongUsage,
-                "--listen " + options.listen + ": ADDRESS:PORT is wanted, such as 0.0.0.0:8080 or [::]:8080");
-  }
-  for (const auto& path : {options.scene, options.thermal}) {
-    if (path && !std::ifstream(*path)) return fail(kJobFailed, path->string() + ": cannot be opened");
-  }
-  if (options.web && !fs::exists(*options.web / "index.html")) {
-    return fail(kJobFailed, options.web->string() + ": there is no index.html in it");
-  }
-  auto tokens = token_list(options);
-  if (const auto* problem = std::get_if<std::string>(&tokens)) return fail(kJobFailed, *problem);
-  auto& list = std::get<std::optional<TokenList>>(tokens);
-  if (!list && !options.is_insecure && !is_loopback(*listen)) {
-    return fail(kWrongUsage, "--listen " + options.listen +
-                                 " lets others in: name whom with --tokens FILE (spectra token makes it), or " +
-                                 "let anybody watch and operate with --insecure");
-  }
-  if (options.invited && !list) return fail(kWrongUsage, "--invite is for a server with --tokens");
+  auto looked = serve_setup(options);
+  if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
+  auto& setup = std::get<ServeSetup>(looked);
   raise_descriptor_limit();
 
   NetOptions net;
-  if (list) {
-    net.access = std::make_shared<AccessControl>(std::move(*list), "spectra_" + std::to_string(listen->port));
+  if (setup.tokens) {
+    net.access =
+        std::make_shared<AccessControl>(std::move(*setup.tokens), "spectra_" + std::to_string(setup.listen.port));
   }
-  if (options.certificate) {
-    net.tls = std::make_shared<TlsIdentity>(*options.certificate, *options.key);
-    if (const auto problem = net.tls->load()) return fail(kJobFailed, *problem);
-  }
-  if (options.tokens || net.tls) {
+  net.tls = setup.tls;
+  // With a config file it is a service: nobody's terminal closes with SIGHUP.
+  if (options.tokens || net.tls || options.has_config_file) {
     net.reload = [file = options.tokens, access = net.access, tls = net.tls] {
       if (file) reload_tokens(*file, *access);
       if (tls) reload_certificate(*tls);
+      if (!file && !tls) spdlog::info("there are no tokens and no certificate to read again");
     };
   }
-  net.address = listen->address;
-  net.port = listen->port;
+  net.address = setup.listen.address;
+  net.port = setup.listen.port;
   net.allowed_hosts = options.allowed_hosts;
   net.limits.gives_raw_layers = !options.is_fused_only;
   net.stop_on_signals = true;
@@ -249,7 +206,7 @@ int run_serve(const ServeOptions& options) {
   api.set_metrics(server->metrics());
   for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
   if (options.invited) print_invitation(*server, *net.access, *options.invited);
-  if (options.is_insecure && !is_loopback(*listen))
+  if (options.is_insecure && !is_loopback(setup.listen))
     spdlog::warn("anybody on the network may watch and operate (--insecure)");
   std::fflush(stdout);
 
