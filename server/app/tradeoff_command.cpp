@@ -33,7 +33,8 @@ int run_tradeoff(const TradeoffCommandOptions& options) {
   const auto recommended = recommended_points(measurement.value(), {1, 5, 20, 100});
   const auto written = write_report(options.folder, measurement.value(), recommended);
   if (!written) return fail(written.error());
-  fmt::print("{}report: {}\n", recommendation_text(recommended), (options.folder / "report.html").string());
+  fmt::print("{}{}report: {}\n", recommendation_text(recommended), raw_text(measurement.value()),
+             (options.folder / "report.html").string());
   return kDone;
 }
 

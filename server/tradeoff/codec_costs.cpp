@@ -4,7 +4,6 @@
 #include <zstd.h>
 
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -13,6 +12,7 @@
 #include "protocol/draco_codec.hpp"
 #include "server/stream/lattice.hpp"
 #include "server/stream/tile_encoder.hpp"
+#include "server/tradeoff/stopwatch.hpp"
 
 namespace spectra::server {
 namespace {
@@ -21,21 +21,6 @@ using fusion::failure;
 using fusion::Rgb8;
 
 constexpr int kZstdLevel = 3;
-
-/// Adds the milliseconds of its own life to a sum.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum_ms) : sum_ms_(sum_ms), start_(std::chrono::steady_clock::now()) {}
-  ~Stopwatch() {
-    sum_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& sum_ms_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 std::span<const std::byte> bytes_of(const auto& values) {
   return std::as_bytes(std::span(values));

@@ -9,6 +9,7 @@
 #include "server/stream/lattice.hpp"
 #include "server/stream/viewer_stream.hpp"
 #include "server/tradeoff/codec_costs.hpp"
+#include "server/tradeoff/raw_costs.hpp"
 #include "server/tradeoff/shown_error.hpp"
 
 namespace spectra::server {
@@ -53,6 +54,7 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
                              scene.level_count(),
                              1000 * static_cast<double>(suggested_m),
                              {},
+                             {},
                              {}};
   const auto append = [](auto& all, auto more) {
     all.insert(all.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
@@ -95,8 +97,23 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
     }
     BOOST_OUTCOME_TRY(auto points, colour_costs(tiles, suggested_m, samples.look(), bases));
     append(result.colours, std::move(points));
+    if (level != levels.back() || scene.temperature().summary.finite_count == 0) continue;
+    BOOST_OUTCOME_TRY(result.raw, raw_costs(tiles, suggested_m, samples.look(), options.temperature_steps_celsius));
   }
   return result;
+}
+
+const ColourPoint& full_change(const TradeoffMeasurement& measurement) {
+  const ColourPoint* full = nullptr;
+  for (const ColourPoint& point : measurement.colours) {
+    const bool is_asked_for = point.codec == kSubtractGreen && point.colour_bits == 8;
+    if (is_asked_for && (full == nullptr || point.level > full->level)) full = &point;
+  }
+  return *full;
+}
+
+std::uint64_t break_even(const RawPoint& raw, const ColourPoint& change) {
+  return raw.size_bytes() / std::max<std::uint64_t>(1, change.size_bytes) + 1;
 }
 
 std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measurement,

@@ -20,7 +20,8 @@ struct TradeoffOptions {
   std::string palette = "inferno";      ///< The temperature is read back from its colours.
   std::vector<int> encoder_speeds{0, 5, 7, 10};
   std::vector<int> colour_bits{8, 7, 6, 5, 4};
-  std::vector<double> step_factors{0.25, 0.5, 1, 2, 4, 8};  ///< Times the scene's suggested position step.
+  std::vector<double> step_factors{0.25, 0.5, 1, 2, 4, 8};            ///< Times the scene's suggested position step.
+  std::vector<double> temperature_steps_celsius{0.01, 0.05, 0.2, 1};  ///< Of raw layers.
 };
 
 /// Codec of colours in frames of kind 6: Draco, after subtracting green from red and blue.
@@ -54,6 +55,21 @@ struct ColourPoint {
   double temperature_p95_celsius = 0;  ///< NaN in a scene without thermal data.
 };
 
+/// Both raw layers of the full detail, from which a client fuses by itself: what they cost once, and what rounding the temperatures to a
+/// step does to them and to fused colours.
+struct RawPoint {
+  double temperature_step_celsius = 0;
+  std::uint64_t temperature_bytes = 0;
+  std::uint64_t visible_bytes = 0;  ///< The smaller of plain and kSubtractGreen, for each tile.
+  double encode_ms = 0;
+  double decode_ms = 0;
+  double temperature_worst_celsius = 0;
+  double levels_mean = 0;  ///< Largest difference of a channel of the fused colours, of 255.
+  double levels_p95 = 0;
+
+  std::uint64_t size_bytes() const { return temperature_bytes + visible_bytes; }
+};
+
 /// Everything that was measured. The full grid of knobs is every GeometryPoint with every ColourPoint of the same level.
 struct TradeoffMeasurement {
   std::string scene;
@@ -63,7 +79,13 @@ struct TradeoffMeasurement {
   double suggested_step_mm = 0;  ///< The scene's suggested position step.
   std::vector<GeometryPoint> geometry;
   std::vector<ColourPoint> colours;
+  std::vector<RawPoint> raw;  ///< Empty for a scene without temperatures.
 };
+
+/// Colours of the full detail as the web client asks for them: what a change of settings costs that is not made there.
+const ColourPoint& full_change(const TradeoffMeasurement& measurement);
+/// From which setting on raw layers have cost less than fused colours; 1 is the first.
+std::uint64_t break_even(const RawPoint& raw, const ColourPoint& change);
 
 /// Measures on one thread, as one core of the server would work; `progress` is told of kMeasuringPhase.
 fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -228,6 +229,26 @@ Row row_of(const Recommendation& r) {
           number(r.colours.temperature_p95_celsius, 2)};
 }
 
+const Row kRawHeader{"link Mbit/s", "temperature step degC",  "temperature bytes",   "visible bytes",
+                     "once s",      "each change fused s",    "cheaper from change", "encode ms",
+                     "decode ms",   "temperature worst degC", "levels mean",         "levels p95"};
+constexpr std::array kRates{1.0, 5.0, 20.0, 100.0};
+
+std::vector<Row> raw_rows(const TradeoffMeasurement& measurement) {
+  std::vector<Row> rows;
+  for (const double rate : kRates) {
+    for (const RawPoint& raw : measurement.raw) {
+      const ColourPoint& change = full_change(measurement);
+      const auto seconds = [rate](std::uint64_t bytes) { return number(8e-6 * static_cast<double>(bytes) / rate, 3); };
+      rows.push_back({number(rate, 0), number(raw.temperature_step_celsius), std::to_string(raw.temperature_bytes),
+                      std::to_string(raw.visible_bytes), seconds(raw.size_bytes()), seconds(change.size_bytes),
+                      std::to_string(break_even(raw, change)), number(raw.encode_ms, 1), number(raw.decode_ms, 1),
+                      number(raw.temperature_worst_celsius, 4), number(raw.levels_mean), number(raw.levels_p95, 0)});
+    }
+  }
+  return rows;
+}
+
 /// All of them or none.
 fusion::Result<void> written_files(const std::filesystem::path& folder,
                                    const std::vector<std::pair<const char*, std::string>>& texts) {
@@ -248,6 +269,15 @@ std::string geometry_csv(const TradeoffMeasurement& measurement) {
 
 std::string colours_csv(const TradeoffMeasurement& measurement) {
   return csv(kColourHeader, rows_of(measurement.colours));
+}
+
+std::string raw_csv(const TradeoffMeasurement& measurement) {
+  Row header = kRawHeader;
+  for (std::string& name : header) {
+    std::replace(name.begin(), name.end(), ' ', '_');
+    std::replace(name.begin(), name.end(), '/', '_');
+  }
+  return csv(header, raw_rows(measurement));
 }
 
 std::string grid_csv(const TradeoffMeasurement& measurement) {
@@ -289,6 +319,12 @@ th,td{padding:2px 8px;border-bottom:1px solid #e4e4e4;text-align:right}th{backgr
   const auto celsius = colour_marks(m, [](const ColourPoint& p) { return p.temperature_p95_celsius; });
   if (!celsius.empty())
     html += plot("Colours: temperature read back (95th percentile, degC)", "degC p95", celsius, 1e-3);
+  if (!m.raw.empty()) {
+    html +=
+        "<h2>Raw layers beside fused colours</h2><p>Full detail. Raw temperatures and visible colours come once; then "
+        "the client makes colours by itself, and a change of settings sends none.</p>" +
+        table(kRawHeader, raw_rows(m));
+  }
   html +=
       "<details><summary>Geometry, all points</summary>" + table(kGeometryHeader, rows_of(m.geometry)) + "</details>";
   html += "<details><summary>Colours, all points</summary>" + table(kColourHeader, rows_of(m.colours)) +
@@ -313,12 +349,25 @@ std::string recommendation_text(const std::vector<Recommendation>& recommendatio
   return text;
 }
 
+std::string raw_text(const TradeoffMeasurement& measurement) {
+  if (measurement.raw.empty()) return "";
+  const RawPoint& raw = measurement.raw.front();
+  const ColourPoint& change = full_change(measurement);
+  return fmt::format(
+      "raw layers: {:.2f} MB once against {:.2f} MB a change, cheaper from change {} on; temperatures within {:.3f} "
+      "degC, colours within "
+      "{:g} levels (95 %)\n",
+      1e-6 * static_cast<double>(raw.size_bytes()), 1e-6 * static_cast<double>(change.size_bytes),
+      break_even(raw, change), raw.temperature_worst_celsius, raw.levels_p95);
+}
+
 fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
                                   const std::vector<Recommendation>& recommendations) {
   std::error_code ignored;  // what is wrong with the folder, the first file tells
   const bool is_new = std::filesystem::create_directories(folder, ignored);
   auto written = written_files(folder, {{"geometry.csv", geometry_csv(measurement)},
                                         {"colours.csv", colours_csv(measurement)},
+                                        {"raw.csv", raw_csv(measurement)},
                                         {"grid.csv", grid_csv(measurement)},
                                         {"report.html", report_html(measurement, recommendations)}});
   if (!written && is_new) std::filesystem::remove(folder, ignored);

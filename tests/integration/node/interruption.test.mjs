@@ -99,7 +99,7 @@ test("tradeoff, stopped at any moment or without room, leaves all tables or none
   run("demo-scene", small, "--vertices", "5000");
   const where = path.join(folder, "tradeoff");
   const args = ["tradeoff", small, "--out", where];
-  const kFiles = ["colours.csv", "geometry.csv", "grid.csv", "report.html"];
+  const kFiles = ["colours.csv", "geometry.csv", "grid.csv", "raw.csv", "report.html"];
   run(...args);
   assert.deepEqual(readdirSync(where).sort(), kFiles);
   rmSync(where, { recursive: true });

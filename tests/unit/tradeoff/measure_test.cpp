@@ -113,6 +113,46 @@ TEST_F(Tradeoff, RecommendsMoreForFasterLinks) {
   for (const auto& r : recommended) EXPECT_EQ(r.colours.codec, kSubtractGreen);
 }
 
+TEST_F(Tradeoff, CoarserRawTemperaturesCostLessAndAreOffByHalfAStepAtMost) {
+  const auto& raw = measurement_->raw;
+  ASSERT_EQ(raw.size(), TradeoffOptions().temperature_steps_celsius.size());
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    EXPECT_GT(raw[i].visible_bytes, 0U);
+    // 20 degC in 32-bit floats are exact to some millionths.
+    EXPECT_LE(raw[i].temperature_worst_celsius, raw[i].temperature_step_celsius / 2 + 1e-5);
+    EXPECT_GT(raw[i].temperature_worst_celsius, raw[i].temperature_step_celsius / 8);
+    if (i == 0) continue;
+    EXPECT_LT(raw[i].temperature_bytes, raw[i - 1].temperature_bytes);
+    EXPECT_EQ(raw[i].visible_bytes, raw[i - 1].visible_bytes);
+    EXPECT_GE(raw[i].levels_mean, raw[i - 1].levels_mean);
+  }
+  EXPECT_LT(raw.front().levels_p95, 2);
+  EXPECT_GT(raw.back().levels_p95, 1);
+}
+
+TEST_F(Tradeoff, TellsFromWhichChangeOnRawLayersAreCheaper) {
+  RawPoint raw;
+  ColourPoint change;
+  raw.temperature_bytes = 100;
+  raw.visible_bytes = 99;
+  change.size_bytes = 100;
+  EXPECT_EQ(break_even(raw, change), 2U) << "two changes cost 200 bytes, one 100";
+  raw.visible_bytes = 100;
+  EXPECT_EQ(break_even(raw, change), 3U) << "two changes cost as much";
+  EXPECT_EQ(full_change(*measurement_).level, full_level());
+  EXPECT_EQ(full_change(*measurement_).colour_bits, 8);
+}
+
+TEST_F(Tradeoff, ReportsRawLayersForEveryLink) {
+  const std::string csv = raw_csv(*measurement_);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n') - 1, 4 * 4);
+  EXPECT_NE(raw_text(*measurement_).find("cheaper from change"), std::string::npos);
+  TradeoffMeasurement without = *measurement_;
+  without.raw.clear();
+  EXPECT_EQ(raw_text(without), "");
+  EXPECT_EQ(report_html(without, {}).find("Raw layers"), std::string::npos);
+}
+
 TEST_F(Tradeoff, ReportsEveryPointAndEscapesNames) {
   const std::string csv = grid_csv(*measurement_);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n') - 1,
