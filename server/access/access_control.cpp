@@ -18,15 +18,6 @@ std::chrono::sys_seconds system_now() {
   return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
 }
 
-std::string who_counts(const std::string& address) {
-  boost::system::error_code error;
-  const auto parsed = boost::asio::ip::make_address(address, error);
-  if (error || !parsed.is_v6() || parsed.to_v6().is_v4_mapped()) return address;
-  auto bytes = parsed.to_v6().to_bytes();
-  std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
-  return boost::asio::ip::address_v6(bytes).to_string();
-}
-
 /// What is signed. The parts hold no dots.
 std::string claim_of(AccessRole role, std::chrono::sys_seconds until, std::string_view name) {
   return std::string(to_string(role)) + '.' + std::to_string(until.time_since_epoch().count()) + '.' +
@@ -57,6 +48,15 @@ std::string tidy_code(std::string_view text) {
 }
 
 }  // namespace
+
+std::string who_counts(const std::string& address) {
+  boost::system::error_code error;
+  const auto parsed = boost::asio::ip::make_address(address, error);
+  if (error || !parsed.is_v6() || parsed.to_v6().is_v4_mapped()) return address;
+  auto bytes = parsed.to_v6().to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+  return boost::asio::ip::address_v6(bytes).to_string();
+}
 
 bool AttemptLimit::take(const std::string& address, double now_s) {
   const std::string key = who_counts(address);

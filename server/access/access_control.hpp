@@ -16,10 +16,12 @@
 
 namespace spectra::server {
 
+/// As whom an address counts: one machine has all IPv6 addresses that begin with the same 64 bits.
+std::string who_counts(const std::string& address);
+
 /// Lets each address try so often, and all of them together. Remembers a bounded number of addresses. Not thread-safe.
 class AttemptLimit {
  public:
-  /// IPv6 addresses count by their first 64 bits, for one machine has all that begin with them.
   bool take(const std::string& address, double now_s);
 
   static constexpr double kPerSecond = 0.5;

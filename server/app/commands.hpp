@@ -10,6 +10,7 @@
 #include "protocol/draco_file.hpp"
 #include "server/access/role.hpp"
 #include "server/app/settings_text.hpp"
+#include "server/net/net_options.hpp"
 #include "server/store/block_store.hpp"
 
 namespace spectra::server {
@@ -30,9 +31,10 @@ struct ServeOptions {
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> tokens;            ///< Whom to let in; absent: what the environment says.
   std::optional<std::filesystem::path> certificate, key;  ///< PEM; both: connections are encrypted.
-  bool is_insecure = false;                               ///< Others are let in without a token.
-  std::optional<AccessRole> invited;                      ///< Print a link that lets one browser in.
-  bool is_fused_only = false;                             ///< Viewers get no raw layers.
+  NetLimits limits;
+  bool is_insecure = false;           ///< Others are let in without a token.
+  std::optional<AccessRole> invited;  ///< Print a link that lets one browser in.
+  bool is_fused_only = false;         ///< Viewers get no raw layers.
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;     ///< Of the worker pool; 0 = as many as processors.
   bool has_config_file = false;  ///< They come from one, in part at least.

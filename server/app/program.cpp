@@ -15,6 +15,7 @@
 #include "server/app/config_file.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/version.hpp"
+#include "server/net/limit_table.hpp"
 #include "server/store/time_text.hpp"
 
 namespace spectra::server {
@@ -98,6 +99,15 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
           "--insecure", options.is_insecure,
           "On a network: let anybody watch and operate without a token; the map is changed from this machine alone")
       ->excludes("--tokens");
+  const auto set_limits = [&options](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      if (const auto problem = set_limit(options.limits, text)) throw CLI::ValidationError("--limit " + *problem);
+    }
+  };
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--limit", set_limits, "Another bound, NAME=VALUE (may be repeated); docs/limits.md has all of them")
+      ->allow_extra_args(false);
   const auto set_invited = [&options](const std::string& role) {
     options.invited = access_role(role);
     if (!options.invited) throw CLI::ValidationError("--invite " + role, "viewer, operator, ingest or admin is wanted");

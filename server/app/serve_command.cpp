@@ -175,6 +175,7 @@ int run_serve(const ServeOptions& options) {
   net.address = setup.listen.address;
   net.port = setup.listen.port;
   net.allowed_hosts = options.allowed_hosts;
+  net.limits = options.limits;
   net.limits.gives_raw_layers = !options.is_fused_only;
   net.stop_on_signals = true;
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());

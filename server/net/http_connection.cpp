@@ -177,8 +177,12 @@ class ReplyOnce {
 
 }  // namespace
 
-HttpConnection::HttpConnection(ConnectionStream stream, ServerContext& context)
-    : stream_(std::move(stream)), executor_(stream_.get_executor()), context_(context), buffer_(64 * 1024) {}
+HttpConnection::HttpConnection(ConnectionStream stream, ConnectionPlaces::Place place, ServerContext& context)
+    : place_(std::move(place)),
+      stream_(std::move(stream)),
+      executor_(stream_.get_executor()),
+      context_(context),
+      buffer_(64 * 1024) {}
 
 asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();

@@ -22,7 +22,7 @@ namespace spectra::server {
 class HttpConnection final : public Stoppable, public std::enable_shared_from_this<HttpConnection> {
  public:
   /// `stream` is connected and its executor is a strand.
-  HttpConnection(ConnectionStream stream, ServerContext& context);
+  HttpConnection(ConnectionStream stream, ConnectionPlaces::Place place, ServerContext& context);
 
   boost::asio::awaitable<void> run();
 
@@ -53,6 +53,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   std::optional<HttpReply> refusal_of(const Request& request);
   std::optional<HttpReply> upgrade_refusal_of(const Request& request, const std::string& subprotocol) const;
 
+  const ConnectionPlaces::Place place_;
   Transport stream_;
   const ConnectionStream::executor_type executor_;  ///< Of the stream, which a session may have taken over.
   ServerContext& context_;

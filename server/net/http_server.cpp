@@ -101,6 +101,8 @@ struct HttpServer::State {
   void listen();
   asio::awaitable<void> accept_connections();
   asio::awaitable<void> stop_in_stages();
+  /// Says why, as far as the peer takes it at once, and closes.
+  void refuse(tcp::socket& socket, std::string_view why);
   void begin_stop();
   void reload_on_hangup();
 
@@ -146,6 +148,19 @@ void HttpServer::State::listen() {
   }
 }
 
+void HttpServer::State::refuse(tcp::socket& socket, std::string_view why) {
+  metrics.connections_refused += 1;
+  error_code ignored;
+  if (!context.options.tls) {
+    const std::string answer = "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: " +
+                               std::to_string(why.size() + 1) + "\r\nRetry-After: 1\r\nConnection: close\r\n\r\n" +
+                               std::string(why) + '\n';
+    socket.non_blocking(true, ignored);
+    socket.write_some(asio::buffer(answer), ignored);
+  }
+  socket.shutdown(tcp::socket::shutdown_send, ignored);
+}
+
 asio::awaitable<void> HttpServer::State::accept_connections() {
   const NetLimits& limits = context.options.limits;
   bool was_short = false;
@@ -169,13 +184,21 @@ asio::awaitable<void> HttpServer::State::accept_connections() {
     was_short = false;
     metrics.connections_accepted += 1;
     if (metrics.connections_open >= static_cast<std::int64_t>(limits.max_connections)) {
-      metrics.connections_refused += 1;
+      refuse(socket, "too many connections");
       continue;
     }
-    set_socket_options(socket);
     try {
+      error_code unknown;
+      const auto address = socket.remote_endpoint(unknown).address().to_string();
+      auto place = context.places.take(who_counts(address), limits.connections_per_address);
+      if (!place) {
+        refuse(socket, "too many connections from your address");
+        continue;
+      }
+      set_socket_options(socket);
       const auto executor = socket.get_executor();
-      const auto connection = std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), context);
+      const auto connection =
+          std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), std::move(*place), context);
       asio::co_spawn(executor, connection->run(), asio::detached);
     } catch (const std::bad_alloc&) {
       metrics.connections_refused += 1;  // It costs this connection.

@@ -26,6 +26,7 @@ struct NetLimits {
   std::size_t message_size_bytes = 64 * 1024;                           ///< One WebSocket message of a client.
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
   std::size_t max_connections = 4096;             ///< Further ones are closed as soon as they are accepted.
+  std::size_t connections_per_address = 1024;     ///< Likewise.
   double messages_per_s = 10'000;                 ///< Beyond it a session's reading pauses (back-pressure).
   double message_bytes_per_s = 512 * 1024;        ///< Likewise.
   bool gives_raw_layers = true;                   ///< Temperatures and visible colours of tiles, beside fused colours.

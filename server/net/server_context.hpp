@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/net/block_change.hpp"
+#include "server/net/connection_places.hpp"
 #include "server/net/host_list.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
@@ -49,6 +50,7 @@ class ServerContext {
   StaticFiles& files;
   NetMetrics& metrics;
   HostList hosts;
+  ConnectionPlaces places;
   std::atomic<std::size_t> block_bytes{0};  ///< Of blocks that are being received or answered.
 
   /// Registers a connection for the staged stop; false when the server is stopping already.

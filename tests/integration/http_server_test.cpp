@@ -291,6 +291,32 @@ TEST_F(HttpServerTest, CutsWhoReadsALongAnswerTooSlowly) {
   EXPECT_LT(read, size);
 }
 
+TEST_F(HttpServerTest, GivesOneAddressSoManyConnectionsAndSaysSo) {
+  server::NetOptions options = quick_options();
+  options.limits.header_timeout = std::chrono::seconds(20);
+  options.limits.connections_per_address = 3;
+  const TestServer server(
+      std::move(options),
+      [](const server::HttpRequest&, const std::function<void(server::HttpReply)>& reply) {
+        reply({200, "text/plain", std::make_shared<const std::string>("ok"), {}});
+      },
+      no_viewer);
+  std::vector<RawClient> idle;
+  for (int i = 0; i < 3; ++i) idle.emplace_back(server.port());
+  ASSERT_TRUE(eventually([&server] { return server.metrics().connections_open == 3; }));
+  RawClient refused(server.port());
+  const auto words = refused.receive_all().value_or("");
+  EXPECT_EQ(status_of(words), 503);
+  EXPECT_NE(words.find("too many connections from your address"), std::string::npos);
+  EXPECT_EQ(server.metrics().connections_refused, 1U);
+  idle.pop_back();
+  ASSERT_TRUE(eventually([&server] { return server.metrics().connections_open == 2; }));
+  EXPECT_TRUE(eventually([&server] {
+    return status_of(http_exchange(server.port(),
+                                   "GET /api/x HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")) == 200;
+  }));
+}
+
 TEST_F(HttpServerTest, AnswersGarbageWith400) {
   EXPECT_EQ(status_of(http_exchange(server_->port(), "\x16\x03\x01\x02\r\n\r\n")), 400);
   EXPECT_EQ(status_of(http_exchange(server_->port(), "GET / HTTP/9.9\r\nHost: localhost\r\n\r\n")), 400);

@@ -142,7 +142,7 @@ class Progress(unittest.TestCase):
                    words=[b"fusing to o.ply"], run_s=0.02)
 
     def test_fuse_to_glb(self):
-        self.check("fuse", self.scene, self.output("o.glb"), "--method", "thermal_only", words=[b"writing o.glb"],
+        self.check("fuse", self.large_cloud, self.output("o.glb"), "--method", "thermal_only", words=[b"writing o.glb"],
                    run_s=0.02)
 
     def test_fuse_to_drc(self):
