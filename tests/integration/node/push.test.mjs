@@ -189,13 +189,14 @@ test("a link that is cut loses nothing", { timeout: 120_000 }, async (t) => {
   await server.stop();
 });
 
-test("says what is wrong with an address", async () => {
+test("says what is wrong with an address", async (t) => {
   const where = folder("address", ["a.ply"]);
   const plain = await serve([], { ready: false });
   const notHttp = await import("node:net").then(({ createServer }) => {
     const server = createServer((socket) => socket.end("SSH-2.0-OpenSSH\r\n"));
     return new Promise((resolve) => server.listen(0, "127.0.0.1", () => resolve(server)));
   });
+  t.after(() => notHttp.close());
   const cases = [
     [1, "http://127.0.0.1:1", /cannot be reached: Connection refused/],
     [1, "http://nowhere.invalid", /there is no such host/],
@@ -206,7 +207,9 @@ test("says what is wrong with an address", async () => {
     [2, "http://127.0.0.1:99999", /is not an address such as/],
     [2, "http://", /is not an address such as/],
     [2, "http://user@127.0.0.1", /is not an address such as/],
-    [2, "https://127.0.0.1", /http:\/\/ alone/],
+    [2, "https://", /is not an address such as/],
+    [1, `https://127.0.0.1:${notHttp.address().port}`, /does not speak TLS as it should/],
+    [1, plain.url.replace("http", "https"), /does not speak TLS as it should/],
   ];
   for (const [expected, url, words] of cases) {
     const { status, errors } = await push(where, "--to", url);
@@ -230,7 +233,6 @@ test("says what is wrong with an address", async () => {
     assert.equal(status, expected, errors);
     assert.match(errors, words);
   }
-  notHttp.close();
   await plain.stop();
 });
 
