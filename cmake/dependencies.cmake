@@ -20,6 +20,9 @@ find_package(TinyGLTF 2.7 REQUIRED)
 find_package(ZLIB 1.2 REQUIRED)
 find_package(SQLite3 3.40 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
+find_package(Eigen3 3.4 REQUIRED)
+find_package(PNG 1.6 REQUIRED)
+find_library(TURBOJPEG_LIBRARY turbojpeg REQUIRED)  # 2.1; its CMake package is not in every Debian package of it
 find_library(QRENCODE_LIBRARY qrencode REQUIRED)  # 4.1; has no CMake package
 if(SPECTRA_BUILD_TESTS)
   find_package(GTest 1.12 REQUIRED)

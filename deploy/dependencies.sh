@@ -15,6 +15,7 @@ build_packages=(
   libdraco-dev libopenmesh-dev libmeshoptimizer-dev libhwy-dev
   prometheus-cpp-dev libtinygltf-dev libfmt-dev libzstd-dev zlib1g-dev
   libsqlite3-dev libssl-dev libqrencode-dev
+  libeigen3-dev libpng-dev libturbojpeg0-dev
 )
 # The compiler of the fusion library for the browser. Without it the browser leaves fusing to the robot, so that these are
 # installed where they can simply be added, and else are left out.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
 
 #include "fusion/mesh/demo/baked_light.hpp"
 #include "fusion/mesh/demo/noise.hpp"
@@ -121,6 +123,38 @@ std::uint8_t level(double albedo, double light, double glow, double grain) {
   return static_cast<std::uint8_t>(std::clamp(255 * std::sqrt(seen) + grain + 0.5, 0.0, 255.0));
 }
 
+/// The colours of the scene in its light, under its dust; `done` is told of shares.
+void paint(const SurfaceMesh& scene, const std::vector<Vec3f>& normals, const demo::BakedLight& light,
+           std::uint64_t seed, std::span<Rgb8> visible, const std::function<void(double)>& done) {
+  for (std::size_t i = 0; i < scene.positions.size(); ++i) {
+    if (i % 16'384 == 0) done(static_cast<double>(i) / static_cast<double>(scene.positions.size()));
+    const Vec p{scene.positions[i].x, scene.positions[i].y, scene.positions[i].z};
+    const Vec n{normals[i].x, normals[i].y, normals[i].z};
+    const Rgb8& bare = scene.colours[i];
+    const double settled = scene.dust[i] / 255.0 * demo::smooth_step(-0.35, 0.9, n.y);
+    const double cloud = demo::fractal_noise(p * 3.1, 3, seed + 901);
+    const Colour c = mix(Colour{static_cast<double>(bare.r), static_cast<double>(bare.g), static_cast<double>(bare.b)},
+                         Colour{162, 155, 144} * (1 + 0.10 * cloud), demo::clamp01(settled * (0.85 + 0.5 * cloud)));
+    const Colour lit = light.at(p, n);
+    const double glow = scene.glow[i] / 255.0;
+    const double grain = 5 * (static_cast<double>(demo::scramble(seed + i) >> 40) * 0x1p-23 - 1);
+    visible[i] = {level(c.r, lit.r, glow, grain), level(c.g, lit.g, glow, grain), level(c.b, lit.b, glow, grain)};
+  }
+}
+
+/// A mesh with the form of the scene.
+MultispectralMesh formed(const SurfaceMesh& scene) {
+  MultispectralMesh mesh;
+  mesh.name = "demo";
+  mesh.up = UpAxis::Y;
+  mesh.is_metric = true;
+  mesh.has_visible = true;
+  mesh.has_temperature = true;
+  mesh.resize_vertices(scene.positions.size());
+  std::copy(scene.positions.begin(), scene.positions.end(), mesh.positions().begin());
+  return mesh;
+}
+
 }  // namespace
 
 LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Progress& progress) {
@@ -138,37 +172,33 @@ LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Pro
 
   SurfaceMesh scene = seen_surfaces(wanted, seed, demo::ScanCoverage(stand_in), stand_in);
   const std::vector<Vec3f> normals = demo::vertex_normals(scene);
-  MultispectralMesh mesh;
-  mesh.name = "demo";
-  mesh.up = UpAxis::Y;
-  mesh.is_metric = true;
-  mesh.has_visible = true;
-  mesh.has_temperature = true;
-  mesh.resize_vertices(scene.positions.size());
-  std::copy(scene.positions.begin(), scene.positions.end(), mesh.positions().begin());
-  const std::span<Rgb8> visible = mesh.visible();
+  MultispectralMesh mesh = formed(scene);
+  paint(scene, normals, light, seed, mesh.visible(),
+        [&](double share) { report(progress, kModellingPhase, surfaces_share + (1 - surfaces_share) * share); });
   const std::span<float> celsius = mesh.temperature_celsius();
   for (std::size_t i = 0; i < scene.positions.size(); ++i) {
-    if (i % 16'384 == 0) {
-      report(
-          progress, kModellingPhase,
-          surfaces_share + (1 - surfaces_share) * static_cast<double>(i) / static_cast<double>(scene.positions.size()));
-    }
-    const Vec p{scene.positions[i].x, scene.positions[i].y, scene.positions[i].z};
-    const Vec n{normals[i].x, normals[i].y, normals[i].z};
-    celsius[i] = sensor.celsius_at(p, n);
-    const Rgb8& bare = scene.colours[i];
-    const double settled = scene.dust[i] / 255.0 * demo::smooth_step(-0.35, 0.9, n.y);
-    const double cloud = demo::fractal_noise(p * 3.1, 3, seed + 901);
-    const Colour c = mix(Colour{static_cast<double>(bare.r), static_cast<double>(bare.g), static_cast<double>(bare.b)},
-                         Colour{162, 155, 144} * (1 + 0.10 * cloud), demo::clamp01(settled * (0.85 + 0.5 * cloud)));
-    const Colour lit = light.at(p, n);
-    const double glow = scene.glow[i] / 255.0;
-    const double grain = 5 * (static_cast<double>(demo::scramble(seed + i) >> 40) * 0x1p-23 - 1);
-    visible[i] = {level(c.r, lit.r, glow, grain), level(c.g, lit.g, glow, grain), level(c.b, lit.b, glow, grain)};
+    const Vec3f &p = scene.positions[i], &n = normals[i];
+    celsius[i] = sensor.celsius_at({p.x, p.y, p.z}, {n.x, n.y, n.z});
   }
   mesh.triangles() = std::move(scene.triangles);
   return {std::move(mesh), std::move(scene.is_skin)};
+}
+
+MultispectralMesh true_demo_scene(const DemoSceneOptions& options, const Progress& progress) {
+  report(progress, kModellingPhase, 0);
+  const std::uint64_t wanted = std::clamp(options.vertex_count, kDemoSceneLeastVertices, kDemoSceneMostVertices);
+  const std::uint64_t seed = demo::scramble(options.seed);
+  const demo::BakedLight light(surfaces(std::min(wanted, kStandInVertices), seed));
+  report(progress, kModellingPhase, 0.4);
+  SurfaceMesh scene = surfaces(wanted, seed);
+  report(progress, kModellingPhase, 0.6);
+  const std::vector<Vec3f> normals = demo::vertex_normals(scene);
+  MultispectralMesh mesh = formed(scene);
+  paint(scene, normals, light, seed, mesh.visible(),
+        [&](double share) { report(progress, kModellingPhase, 0.6 + 0.4 * share); });
+  std::copy(scene.celsius.begin(), scene.celsius.end(), mesh.temperature_celsius().begin());
+  mesh.triangles() = std::move(scene.triangles);
+  return mesh;
 }
 
 MultispectralMesh demo_scene(const DemoSceneOptions& options, const Progress& progress) {

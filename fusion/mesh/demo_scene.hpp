@@ -36,6 +36,10 @@ struct LabelledDemoScene {
 };
 LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
 
+/// The surfaces of the demo scene as they are, for simulated sensors: all of them, whether a camera saw them or not, with their true
+/// temperatures and the colours that a camera sees.
+MultispectralMesh true_demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
+
 /// A place in the demo scene whose temperature is known, for tests and for trying out the tools.
 struct DemoLandmark {
   std::string_view name;  ///< For example "mug", "face", "exit_sign".

@@ -11,8 +11,8 @@ namespace spectra::fusion {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{256} * 1024;
-/// No entry is longer: three doubles, a colour, a temperature.
-constexpr std::size_t kMaxEntryBytes = 3 * 8 + 3 + 4;
+/// No entry is longer: three doubles, a colour, a temperature, its sigma and time.
+constexpr std::size_t kMaxEntryBytes = 3 * 8 + 3 + 4 + 4 + 8;
 
 std::string header_text(const PlyLayout& layout) {
   const std::string coordinate = layout.double_positions ? "double" : "float";
@@ -24,6 +24,7 @@ std::string header_text(const PlyLayout& layout) {
     text += "property uchar " + std::string(channel) + "\n";
   }
   if (layout.has_temperature) text += "property float temperature\n";
+  if (layout.has_confidence) text += "property float temperature_sigma\nproperty double seen\n";
   if (layout.triangle_count > 0) {
     text += "element face " + std::to_string(layout.triangle_count) + "\nproperty list uchar int vertex_indices\n";
   }
@@ -48,7 +49,14 @@ void PlyEncoder::put(T value) {
 }
 
 Result<void> PlyEncoder::vertices(std::span<const Vec3f> positions, std::span<const Rgb8> colours,
-                                  std::span<const float> temperature_celsius) {
+                                  std::span<const float> temperature_celsius, const PlyConfidence& confidence) {
+  if (layout_.has_confidence &&
+      (confidence.sigma_kelvin.size() != positions.size() || confidence.seen_s.size() != positions.size())) {
+    return failure(ErrorCode::Inconsistent, "the vertices to write have " + std::to_string(positions.size()) +
+                                                " positions, " + std::to_string(confidence.sigma_kelvin.size()) +
+                                                " deviations and " + std::to_string(confidence.seen_s.size()) +
+                                                " times");
+  }
   if (colours.size() != positions.size() ||
       (layout_.has_temperature && temperature_celsius.size() != positions.size())) {
     return failure(ErrorCode::Inconsistent, "the vertices to write have " + std::to_string(positions.size()) +
@@ -60,6 +68,10 @@ Result<void> PlyEncoder::vertices(std::span<const Vec3f> positions, std::span<co
                             layout_.origin.y + static_cast<double>(positions[i].y),
                             layout_.origin.z + static_cast<double>(positions[i].z)};
     BOOST_OUTCOME_TRY(vertex(position, colours[i], layout_.has_temperature ? temperature_celsius[i] : 0));
+    if (layout_.has_confidence) {
+      put(confidence.sigma_kelvin[i]);
+      put(confidence.seen_s[i]);
+    }
   }
   return success();
 }

@@ -19,7 +19,14 @@ struct PlyLayout {
   Vec3d origin;                      ///< Added to every position.
   bool double_positions = false;
   bool has_temperature = false;
-  std::string comment;  ///< One line of the header; empty: none.
+  bool has_confidence = false;  ///< temperature_sigma and seen after the temperature.
+  std::string comment;          ///< One line of the header; empty: none.
+};
+
+/// How sure a temperature is and when it was seen, one a vertex.
+struct PlyConfidence {
+  std::span<const float> sigma_kelvin;
+  std::span<const double> seen_s;
 };
 
 /// Makes the bytes of a binary little-endian PLY file, block after block, in constant memory.
@@ -30,9 +37,9 @@ class PlyEncoder {
   PlyEncoder(const PlyLayout& layout, Sink sink);
 
   /// In this order: all vertices in any number of calls, then all triangles, then finish(). `temperature_celsius` is
-  /// read when the layout has one; the spans have the same length.
+  /// read when the layout has one, `confidence` when it has that; the spans have the same length.
   Result<void> vertices(std::span<const Vec3f> positions, std::span<const Rgb8> colours,
-                        std::span<const float> temperature_celsius);
+                        std::span<const float> temperature_celsius, const PlyConfidence& confidence = {});
   /// One vertex more, whose position is written as it is: it may be no finite one.
   Result<void> left_out_vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius);
   Result<void> triangles(std::span<const Triangle> triangles);

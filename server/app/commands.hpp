@@ -103,6 +103,23 @@ struct CertificateOptions {
   bool replaces = false;  ///< Files that are there.
 };
 
+struct MapOptions {
+  std::filesystem::path frames;                ///< A folder of them.
+  std::filesystem::path output;                ///< The mesh.
+  std::optional<std::filesystem::path> poses;  ///< Absent: the folder's.
+  std::optional<std::filesystem::path> vignetting;
+  double voxel_m = 0.01;
+  unsigned thread_count = 0;
+};
+
+struct DemoFramesOptions {
+  std::filesystem::path folder;  ///< Made when it does not exist.
+  double seconds = 60;
+  std::uint64_t seed = 1;
+  double pose_drift_m = 0;
+  double clock_offset_s = 0;
+};
+
 /// Each runs one command to its end and returns an exit status; what went wrong stands on standard error in one line.
 int run_serve(const ServeOptions& options);
 /// Says whether `run_serve` could begin with them; they come from `file`.
@@ -115,6 +132,8 @@ int run_methods(bool as_json);
 int run_demo_scene(const DemoSceneFileOptions& options);
 int run_tradeoff(const TradeoffCommandOptions& options);
 int run_push(const PushOptions& options);
+int run_map(const MapOptions& options);
+int run_demo_frames(const DemoFramesOptions& options);
 int run_store_check(const std::filesystem::path& store);
 int run_store_salvage(const StoreSalvageOptions& options);
 

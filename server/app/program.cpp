@@ -236,6 +236,36 @@ void add_certificate(CLI::App& app, CertificateOptions& options, Run& run) {
   command->final_callback([&options, &run] { run = [&options] { return run_certificate(options); }; });
 }
 
+void add_map(CLI::App& app, MapOptions& options, Run& run) {
+  auto* command = app.add_subcommand("map", "Make a multispectral mesh of depth, colour and thermal frames");
+  command->add_option("frames", options.frames, "A folder with frames.txt, poses.txt and calibration.json")->required();
+  command->add_option("output", options.output, "The mesh to write, a PLY file")->required();
+  command->add_option("--voxel", options.voxel_m, "The size of a voxel in metres")
+      ->check(CLI::Range(0.001, 1.0))
+      ->capture_default_str();
+  command->add_option("--poses", options.poses, "A file of poses in place of the folder's (TUM)");
+  command->add_option("--vignetting", options.vignetting, "A PFM picture: kelvin to subtract from each thermal pixel");
+  command->add_option("--threads", options.thread_count, "Threads that map; 0 = one a processor")
+      ->check(CLI::Range(0, 1024));
+  command->final_callback([&options, &run] { run = [&options] { return run_map(options); }; });
+}
+
+void add_demo_frames(CLI::App& app, DemoFramesOptions& options, Run& run) {
+  auto* command = app.add_subcommand("demo-frames", "Write the frames of a simulated drive through the demo office");
+  command->add_option("folder", options.folder, "The folder to write them to")->required();
+  command->add_option("--seconds", options.seconds, "How long the drive takes")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Another number, another drive")->capture_default_str();
+  command->add_option("--pose-drift", options.pose_drift_m, "How far the told poses wander in a second, metres")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_option("--clock-offset", options.clock_offset_s, "Seconds by which the thermal camera's stamps are late")
+      ->check(CLI::Range(-1.0, 1.0))
+      ->capture_default_str();
+  command->final_callback([&options, &run] { run = [&options] { return run_demo_frames(options); }; });
+}
+
 void add_token(CLI::App& app, TokenOptions& options, Run& run) {
   auto* command = app.add_subcommand("token", "Make a token that a server lets in, or take one back");
   command->add_option("--file", options.file, "The file of the server's tokens; made when it is not there")->required();
@@ -315,6 +345,8 @@ int parse_and_run(int argc, const char* const* argv) {
   DemoSceneFileOptions demo_scene;
   TradeoffCommandOptions tradeoff;
   PushOptions push;
+  MapOptions map;
+  DemoFramesOptions demo_frames;
   TokenOptions token;
   CertificateOptions certificate;
   std::filesystem::path checked_store;
@@ -331,6 +363,8 @@ int parse_and_run(int argc, const char* const* argv) {
   add_demo_scene(app, demo_scene, run);
   add_tradeoff(app, tradeoff, run);
   add_push(app, push, run);
+  add_map(app, map, run);
+  add_demo_frames(app, demo_frames, run);
   add_store(app, checked_store, salvage, run);
   add_token(app, token, run);
   add_certificate(app, certificate, run);

@@ -1,0 +1,31 @@
+#include <algorithm>
+#include <string>
+#include <thread>
+
+#include "server/app/command_output.hpp"
+#include "server/app/commands.hpp"
+#include "server/app/interruption.hpp"
+#include "server/app/progress_line.hpp"
+#include "server/mapping/frame_folder_writer.hpp"
+#include "server/mapping/simulated_drive.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::server {
+
+int run_demo_frames(const DemoFramesOptions& options) {
+  const Interruption interruption;
+  ProgressLine line({{fusion::kModellingPhase, "modelling the demo office", 2},
+                     {fusion::kWritingPhase, "driving through it", options.seconds}});
+  mapping::DriveOptions drive_options;
+  drive_options.seconds = options.seconds;
+  drive_options.seed = options.seed;
+  drive_options.pose_drift_m = options.pose_drift_m;
+  drive_options.clock_offset_s = options.clock_offset_s;
+  const mapping::SimulatedDrive drive(drive_options, line.sink());
+  WorkerPool pool(std::max(2U, std::thread::hardware_concurrency()) - 1);
+  const auto written = mapping::write_drive(options.folder, drive, pool, line.sink());
+  line.end();
+  return written ? kDone : fail(written.error());
+}
+
+}  // namespace spectra::server

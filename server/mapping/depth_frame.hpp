@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/mapping/calibration.hpp"
+#include "server/mapping/picture_file.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::mapping {
+
+/// A depth picture made ready: metres, and how much each pixel is to be believed.
+struct DepthFrame {
+  int width = 0;
+  int height = 0;
+  std::vector<float> depth_m;  ///< One more than there are pixels; the last is 0.
+  std::vector<float> weight;   ///< The same; whole numbers, kWeightOne from near; 0: left out.
+  /// Of tiles of 16 x 16 pixels, row after row: the farthest pixel that counts; 0: none.
+  int tiles_across = 0, tiles_down = 0;
+  std::vector<float> farthest_m;
+  std::size_t counted = 0;  ///< Pixels that are not left out.
+
+  static constexpr int kTile = 16;
+};
+
+/// Directions of a camera's pixels with z = 1.
+struct RayTable {
+  explicit RayTable(const CameraModel& camera);
+  int width, height;
+  std::vector<float> x, y;
+};
+
+/// Weighs the pixels of a depth picture: (2 sigma_0 / sigma_z)^2 cos(angle to the surface), at most 1, with sigma of the sensor's noise. Left
+/// out are pixels within 2 of a jump of depth and those beside nothing (what a sensor says there lies between near and far), those seen
+/// at more than 80 degrees, and those whose noise is more than `truncation_m`.
+DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& calibration, const RayTable& rays,
+                          double truncation_m, server::WorkerPool& pool);
+
+}  // namespace spectra::mapping

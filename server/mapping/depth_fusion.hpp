@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "server/mapping/depth_frame.hpp"
+#include "server/mapping/voxel_map.hpp"
+
+namespace spectra::mapping {
+
+/// Distances count up to so many voxels before and behind a surface.
+inline constexpr double kTruncationVoxels = 4, kBehindVoxels = 3;
+
+/// A depth picture and where its camera was.
+struct DepthLook {
+  const DepthFrame& frame;
+  const CameraModel& camera;
+  const RayTable& rays;
+  const DepthNoise& noise;
+  Eigen::Isometry3d world_from_camera;
+};
+
+/// A colour picture and where its camera was.
+struct ColourLook {
+  const PictureRgb& picture;
+  const CameraModel& camera;
+  Eigen::Isometry3d world_from_camera;
+};
+
+/// Fuses a depth picture, and a colour picture if there is one, into truncated signed distances along the line of sight (Curless and
+/// Levoy, SIGGRAPH 1996). Blocks near what is seen are made; all others before it are cleared towards free. Returns the blocks that were
+/// looked at, in rising order. The same bytes for any number of threads.
+///
+/// A mean is kept as distance += (new - distance) w / (W + w), rounded to the nearest whole number but at least by one step towards the
+/// new value, so that it never stalls however heavy W is; W is at most kWeightMost.
+std::vector<std::int32_t> fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
+                                     server::WorkerPool& pool);
+
+/// How well a depth picture fits the map where a pose puts it: pixels of a grid where both have something.
+struct FitOfDepth {
+  std::size_t matching = 0;  ///< At the same distance, within the truncation.
+  std::size_t other = 0;
+};
+FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, server::WorkerPool& pool);
+
+}  // namespace spectra::mapping

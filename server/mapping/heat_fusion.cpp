@@ -1,0 +1,265 @@
+#include "server/mapping/heat_fusion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "server/mapping/surface_view.hpp"
+
+namespace spectra::mapping {
+namespace {
+
+constexpr float kKelvin = 273.15F;
+constexpr float kLeastCosine = 0.2588F;  ///< Of 75 degrees.
+constexpr float kPixelError = 0.7F;      ///< Of where a point falls in the picture, pixels.
+constexpr float kReflection = 0.95F;
+constexpr double kExposureSeconds = 0.010;  ///< A pixel of a microbolometer follows what it sees so slowly.
+constexpr double kAfterShutterSeconds = 0.3;
+constexpr float kAfterShutter = 10;      ///< Times the variance.
+constexpr float kNearAFold = 16;         ///< Times the variance.
+constexpr float kKnownVariance = 0.25F;  ///< K^2; what is known better tells the offset of a picture.
+constexpr float kContradiction = 25;     ///< Variances; a look that is farther off than that tells of a change.
+constexpr std::size_t kLeastCompared = 300;
+/// How an offset may have wandered when nothing tells it: at once, and as a random walk.
+constexpr double kUntoldKelvin = 0.3, kWanderKelvin = 0.05;
+
+/// A histogram of differences with whole weights: the same whatever the order in which it was filled.
+class Differences {
+ public:
+  void add(float difference, float weight) {
+    const double bin = std::floor((static_cast<double>(difference) + kReach) / kStep);
+    if (!(bin >= 0 && bin < static_cast<double>(kBins))) return;
+    bins_[static_cast<std::size_t>(bin)] += static_cast<std::uint64_t>(std::lround(std::min(1e6F, 64 * weight))) + 1;
+    ++count_;
+  }
+  void add(const Differences& other) {
+    for (std::size_t i = 0; i < kBins; ++i) bins_[i] += other.bins_[i];
+    count_ += other.count_;
+  }
+  std::size_t count() const { return count_; }
+
+  double quantile(double share) const {
+    const auto all = static_cast<double>(std::accumulate(bins_.begin(), bins_.end(), std::uint64_t{0}));
+    double below = 0;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      const auto here = static_cast<double>(bins_[i]);
+      if (below + here >= share * all && here > 0) {
+        return (static_cast<double>(i) + (share * all - below) / here) * kStep - kReach;
+      }
+      below += here;
+    }
+    return 0;
+  }
+
+ private:
+  static constexpr double kReach = 20, kStep = 0.01;
+  static constexpr std::size_t kBins = 4000;
+  std::vector<std::uint64_t> bins_ = std::vector<std::uint64_t>(kBins, 0);
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+/// What one picture says of one voxel.
+struct HeatFusion::Look {
+  std::int32_t block;
+  std::uint16_t voxel;
+  float celsius;
+  float scale;  ///< z^2 / cos and everything else that the variance is multiplied by.
+  float own;    ///< K^2, without the part that the whole picture has in common.
+};
+
+struct HeatFusion::Prepared {
+  std::vector<float> celsius;
+  std::vector<float> gradient;  ///< Kelvin a pixel.
+  float reflected = 0;
+};
+
+bool HeatFusion::is_frozen(const Picture16& picture) {
+  if (picture.pixels == last_picture_) return true;
+  last_picture_ = picture.pixels;
+  return false;
+}
+
+HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, server::WorkerPool& pool) const {
+  Prepared prepared;
+  const std::size_t count = picture.pixels.size();
+  const auto width = static_cast<std::size_t>(picture.width), height = static_cast<std::size_t>(picture.height);
+  prepared.celsius.resize(count);
+  prepared.gradient.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    prepared.celsius[i] = static_cast<float>(picture.pixels[i]) * 0.01F - kKelvin;
+    if (!vignetting_.empty()) prepared.celsius[i] -= vignetting_.pixels[i];
+  }
+  if (calibration_.reflected_celsius) {
+    prepared.reflected = static_cast<float>(*calibration_.reflected_celsius);
+  } else {
+    std::vector<float> sorted = prepared.celsius;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count / 2), sorted.end());
+    prepared.reflected = sorted[count / 2];
+  }
+  const auto emissivity = static_cast<float>(calibration_.emissivity);
+  const auto to_fourth = [](float celsius) {
+    const float kelvin = std::max(celsius + kKelvin, 1.0F);
+    return kelvin * kelvin * kelvin * kelvin;
+  };
+  const float reflected_power = (1 - emissivity) * to_fourth(prepared.reflected);
+  pool.for_each(height, [&](std::size_t y) {
+    if (emissivity < 1) {
+      for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
+        const float own = std::max(1.0F, (to_fourth(prepared.celsius[i]) - reflected_power) / emissivity);
+        prepared.celsius[i] = std::sqrt(std::sqrt(own)) - kKelvin;
+      }
+    }
+  });
+  pool.for_each(height, [&](std::size_t y) {
+    const std::size_t above = (y > 0 ? y - 1 : y) * width, below = (y + 1 < height ? y + 1 : y) * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t left = x > 0 ? x - 1 : x, right = x + 1 < width ? x + 1 : x;
+      const float dx = 0.5F * (prepared.celsius[y * width + right] - prepared.celsius[y * width + left]);
+      const float dy = 0.5F * (prepared.celsius[below + x] - prepared.celsius[above + x]);
+      prepared.gradient[y * width + x] = std::sqrt(dx * dx + dy * dy);
+    }
+  });
+  return prepared;
+}
+
+void HeatFusion::find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
+                             HeatReport& report) {
+  // What is known well tells it; where there is too little of that, whatever is known.
+  Differences well_known, known;
+  for (const auto& chunk : looks) {
+    for (const Look& look : chunk) {
+      if (map.head(look.block).heat < 0) continue;
+      const HeatBlock& heat = map.heat(look.block);
+      const float variance = heat.variance[look.voxel];
+      if (std::isinf(variance)) continue;
+      Differences& differences = variance < kKnownVariance ? well_known : known;
+      differences.add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+    }
+  }
+  const bool is_well_known = well_known.count() >= kLeastCompared;
+  if (!is_well_known) known.add(well_known);
+  const Differences& differences = is_well_known ? well_known : known;
+  report.compared = differences.count();
+  if (report.compared >= kLeastCompared) {
+    const double middle = differences.quantile(0.5);
+    const double spread = 0.7413 * (differences.quantile(0.75) - differences.quantile(0.25));
+    // Neighbouring voxels err together: about so many of them are one.
+    constexpr double kTogether = 100;
+    report.offset_kelvin = middle;
+    report.spread_kelvin = spread;
+    report.offset_sigma_kelvin = 0.01 + 1.25 * spread / std::sqrt(static_cast<double>(report.compared) / kTogether);
+  } else if (last_offset_s_) {
+    const double wander = kWanderKelvin * kWanderKelvin * (moment_s - *last_offset_s_) + kUntoldKelvin * kUntoldKelvin;
+    report.offset_kelvin = last_offset_kelvin_;
+    report.offset_sigma_kelvin = std::sqrt(last_offset_sigma_kelvin_ * last_offset_sigma_kelvin_ + wander);
+  }
+  // The first picture is the gauge of all.
+  last_offset_kelvin_ = report.offset_kelvin;
+  last_offset_sigma_kelvin_ = std::min(report.offset_sigma_kelvin, 3.0);
+  last_offset_s_ = moment_s;
+}
+
+HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseAnswer& camera, double moment_s,
+                            server::WorkerPool& pool) {
+  HeatReport report;
+  if (rules_.shutter && is_frozen(picture)) {
+    last_frozen_s_ = moment_s;
+    report.is_frozen = true;
+    return report;
+  }
+  const Prepared prepared = prepare(picture, pool);
+  const SurfaceView view = draw_surfaces(map, calibration_.camera, camera.pose, pool);
+  const Eigen::Vector3f linear =
+      (camera.pose.linear().transpose() * camera.linear_m_per_s * kExposureSeconds).cast<float>();
+  const Eigen::Vector3f angular =
+      (camera.pose.linear().transpose() * camera.angular_rad_per_s * kExposureSeconds).cast<float>();
+  const bool is_after_shutter = rules_.shutter && moment_s - last_frozen_s_ < kAfterShutterSeconds;
+  const auto noise = static_cast<float>(calibration_.netd_kelvin * calibration_.netd_kelvin);
+  const CameraModel& model = calibration_.camera;
+  const Lens lens(model);
+
+  constexpr std::size_t kChunk = 64;
+  std::vector<std::vector<Look>> looks((view.blocks.size() + kChunk - 1) / kChunk);
+  pool.for_each(looks.size(), [&](std::size_t chunk) {
+    const std::size_t end = std::min(view.blocks.size(), (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) {
+      for (const SurfaceVoxel& seen : view.blocks[i].voxels) {
+        const int x = static_cast<int>(std::floor(seen.u)), y = static_cast<int>(std::floor(seen.v));
+        if (x < 0 || y < 0 || x + 1 >= model.width || y + 1 >= model.height) continue;
+        if ((rules_.occlusion && !seen.is_reached) || (rules_.angle && seen.cosine < kLeastCosine)) continue;
+        const std::size_t pixel =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(model.width) + static_cast<std::size_t>(x);
+        if (rules_.edges && view.edges[pixel] == kNearJump) continue;
+        const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
+        const float* row = &prepared.celsius[pixel];
+        const float* next = row + model.width;
+        const float celsius = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
+        Look look{view.blocks[i].block, seen.voxel, celsius, 1, noise};
+        if (rules_.weights) {
+          const float z = seen.z_m, c = std::max(seen.cosine, 0.05F);
+          const float px = (seen.u - lens.cx) / lens.fx, py = (seen.v - lens.cy) / lens.fy;
+          // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
+          const Eigen::Vector3f point(px * z, py * z, z);
+          const Eigen::Vector3f moved = -(linear + angular.cross(point));
+          const float du = lens.fx * (moved.x() - px * moved.z()) / z, dv = lens.fy * (moved.y() - py * moved.z()) / z;
+          const float uncertain = kPixelError * prepared.gradient[pixel];
+          const float askew = (1 - c) * (1 - c);
+          const float reflected = kReflection * askew * askew * (1 - c) * (celsius - prepared.reflected);
+          look.own = noise + uncertain * uncertain + reflected * reflected;
+          look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F) *
+                       (rules_.edges && view.edges[pixel] == kNearFold ? kNearAFold : 1.0F);
+        }
+        looks[chunk].push_back(look);
+      }
+    }
+  });
+
+  if (rules_.frame_offset) find_offset(map, looks, moment_s, report);
+  const auto offset = static_cast<float>(report.offset_kelvin);
+  const auto common = static_cast<float>(report.offset_sigma_kelvin * report.offset_sigma_kelvin);
+  const auto spread = static_cast<float>(report.spread_kelvin * report.spread_kelvin);
+  for (const auto& chunk : looks) {
+    report.observed += chunk.size();
+    for (const Look& look : chunk) map.add_heat(look.block);
+  }
+  const auto process = static_cast<float>(rules_.process_kelvin * rules_.process_kelvin);
+  const auto correlation = static_cast<float>(rules_.correlation_s);
+  const auto now = static_cast<float>(moment_s);
+  const float trusted =
+      report.spread_kelvin > 0 ? static_cast<float>(rules_.trusted_gap_s) : std::numeric_limits<float>::infinity();
+  pool.for_each(looks.size(), [&](std::size_t chunk) {
+    for (const Look& look : looks[chunk]) {
+      HeatBlock& heat = map.heat(look.block);
+      float& celsius = heat.celsius[look.voxel];
+      float& variance = heat.variance[look.voxel];
+      const float seen = look.celsius - offset;
+      float r = look.scale * (look.own + (rules_.weights ? common : 0));
+      const float before = celsius;
+      if (std::isinf(variance)) {
+        celsius = seen;
+        variance = r;
+        map.head(look.block).warmed = 1e3F;
+      } else {
+        const float elapsed = std::max(0.0F, now - heat.seen_s[look.voxel]);
+        if (elapsed < correlation) r *= correlation / std::max(elapsed, 1e-3F);
+        float predicted = variance + process * std::min(elapsed, trusted);
+        const float innovation = seen - celsius;
+        if (innovation * innovation > kContradiction * (predicted + r + spread))
+          predicted = variance + process * elapsed;
+        const float gain = predicted / (predicted + r);
+        celsius += gain * innovation;
+        variance = (1 - gain) * predicted;
+        BlockHead& head = map.head(look.block);
+        head.warmed = std::max(head.warmed, std::abs(celsius - before));
+      }
+      heat.seen_s[look.voxel] = now;
+    }
+  });
+  return report;
+}
+
+}  // namespace spectra::mapping

@@ -1,0 +1,60 @@
+#include "server/mapping/map_ply.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include "fusion/mesh/output_file.hpp"
+#include "fusion/mesh/ply_encoder.hpp"
+
+namespace spectra::mapping {
+namespace {
+
+fusion::PlyLayout layout_of(const UnitMesh& mesh) {
+  fusion::PlyLayout layout;
+  layout.vertex_count = mesh.positions.size();
+  layout.triangle_count = mesh.triangles.size();
+  layout.has_temperature =
+      std::any_of(mesh.celsius.begin(), mesh.celsius.end(), [](float t) { return !std::isnan(t); });
+  return layout;
+}
+
+}  // namespace
+
+fusion::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
+                                   const fusion::Progress& progress) {
+  fusion::PlyLayout layout = layout_of(mesh);
+  layout.has_confidence = layout.has_temperature;
+  layout.comment = "positions in metres";
+  BOOST_OUTCOME_TRY(auto out, fusion::OutputFile::create(file));
+  fusion::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
+  constexpr std::size_t kStep = 65'536;
+  const std::size_t vertices = mesh.positions.size();
+  std::vector<double> seen;
+  for (std::size_t first = 0; first < vertices; first += kStep) {
+    const std::size_t count = std::min(kStep, vertices - first);
+    const auto part = [&](const auto& values) { return std::span(values).subspan(first, count); };
+    seen.clear();
+    for (const float s : part(mesh.seen_s)) seen.push_back(begin_s + static_cast<double>(s));
+    BOOST_OUTCOME_TRYV(encoder.vertices(part(mesh.positions), part(mesh.colours), part(mesh.celsius),
+                                        {part(mesh.sigma_kelvin), seen}));
+    fusion::report(progress, fusion::kWritingPhase, 0.6 * static_cast<double>(first) / static_cast<double>(vertices));
+  }
+  BOOST_OUTCOME_TRYV(encoder.triangles(mesh.triangles));
+  BOOST_OUTCOME_TRYV(encoder.finish());
+  return out.commit();
+}
+
+std::string block_ply(const UnitMesh& mesh) {
+  std::string text;
+  fusion::PlyEncoder encoder(layout_of(mesh), [&text](std::span<const std::byte> bytes) -> fusion::Result<void> {
+    text.append(std::bit_cast<const char*>(bytes.data()), bytes.size());
+    return fusion::success();
+  });
+  const bool is_whole = encoder.vertices(mesh.positions, mesh.colours, mesh.celsius) &&
+                        encoder.triangles(mesh.triangles) && encoder.finish();
+  return is_whole ? text : std::string();
+}
+
+}  // namespace spectra::mapping

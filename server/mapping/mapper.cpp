@@ -1,0 +1,134 @@
+#include "server/mapping/mapper.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "server/mapping/depth_fusion.hpp"
+
+namespace spectra::mapping {
+namespace {
+
+constexpr std::size_t kLeastEvidence = 200;  ///< Pixels of fit_of that match.
+constexpr double kLeastFit = 0.5;            ///< Of those where both have something.
+
+std::string seconds_text(double seconds) {
+  std::string text = std::to_string(seconds);
+  return text.substr(0, text.size() - 3) + " s";
+}
+
+/// The pose and motion of a camera that is rigidly beside another.
+PoseAnswer beside(const PoseAnswer& depth, const Eigen::Isometry3d& from_depth) {
+  PoseAnswer other = depth;
+  other.pose = depth.pose * from_depth.inverse();
+  other.linear_m_per_s += depth.angular_rad_per_s.cross(other.pose.translation() - depth.pose.translation());
+  return other;
+}
+
+}  // namespace
+
+Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, server::WorkerPool& pool)
+    : calibration_(calibration),
+      settings_(settings),
+      pool_(pool),
+      rays_(calibration.depth.camera),
+      map_(settings.voxel_m) {
+  if (calibration.thermal && settings.use_thermal) heat_.emplace(*calibration.thermal, settings.heat);
+}
+
+fusion::Result<void> Mapper::set_vignetting(PictureFloat picture) {
+  const CameraModel* camera = calibration_.thermal ? &calibration_.thermal->camera : nullptr;
+  if (camera == nullptr || picture.width != camera->width || picture.height != camera->height) {
+    return fusion::failure(fusion::ErrorCode::Inconsistent,
+                           "the vignetting picture is not of the size of the thermal camera in calibration.json");
+  }
+  if (heat_) heat_->set_vignetting(std::move(picture));
+  return fusion::success();
+}
+
+void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+  if (!begin_s_) begin_s_ = frame.time_s;
+  if (!frame.depth.empty() && !fuse_surface(frame, trajectory, faults)) return;
+  if (!frame.thermal.empty() && heat_) fuse_heat(frame, trajectory, faults);
+}
+
+bool Mapper::find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults) {
+  answer = trajectory.at(time_s);
+  if (answer.state == PoseState::Unknown) {
+    faults.add(FaultKind::NoPose, "at " + seconds_text(time_s) + " no pose is known within 100 ms");
+    return false;
+  }
+  if (answer.state == PoseState::Jumping || answer.jumps_before > jumps_seen_) {
+    faults.add(FaultKind::JumpingPose, "at " + seconds_text(time_s) + " the poses jump faster than anything moves");
+    jumps_seen_ = std::max(jumps_seen_, answer.jumps_before);
+    is_doubtful_ = true;
+  }
+  return answer.state == PoseState::Known;
+}
+
+bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+  PoseAnswer pose;
+  if (!find_pose(trajectory, frame.time_s + calibration_.depth.delay_s, pose, faults)) return false;
+  const DepthFrame depth =
+      prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
+  const DepthLook look{depth, calibration_.depth.camera, rays_, calibration_.depth.noise, pose.pose};
+  if (is_doubtful_ && map_.block_count() > 0) {
+    const FitOfDepth fit = fit_of(map_, look, pool_);
+    const auto both = static_cast<double>(fit.matching + fit.other);
+    if (fit.matching < kLeastEvidence || static_cast<double>(fit.matching) < kLeastFit * both) {
+      faults.add(FaultKind::UnfittingPose,
+                 "at " + seconds_text(frame.time_s) +
+                     " the picture does not fit the map where the pose puts it, after poses have jumped");
+      return false;
+    }
+    is_doubtful_ = false;
+  }
+  std::optional<ColourLook> colour;
+  if (!frame.colour.empty() && settings_.use_colour) {
+    const PoseAnswer at = trajectory.at(frame.time_s + calibration_.colour->delay_s);
+    if (at.state == PoseState::Known) {
+      colour.emplace(
+          ColourLook{frame.colour, calibration_.colour->camera, at.pose * calibration_.colour->from_depth.inverse()});
+      ++figures_.colour_frames;
+    }
+  }
+  fuse_depth(map_, look, colour ? &*colour : nullptr, pool_);
+  ++figures_.depth_frames;
+  return true;
+}
+
+void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+  PoseAnswer pose;
+  const double moment = frame.time_s + calibration_.thermal->delay_s;
+  if (!find_pose(trajectory, moment, pose, faults) || is_doubtful_) return;
+  const HeatReport report =
+      heat_->fuse(map_, frame.thermal, beside(pose, calibration_.thermal->from_depth), moment - *begin_s_, pool_);
+  ++(report.is_frozen ? figures_.frozen_frames : figures_.thermal_frames);
+  if (report.spread_kelvin > 0) {
+    const auto at = std::upper_bound(spreads_kelvin_.begin(), spreads_kelvin_.end(), report.spread_kelvin);
+    spreads_kelvin_.insert(at, report.spread_kelvin);
+    figures_.spread_kelvin = spreads_kelvin_[spreads_kelvin_.size() / 2];
+  }
+  figures_.largest_offset_kelvin = std::max(figures_.largest_offset_kelvin, std::abs(report.offset_kelvin));
+}
+
+UnitMesh Mapper::whole_mesh(const fusion::Progress& progress) const {
+  std::vector<UnitMesh> units(map_.units().size());
+  MeshRules rules = settings_.mesh;
+  rules.least_sigma_kelvin =
+      std::max(rules.least_sigma_kelvin, static_cast<float>(kSystematic * figures_.spread_kelvin));
+  std::size_t done = 0;
+  constexpr std::size_t kGroup = 64;
+  while (done < units.size()) {
+    const std::size_t count = std::min(kGroup, units.size() - done);
+    pool_.for_each(count, [&](std::size_t i) {
+      units[done + i] = mesh_of_unit(map_, static_cast<std::int32_t>(done + i), rules);
+    });
+    done += count;
+    fusion::report(progress, kMeshingPhase, static_cast<double>(done) / static_cast<double>(units.size()));
+  }
+  return joined(units);
+}
+
+}  // namespace spectra::mapping

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "fusion/error.hpp"
+#include "fusion/progress.hpp"
+#include "server/mapping/calibration.hpp"
+#include "server/mapping/depth_frame.hpp"
+#include "server/mapping/frame_folder.hpp"
+#include "server/mapping/heat_fusion.hpp"
+#include "server/mapping/surface_mesh.hpp"
+#include "server/mapping/voxel_map.hpp"
+
+namespace spectra::mapping {
+
+struct MapperSettings {
+  double voxel_m = 0.01;
+  bool use_colour = true;
+  bool use_thermal = true;
+  HeatRules heat;
+  MeshRules mesh;
+};
+
+/// What a mapper has done so far.
+struct MapperFigures {
+  std::size_t depth_frames = 0, colour_frames = 0, thermal_frames = 0;  ///< That were fused.
+  std::size_t frozen_frames = 0;                                        ///< Thermal pictures of a closed shutter.
+  double spread_kelvin = 0;          ///< Median over the thermal pictures: what they differ from what was known.
+  double largest_offset_kelvin = 0;  ///< Of a thermal picture, in amount.
+};
+
+/// Makes a map of frames whose poses are known. For one thread; uses a pool inside.
+class Mapper {
+ public:
+  Mapper(const Calibration& calibration, const MapperSettings& settings, server::WorkerPool& pool);
+
+  /// Kelvin to subtract from each thermal pixel. Inconsistent when it is not of the camera's size.
+  fusion::Result<void> set_vignetting(PictureFloat picture);
+
+  /// Fuses what of a frame has a pose; frames in order of their time. What cannot be fused is left out and stands in `faults`.
+  void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+
+  /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
+  /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
+  UnitMesh whole_mesh(const fusion::Progress& progress = {}) const;
+  static constexpr double kSystematic = 0.7;
+  static constexpr std::string_view kMeshingPhase = "meshing";
+
+  const VoxelMap& map() const { return map_; }
+  const MapperFigures& figures() const { return figures_; }
+  /// The time of the first frame, which seen_s counts from.
+  double begin_s() const { return begin_s_.value_or(0); }
+
+ private:
+  /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
+  bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
+  bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+  void fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+
+  const Calibration calibration_;
+  const MapperSettings settings_;
+  server::WorkerPool& pool_;
+  const RayTable rays_;
+  VoxelMap map_;
+  std::optional<HeatFusion> heat_;
+  std::optional<double> begin_s_;
+  std::vector<double> spreads_kelvin_;  ///< Of the thermal pictures about what was known.
+  std::size_t jumps_seen_ = 0;
+  bool is_doubtful_ = false;  ///< Poses have jumped, and none has been found to fit since.
+  MapperFigures figures_;
+};
+
+}  // namespace spectra::mapping

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "server/mapping/camera.hpp"
+#include "server/mapping/voxel_map.hpp"
+#include "server/scene/worker_pool.hpp"
+
+namespace spectra::mapping {
+
+/// A voxel beside a surface as a camera sees it.
+struct SurfaceVoxel {
+  std::uint16_t voxel = 0;
+  bool is_reached = false;  ///< Nothing of the map lies before it.
+  float u = 0, v = 0;       ///< Where its place on the surface falls in the picture, pixels.
+  float z_m = 0;
+  float cosine = 0;  ///< Between the line of sight and the surface's normal.
+};
+
+/// The voxels beside surfaces of one block.
+struct SurfaceBlock {
+  std::int32_t block = -1;
+  std::vector<SurfaceVoxel> voxels;
+};
+
+/// What a pixel is near to.
+inline constexpr std::uint8_t kNearFold = 1, kNearJump = 2;
+
+/// The surfaces of the map as a camera sees them: drawn as squares as large as voxels into a picture of depth, in which those that lie
+/// behind others are told.
+struct SurfaceView {
+  std::vector<SurfaceBlock> blocks;  ///< In rising order; voxels that look away from the camera are left out.
+  std::vector<float> depth_m;        ///< A pixel each; infinite where the map has nothing.
+  /// Within 3 pixels of a jump of depth, or of where the map has nothing; or else of a fold, which may be a small jump.
+  std::vector<std::uint8_t> edges;
+};
+
+/// Draws the map at a pose. The same for any number of threads.
+SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const Eigen::Isometry3d& world_from_camera,
+                          server::WorkerPool& pool);
+
+}  // namespace spectra::mapping

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "fusion/error.hpp"
+
+namespace spectra::mapping {
+
+/// What is known of where the cameras were at a moment.
+enum class PoseState {
+  Known,
+  Unknown,  ///< Before the first pose, after the last, or in a gap of more than 100 ms.
+  Jumping,  ///< The poses around it would need an impossible motion.
+};
+
+struct PoseAnswer {
+  PoseState state = PoseState::Unknown;
+  std::size_t jumps_before =
+      0;  ///< Impossible motions between poses at most 100 ms apart, from the beginning up to here.
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  Eigen::Vector3d linear_m_per_s = Eigen::Vector3d::Zero();  ///< In the world.
+  Eigen::Vector3d angular_rad_per_s =
+      Eigen::Vector3d::Zero();  ///< In the world; both 0 where neighbours are too far away in time.
+};
+
+/// Lines that were left out of a trajectory, by reason.
+struct TrajectoryNotes {
+  std::size_t unreadable = 0;  ///< Not eight finite numbers, or no rotation.
+  std::size_t backwards = 0;   ///< Not later than the line before.
+};
+
+/// Poses in the order of their time.
+class Trajectory {
+ public:
+  static constexpr double kMaxGapSeconds = 0.1;
+  static constexpr double kMaxMetresPerSecond = 5;
+  static constexpr double kMaxRadiansPerSecond = 12;
+
+  /// Lines of `timestamp tx ty tz qx qy qz qw`, as the RGB-D benchmark of TUM has them (Sturm et al., IROS 2012); # begins a comment.
+  /// What is no pose is left out and counted. Fails when nothing is left.
+  static fusion::Result<Trajectory> read(const std::filesystem::path& file);
+  static Trajectory from_text(const std::string& text);
+
+  void add(double time_s, const Eigen::Isometry3d& pose);
+  /// Poses of another camera, or from the world to it, become those of the camera that `camera_from_own` leads to.
+  void change_to(bool is_world_to_camera, const Eigen::Isometry3d& camera_from_own);
+
+  /// The pose at a moment: the rotation by slerp, the translation linearly, between neighbours at most 100 ms apart; or that of a
+  /// pose of exactly this moment, within a microsecond.
+  PoseAnswer at(double time_s) const;
+
+  std::size_t size() const { return times_.size(); }
+  double begin_s() const { return times_.front(); }
+  double end_s() const { return times_.back(); }
+  const TrajectoryNotes& notes() const { return notes_; }
+
+ private:
+  bool is_near(std::size_t first) const;  ///< Pose `first` and the next are at most the gap apart.
+  bool is_jump(std::size_t first) const;
+  void set_speed(std::size_t first, std::size_t last, PoseAnswer& answer) const;
+
+  std::vector<double> times_;
+  std::vector<Eigen::Isometry3d> poses_;
+  std::vector<std::size_t> jumps_;  ///< Up to each pose.
+  TrajectoryNotes notes_;
+};
+
+}  // namespace spectra::mapping

@@ -1,0 +1,92 @@
+// The map of a simulated drive against the truth, and what a frame takes.
+//
+//   drive_bench [--seconds S] [--seed N] [--voxel M] [--vertices N] [--rules] [--check]
+//
+// --rules: the same without each of the rules of the thermal model. --check: ends with status 1 when the map is far from the truth.
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "comparison.hpp"
+#include "server/mapping/mapper.hpp"
+#include "server/mapping/simulated_drive.hpp"
+
+using namespace spectra;
+using namespace spectra::mapping;
+
+int main(int argc, char** argv) {
+  DriveOptions options;
+  double voxel_m = 0.01;
+  bool with_rules = false, is_checked = false, is_good = true;
+  for (int i = 1; i < argc; ++i) {
+    const auto is = [&](const char* name) { return std::strcmp(argv[i], name) == 0 && i + 1 < argc; };
+    if (is("--seconds"))
+      options.seconds = std::atof(argv[++i]);
+    else if (is("--seed"))
+      options.seed = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    else if (is("--voxel"))
+      voxel_m = std::atof(argv[++i]);
+    else if (is("--vertices"))
+      options.vertex_count = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    else if (std::strcmp(argv[i], "--check") == 0)
+      is_checked = true;
+    else if (std::strcmp(argv[i], "--rules") == 0)
+      with_rules = true;
+  }
+  const SimulatedDrive drive(options);
+  server::WorkerPool pool(1);
+  std::vector<Frame> frames(drive.frame_count());
+  pool.for_each(frames.size(), [&](std::size_t i) { frames[i] = drive.frame(i); });
+
+  const auto run = [&](const char* name, const std::function<void(MapperSettings&)>& change) {
+    MapperSettings settings;
+    settings.voxel_m = voxel_m;
+    change(settings);
+    Mapper mapper(drive.calibration(), settings, pool);
+    FaultLog faults;
+    std::vector<double> depth_ms, heat_ms;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      mapper.fuse(frames[i], drive.trajectory(), faults);
+      (drive.is_thermal(i) ? heat_ms : depth_ms)
+          .push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    const UnitMesh mesh = mapper.whole_mesh();
+    const double mesh_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    const Comparison found = compare(mesh, drive.truth());
+    print(name, found);
+    is_good = is_good && found.vertices > 10'000 && found.temperatures > found.vertices / 3 &&
+              found.surface_median_m < 0.008 && found.surface_beyond_50mm < 0.02 && found.heat_mean_error < 0.5 &&
+              found.within_two_sigma > 0.8;
+    std::printf(
+        "  depth+colour %.1f ms (p95 %.1f), heat %.1f ms (p95 %.1f), whole mesh %.0f ms, %.1f bytes a voxel, %zu "
+        "blocks\n",
+        quantile(depth_ms, 0.5), quantile(depth_ms, 0.95), quantile(heat_ms, 0.5), quantile(heat_ms, 0.95), mesh_ms,
+        static_cast<double>(mapper.map().size_bytes()) / static_cast<double>(mapper.map().block_count() * kBlockVoxels),
+        mapper.map().block_count());
+    for (const FrameFault& fault : faults.all()) {
+      if (fault.count > 0) std::printf("  %s (%zu times)\n", fault.what.c_str(), fault.count);
+    }
+  };
+  print_head();
+  run("all", [](MapperSettings&) {});
+  if (!with_rules) return is_checked && !is_good ? 1 : 0;
+  run("plain mean", [](MapperSettings& s) {
+    HeatRules& r = s.heat;
+    r.occlusion = r.edges = r.angle = r.weights = r.frame_offset = r.shutter = false;
+    r.process_kelvin = r.correlation_s = 0;
+  });
+  run("without occlusion", [](MapperSettings& s) { s.heat.occlusion = false; });
+  run("without edges", [](MapperSettings& s) { s.heat.edges = false; });
+  run("without angle", [](MapperSettings& s) { s.heat.angle = false; });
+  run("without weights", [](MapperSettings& s) { s.heat.weights = false; });
+  run("without offset", [](MapperSettings& s) { s.heat.frame_offset = false; });
+  run("without shutter", [](MapperSettings& s) { s.heat.shutter = false; });
+  run("without correlation", [](MapperSettings& s) { s.heat.correlation_s = 0; });
+  return 0;
+}
