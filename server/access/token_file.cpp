@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "server/access/private_file.hpp"
@@ -70,16 +71,22 @@ AccessResult<TokenList> read_tokens(const std::filesystem::path& file) {
   }
   std::ifstream in(file);
   if (!in) return system_error(file, "");
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad()) return system_error(file, "");
+  auto list = parsed_tokens(text);
+  if (const auto* problem = std::get_if<std::string>(&list)) return file.string() + *problem;
+  return list;
+}
+
+AccessResult<TokenList> parsed_tokens(const std::string& text) {
   TokenList list;
+  std::istringstream in(text);
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
-    if (const auto problem = take_line(list, line)) {
-      return file.string() + ", line " + std::to_string(number) + ": " + *problem;
-    }
+    if (const auto problem = take_line(list, line)) return ", line " + std::to_string(number) + ": " + *problem;
   }
-  if (in.bad()) return system_error(file, "");
-  if (list.tokens.empty()) return file.string() + ": there is no token in it; `spectra token` makes one";
-  if (list.secret.empty()) return file.string() + ": the line with the secret is missing; `spectra token` writes it";
+  if (list.tokens.empty()) return std::string(": there is no token in it; `spectra token` makes one");
+  if (list.secret.empty()) return std::string(": the line with the secret is missing; `spectra token` writes it");
   return list;
 }
 

@@ -34,6 +34,8 @@ bool is_token_name(std::string_view name);
 /// Reads a file: lines `secret TEXT` (one) and `ROLE NAME DIGEST`, empty ones and ones that begin with #. Wrong is a file that cannot be
 /// read, one that everybody on the machine may read, and any line that is none of these.
 AccessResult<TokenList> read_tokens(const std::filesystem::path& file);
+/// The text of one. What is wrong begins with its place, to be put behind a name.
+AccessResult<TokenList> parsed_tokens(const std::string& text);
 /// Writes it so that only its owner can read it; the old one stays until the new one is whole.
 std::optional<std::string> write_tokens(const std::filesystem::path& file, const TokenList& list);
 

@@ -18,6 +18,7 @@
 #include "protocol/jsonrpc.hpp"
 #include "server/net/request_right.hpp"
 #include "server/net/request_target.hpp"
+#include "server/net/websocket_setup.hpp"
 
 namespace spectra::server {
 namespace asio = boost::asio;
@@ -49,19 +50,13 @@ asio::awaitable<void> IngestSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
   const auto self = shared_from_this();
   beast::get_lowest_layer(ws_).expires_never();
-  websocket::stream_base::timeout timeouts{};
-  timeouts.handshake_timeout = context_.options.limits.header_timeout;
-  timeouts.idle_timeout = websocket::stream_base::none();
-  timeouts.keep_alive_pings = false;
-  ws_.set_option(timeouts);
-  ws_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
-    response.set(beast::http::field::sec_websocket_protocol, protocol::kIngestProtocol);
-    response.set(beast::http::field::server, "Spectra");
-  }));
-  ws_.read_message_max(0);  // a message is read in parts, for which there is room
-  ws_.auto_fragment(false);
+  // A message is read in parts, for which there is room.
+  set_up_websocket(ws_, context_.options.limits.header_timeout, protocol::kIngestProtocol, 0);
   ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
     if (kind == websocket::frame_type::pong) pings_.answered({payload.data(), payload.size()}, Clock::now());
+    if (kind != websocket::frame_type::close || !has_unknown_close(ws_) || closing_) return;
+    closing_.emplace(websocket::close_code::protocol_error);
+    ws_.async_close(*closing_, [self = shared_from_this()](const error_code&) {});
   });
 
   const auto [accept_error] = co_await ws_.async_accept(request, kAwait);

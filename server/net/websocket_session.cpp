@@ -13,9 +13,9 @@
 #include <exception>
 #include <utility>
 
-#include "server/net/steady_seconds.hpp"
-
 #include "server/net/request_right.hpp"
+#include "server/net/steady_seconds.hpp"
+#include "server/net/websocket_setup.hpp"
 
 namespace spectra::server {
 namespace asio = boost::asio;
@@ -42,18 +42,7 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   const auto self = shared_from_this();
   const NetLimits& limits = context_.options.limits;
   beast::get_lowest_layer(ws_).expires_never();
-  // Beast's own idle timeout takes a slow reader for a dead one; mind_deadlines() watches progress instead.
-  websocket::stream_base::timeout timeouts{};
-  timeouts.handshake_timeout = limits.header_timeout;
-  timeouts.idle_timeout = websocket::stream_base::none();
-  timeouts.keep_alive_pings = false;
-  ws_.set_option(timeouts);
-  ws_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
-    response.set(beast::http::field::sec_websocket_protocol, "spectra.v1");
-    response.set(beast::http::field::server, "Spectra");
-  }));
-  ws_.read_message_max(limits.message_size_bytes);
-  ws_.auto_fragment(false);
+  set_up_websocket(ws_, limits.header_timeout, "spectra.v1", limits.message_size_bytes);
   ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
     if (kind == websocket::frame_type::close) refuse_unknown_close();
     if (kind != websocket::frame_type::pong) return;
@@ -209,9 +198,8 @@ asio::awaitable<void> WebSocketSession::ping(std::string payload) {
 }
 
 void WebSocketSession::refuse_unknown_close() {
-  constexpr std::uint16_t kLastCode = 4999;
-  if (ws_.reason().code <= kLastCode || closing_) return;
-  // Beast would send it back, but not beside a close that has begun.
+  // Not beside a close that has begun.
+  if (!has_unknown_close(ws_) || closing_) return;
   closing_.emplace(websocket::close_code::protocol_error);
   ws_.async_close(*closing_, [self = shared_from_this()](const error_code&) {});
 }

@@ -1,0 +1,35 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <set>
+#include <string>
+#include <variant>
+
+#include "server/access/token_file.hpp"
+
+namespace {
+
+using namespace spectra::server;
+
+void check(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// Names are names and nobody's twice; what is wrong is said.
+void pass(const AccessResult<TokenList>& read) {
+  if (const auto* problem = std::get_if<std::string>(&read)) return check(!problem->empty());
+  const auto& list = std::get<TokenList>(read);
+  check(!list.tokens.empty() && list.secret.size() >= 32);
+  std::set<std::string> names;
+  for (const AccessToken& token : list.tokens) check(is_token_name(token.name) && names.insert(token.name).second);
+}
+
+}  // namespace
+
+/// Any text as a file of tokens, and as tokens in the environment.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  pass(parsed_tokens(text));
+  pass(tokens_of_text(text));
+  return 0;
+}
