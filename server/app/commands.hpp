@@ -9,6 +9,7 @@
 #include "fusion/mesh/read_options.hpp"
 #include "protocol/draco_file.hpp"
 #include "server/access/role.hpp"
+#include "server/app/log_setup.hpp"
 #include "server/app/settings_text.hpp"
 #include "server/net/net_options.hpp"
 #include "server/store/block_store.hpp"
@@ -32,6 +33,7 @@ struct ServeOptions {
   std::optional<std::filesystem::path> tokens;            ///< Whom to let in; absent: what the environment says.
   std::optional<std::filesystem::path> certificate, key;  ///< PEM; both: connections are encrypted.
   NetLimits limits;
+  LogOptions log;
   bool is_insecure = false;           ///< Others are let in without a token.
   std::optional<AccessRole> invited;  ///< Print a link that lets one browser in.
   bool is_fused_only = false;         ///< Viewers get no raw layers.

@@ -108,6 +108,16 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
       ->add_option_function<std::vector<std::string>>(
           "--limit", set_limits, "Another bound, NAME=VALUE (may be repeated); docs/limits.md has all of them")
       ->allow_extra_args(false);
+  command->add_option("--log-format", options.log.format, "Of the log: text, or json with an object in each line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  command
+      ->add_option("--log-level", options.log.level,
+                   "What is logged: debug, info, warning or error, and what is graver")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
+      ->capture_default_str();
+  command->add_option("--log-file", options.log.file,
+                      "Log to this file instead of standard error; at 10 MB it is begun anew, and five are kept");
   const auto set_invited = [&options](const std::string& role) {
     options.invited = access_role(role);
     if (!options.invited) throw CLI::ValidationError("--invite " + role, "viewer, operator, ingest or admin is wanted");

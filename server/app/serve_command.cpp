@@ -1,4 +1,3 @@
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -19,6 +18,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/http_api.hpp"
 #include "server/app/invitation.hpp"
+#include "server/app/log_setup.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/serve_setup.hpp"
@@ -35,15 +35,6 @@ namespace {
 /// From the last connection to the end of the program.
 constexpr std::chrono::milliseconds kLongestEnd{250};
 constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
-
-/// Standard error, where the line of progress makes way.
-class LogSink final : public spdlog::sinks::stderr_color_sink_mt {
- public:
-  void log(const spdlog::details::log_msg& message) override {
-    ProgressLine::make_way();
-    spdlog::sinks::stderr_color_sink_mt::log(message);
-  }
-};
 
 /// Every viewer needs a descriptor, and the usual limit of 1024 is only a default.
 void raise_descriptor_limit() {
@@ -151,8 +142,7 @@ class SceneLoader {
 }  // namespace
 
 int run_serve(const ServeOptions& options) {
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("spectra", std::make_shared<LogSink>()));
-  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
+  if (const auto problem = set_up_log(options.log)) return fail(kJobFailed, *problem);
   auto looked = serve_setup(options);
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
   auto& setup = std::get<ServeSetup>(looked);
