@@ -1,6 +1,7 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vitest/config';
 import { fusionModule } from './scripts/fusion_module';
+import { licences, shippedPackages } from './scripts/licences';
 import { leanThree } from './scripts/lean_three';
 import { precompressed } from './scripts/precompressed';
 import { programPreload } from './scripts/program_preload';
@@ -8,7 +9,7 @@ import { programPreload } from './scripts/program_preload';
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [leanThree(), fusionModule(), svelte(), programPreload(), precompressed()],
+  plugins: [leanThree(), fusionModule(), svelte(), programPreload(), precompressed(), shippedPackages(), licences()],
   base: './',
   // One style sheet and plain imports: the page itself says what is to be loaded early.
   build: {
@@ -19,7 +20,7 @@ export default defineConfig({
     modulePreload: false,
     minify: 'terser',
   },
-  worker: { format: 'es', plugins: () => [leanThree()] },
+  worker: { format: 'es', plugins: () => [leanThree(), shippedPackages()] },
   // By number: a machine without /etc/hosts does not know "localhost".
   server: {
     host: '127.0.0.1',

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "fusion/mesh/read_options.hpp"
@@ -126,6 +127,9 @@ struct DemoFramesOptions {
 int run_serve(const ServeOptions& options);
 /// Says whether `run_serve` could begin with them; they come from `file`.
 int run_check_config(const std::filesystem::path& file, const ServeOptions& options);
+/// Prints a page on what this machine can do and what would keep `run_serve` from working; `read` are the options in `file`, or why they cannot
+/// be read.
+int run_doctor(const std::optional<std::filesystem::path>& file, const std::variant<ServeOptions, std::string>& read);
 int run_token(const TokenOptions& options);
 int run_certificate(const CertificateOptions& options);
 int run_fuse(const FuseOptions& options);

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <functional>
 #include <new>
+#include <optional>
 #include <string>
+#include <variant>
 
 #include "fusion/mesh/demo_scene.hpp"
 #include "server/app/command_output.hpp"
@@ -341,6 +343,22 @@ void add_check_config(CLI::App& app, std::filesystem::path& file, Run& run) {
   });
 }
 
+void add_doctor(CLI::App& app, std::optional<std::filesystem::path>& file, Run& run) {
+  auto* command = app.add_subcommand("doctor", "Say what this machine can do, and what would keep serve from working");
+  command->add_option("--config", file, "The config file that serve is to be started with");
+  command->final_callback([&file, &run] {
+    run = [&file] {
+      std::variant<ServeOptions, std::string> read;
+      try {
+        if (file) read = options_of_file(*file);
+      } catch (const CLI::ParseError& error) {
+        read = std::string(error.what());
+      }
+      return run_doctor(file, read);
+    };
+  });
+}
+
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
   app.set_version_flag("--version", "spectra " + std::string(kVersion));
@@ -361,12 +379,14 @@ int parse_and_run(int argc, const char* const* argv) {
   CertificateOptions certificate;
   std::filesystem::path checked_store;
   std::filesystem::path checked_config;
+  std::optional<std::filesystem::path> examined_config;
   StoreSalvageOptions salvage;
   Run run;
   bool is_demo = false;  // what is served without a scene anyway
   add_serve(app, serve, is_demo, run);
   add_config_file(app, *app.get_subcommand("serve"));
   add_check_config(app, checked_config, run);
+  add_doctor(app, examined_config, run);
   add_fuse(app, fuse, sets, keep, run);
   add_info(app, info, run);
   add_methods(app, methods_as_json, run);
