@@ -1,6 +1,7 @@
 """What goes into the package, as far as it can be looked at without building one: the unit, the man page, completion, the maintainers'
 scripts, notices. SPECTRA_BIN names the program. Checks by programs that are not installed here are skipped by name."""
 
+import json
 import os
 import pathlib
 import re
@@ -144,6 +145,27 @@ class Scripts(unittest.TestCase):
             (at / "private" / "tokens").unlink()
             hand_over()
             self.assertEqual(list((at / "run").iterdir()), [])
+
+
+class Notices(unittest.TestCase):
+    BUILD = pathlib.Path(PROGRAM).resolve().parent.parent
+
+    @unittest.skipUnless(shutil.which("dpkg") and shutil.which("ninja"), "dpkg or ninja is not installed")
+    def test_name_what_is_compiled_in_and_linked(self):
+        said = run("python3", PACKAGE / "notices.py", self.BUILD, SOURCE / "web/dist", "--list").split("\n")
+        for part in ("compiled libboost1.81-dev", "compiled nlohmann-json3-dev", "linked libdraco7", "linked libssl3"):
+            self.assertIn(part, said)
+        needed = re.findall(r"=> (/\S+)", run("ldd", PROGRAM))
+        self.assertGreaterEqual(sum(line.startswith("linked") for line in said), len(needed) // 2)
+
+    @unittest.skipUnless((SOURCE / "web/dist/licences.txt").exists(), "the client is not built")
+    def test_of_the_client_name_its_packages_and_palettes(self):
+        text = (SOURCE / "web/dist/licences.txt").read_text()
+        packages = json.loads((SOURCE / "web/package.json").read_text())["dependencies"]
+        for name, version in [*packages.items(), ("svelte", "")]:
+            self.assertIn(f"In the client: {name} {version}", text)
+        for table in (SOURCE / "fusion/colour/data").glob("*.cpp"):
+            self.assertRegex(text, rf"(?m)^  {table.stem}: ")
 
 
 if __name__ == "__main__":
