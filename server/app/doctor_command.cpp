@@ -250,7 +250,7 @@ void look_at_store(Report& report, const ServeOptions& options) {
     return;
   }
   const store::Catalogue catalogue = opened.value()->take_catalogue();
-  const auto faults = opened.value()->check(catalogue, {});
+  const auto faults = opened.value()->check(catalogue, [](double) {});
   if (!faults) {
     report.wrong("store: " + faults.error().message);
   } else if (!faults.value().empty()) {

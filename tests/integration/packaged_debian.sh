@@ -37,7 +37,7 @@ has() { bare sh -c "command -v $1" > /dev/null; }
 # The command line of the unit, as a user of its own. Sets `server` and `url`; prints how long it took.
 serve() {
   bare install -d -m 0700 -o $user -g $user /var/lib/spectra
-  bare env SPECTRA_STATE=/var/lib/spectra /usr/lib/spectra/hand-over
+  bare /usr/lib/spectra/hand-over
   local begin=$(date +%s.%N)
   # As BindReadOnlyPaths= of the unit does it.
   env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 unshare -m sh -c \

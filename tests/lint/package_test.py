@@ -131,20 +131,20 @@ class Scripts(unittest.TestCase):
     def test_hand_over_gives_copies_and_takes_them_back(self):
         with tempfile.TemporaryDirectory() as folder:
             at = pathlib.Path(folder)
-            for name in ("private", "state"):
-                (at / name).mkdir()
-            (at / "private" / "tokens").write_text("one")
-            environment = dict(os.environ, SPECTRA_PRIVATE=f"{at}/private", SPECTRA_RUN=f"{at}/run", SPECTRA_STATE=f"{at}/state")
-            hand_over = lambda: run(PACKAGE / "hand-over", env=environment)
+            private, given, state = at / "etc/spectra/private", at / "run/spectra", at / "var/lib/spectra"
+            for folder in (private, state, at / "run"):
+                folder.mkdir(parents=True)
+            (private / "tokens").write_text("one")
+            hand_over = lambda: run(PACKAGE / "hand-over", at)
             hand_over()
-            self.assertEqual(oct((at / "run/tokens").stat().st_mode), "0o100400")
-            self.assertEqual((at / "run/tokens").stat().st_uid, (at / "state").stat().st_uid)
-            (at / "private" / "tokens").write_text("two")
+            self.assertEqual(oct((given / "tokens").stat().st_mode), "0o100400")
+            self.assertEqual((given / "tokens").stat().st_uid, state.stat().st_uid)
+            (private / "tokens").write_text("two")
             hand_over()
-            self.assertEqual((at / "run/tokens").read_text(), "two")
-            (at / "private" / "tokens").unlink()
+            self.assertEqual((given / "tokens").read_text(), "two")
+            (private / "tokens").unlink()
             hand_over()
-            self.assertEqual(list((at / "run").iterdir()), [])
+            self.assertEqual(list(given.iterdir()), [])
 
 
 class Notices(unittest.TestCase):
