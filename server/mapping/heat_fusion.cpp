@@ -18,7 +18,7 @@ constexpr float kReflection = 0.95F;
 constexpr double kExposureSeconds = 0.010;  ///< A pixel of a microbolometer follows what it sees so slowly.
 constexpr double kAfterShutterSeconds = 0.3;
 constexpr float kAfterShutter = 10;      ///< Times the variance.
-constexpr float kNearAFold = 16;         ///< Times the variance.
+constexpr float kMostVariance = 9;       ///< K^2; a look that knows less says nothing.
 constexpr float kKnownVariance = 0.25F;  ///< K^2; what is known better tells the offset of a picture.
 constexpr float kContradiction = 25;     ///< Variances; a look that is farther off than that tells of a change.
 constexpr std::size_t kLeastCompared = 300;
@@ -193,7 +193,7 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
         if ((rules_.occlusion && !seen.is_reached) || (rules_.angle && seen.cosine < kLeastCosine)) continue;
         const std::size_t pixel =
             static_cast<std::size_t>(y) * static_cast<std::size_t>(model.width) + static_cast<std::size_t>(x);
-        if (rules_.edges && view.edges[pixel] == kNearJump) continue;
+        if (rules_.edges && view.is_near_edge[pixel] != 0) continue;
         const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
         const float* row = &prepared.celsius[pixel];
         const float* next = row + model.width;
@@ -210,8 +210,8 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
           const float askew = (1 - c) * (1 - c);
           const float reflected = kReflection * askew * askew * (1 - c) * (celsius - prepared.reflected);
           look.own = noise + uncertain * uncertain + reflected * reflected;
-          look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F) *
-                       (rules_.edges && view.edges[pixel] == kNearFold ? kNearAFold : 1.0F);
+          look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F);
+          if (look.own * look.scale > kMostVariance) continue;
         }
         looks[chunk].push_back(look);
       }
@@ -227,7 +227,6 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
     for (const Look& look : chunk) map.add_heat(look.block);
   }
   const auto process = static_cast<float>(rules_.process_kelvin * rules_.process_kelvin);
-  const auto correlation = static_cast<float>(rules_.correlation_s);
   const auto now = static_cast<float>(moment_s);
   const float trusted =
       report.spread_kelvin > 0 ? static_cast<float>(rules_.trusted_gap_s) : std::numeric_limits<float>::infinity();
@@ -237,7 +236,7 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
       float& celsius = heat.celsius[look.voxel];
       float& variance = heat.variance[look.voxel];
       const float seen = look.celsius - offset;
-      float r = look.scale * (look.own + (rules_.weights ? common : 0));
+      const float r = look.scale * (look.own + (rules_.weights ? common : 0));
       const float before = celsius;
       if (std::isinf(variance)) {
         celsius = seen;
@@ -245,7 +244,6 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
         map.head(look.block).warmed = 1e3F;
       } else {
         const float elapsed = std::max(0.0F, now - heat.seen_s[look.voxel]);
-        if (elapsed < correlation) r *= correlation / std::max(elapsed, 1e-3F);
         float predicted = variance + process * std::min(elapsed, trusted);
         const float innovation = seen - celsius;
         if (innovation * innovation > kContradiction * (predicted + r + spread))

@@ -25,9 +25,6 @@ struct HeatRules {
       0.05;  ///< Temperatures may change by so much in a second (standard deviation of a random walk).
   /// A gap of more than this is a reason to believe in a change only where the new look contradicts the old ones.
   double trusted_gap_s = 1;
-  /// Looks at a voxel that follow each other faster have errors in common (the pattern of the sensor, the pose): together, those of so many
-  /// seconds weigh as one.
-  double correlation_s = 1;
 };
 
 /// What became of a thermal picture.

@@ -57,11 +57,11 @@ std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, int wid
 
 std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, int height, float voxel_m) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
-  std::vector<std::uint8_t> jumps(depth.size(), 0), folds(depth.size(), 0), something(depth.size(), 0);
+  std::vector<std::uint8_t> jumps(depth.size(), 0), something(depth.size(), 0);
   for (std::size_t i = 0; i < depth.size(); ++i) something[i] = depth[i] < kFarthest ? 1 : 0;
   // Nothing counts where it is more than a gap between the squares that were drawn.
   const std::vector<std::uint8_t> covered = widened(something, width, height, kHoleReach);
-  // 1 / z is linear over a plane, however askew it is: what it bends by, as a depth, is a jump or a fold.
+  // 1 / z is linear over a plane, however askew it is: what it bends by, as a depth, is a jump.
   const auto bend = [&](std::size_t before, std::size_t i, std::size_t after) {
     if (depth[before] == kFarthest || depth[after] == kFarthest) return 0.0F;
     const float z = depth[i];
@@ -75,17 +75,13 @@ std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, i
       const float most =
           std::max(x > 0 && x + 1 < w ? bend(i - 1, i, i + 1) : 0, y > 0 && y + 1 < h ? bend(i - w, i, i + w) : 0);
       if (most > std::max(3 * voxel_m, 0.02F * z)) jumps[i] = 1;
-      if (most > std::max(2 * voxel_m, 0.01F * z)) folds[i] = 1;
     }
   }
   std::vector<std::uint8_t> near = widened(jumps, width, height, kEdgeReach);
-  const std::vector<std::uint8_t> near_fold = widened(folds, width, height, kEdgeReach);
   std::vector<std::uint8_t> nothing(depth.size());
   for (std::size_t i = 0; i < depth.size(); ++i) nothing[i] = covered[i] == 0 ? 1 : 0;
   const std::vector<std::uint8_t> beside = widened(nothing, width, height, kHoleReach + kEdgeReach);
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    near[i] = near[i] != 0 || beside[i] != 0 ? kNearJump : near_fold[i] != 0 ? kNearFold : 0;
-  }
+  for (std::size_t i = 0; i < near.size(); ++i) near[i] |= beside[i];
   return near;
 }
 
@@ -186,7 +182,7 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
     const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) drawing.draw(drawn.blocks[i].block, drawn.blocks[i].voxels);
   });
-  drawn.edges = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m);
+  drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m);
 
   pool.for_each(chunks, [&](std::size_t chunk) {
     const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);

@@ -25,16 +25,12 @@ struct SurfaceBlock {
   std::vector<SurfaceVoxel> voxels;
 };
 
-/// What a pixel is near to.
-inline constexpr std::uint8_t kNearFold = 1, kNearJump = 2;
-
 /// The surfaces of the map as a camera sees them: drawn as squares as large as voxels into a picture of depth, in which those that lie
 /// behind others are told.
 struct SurfaceView {
-  std::vector<SurfaceBlock> blocks;  ///< In rising order; voxels that look away from the camera are left out.
-  std::vector<float> depth_m;        ///< A pixel each; infinite where the map has nothing.
-  /// Within 3 pixels of a jump of depth, or of where the map has nothing; or else of a fold, which may be a small jump.
-  std::vector<std::uint8_t> edges;
+  std::vector<SurfaceBlock> blocks;        ///< In rising order; voxels that look away from the camera are left out.
+  std::vector<float> depth_m;              ///< A pixel each; infinite where the map has nothing.
+  std::vector<std::uint8_t> is_near_edge;  ///< 1 within 3 pixels of a jump of depth, or of where the map has nothing.
 };
 
 /// Draws the map at a pose. The same for any number of threads.

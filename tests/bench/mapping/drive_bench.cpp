@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
   run("plain mean", [](MapperSettings& s) {
     HeatRules& r = s.heat;
     r.occlusion = r.edges = r.angle = r.weights = r.frame_offset = r.shutter = false;
-    r.process_kelvin = r.correlation_s = 0;
+    r.process_kelvin = 0;
   });
   run("without occlusion", [](MapperSettings& s) { s.heat.occlusion = false; });
   run("without edges", [](MapperSettings& s) { s.heat.edges = false; });
@@ -87,6 +87,5 @@ int main(int argc, char** argv) {
   run("without weights", [](MapperSettings& s) { s.heat.weights = false; });
   run("without offset", [](MapperSettings& s) { s.heat.frame_offset = false; });
   run("without shutter", [](MapperSettings& s) { s.heat.shutter = false; });
-  run("without correlation", [](MapperSettings& s) { s.heat.correlation_s = 0; });
   return 0;
 }

@@ -126,19 +126,31 @@ TEST_F(HeatFusionTest, TakesTheDriftOfTheCameraOut) {
   EXPECT_NEAR(known_at(0.1, 0, 2).first, 20.3, 0.06);
 }
 
-TEST_F(HeatFusionTest, AFrozenPictureIsNoLook) {
+TEST_F(HeatFusionTest, AFrozenPictureIsNoLookAndTheNextWeighsATenth) {
   const BoxWorld world{{wall(25)}};
   build(world);
-  HeatFusion heat(*calibration_.thermal, {});
+  HeatRules rules;
+  rules.frame_offset = false;
+  HeatFusion heat(*calibration_.thermal, rules);
   heat.fuse(map_, picture(world, looking_ahead()), at(looking_ahead()), 0, pool_);
   const auto before = known_at(0, 0, 2);
   EXPECT_TRUE(heat.fuse(map_, picture(world, looking_ahead()), at(looking_ahead(0.1)), 0.04, pool_).is_frozen);
   EXPECT_EQ(known_at(0, 0, 2), before);
-  // Just after it a look weighs a tenth.
-  HeatRules open;
-  open.correlation_s = 0;
-  HeatFusion other(*calibration_.thermal, open);
-  EXPECT_FALSE(heat.fuse(map_, picture({{wall(25.1)}}, looking_ahead()), at(looking_ahead()), 0.1, pool_).is_frozen);
+  EXPECT_FALSE(heat.fuse(map_, picture({{wall(26)}}, looking_ahead()), at(looking_ahead()), 0.1, pool_).is_frozen);
+  const double r = 4 * 0.05 * 0.05, predicted = r + 0.1 * 0.05 * 0.05;
+  EXPECT_NEAR(known_at(0, 0, 2).first, 25 + predicted / (predicted + 10 * r), 0.02);
+}
+
+TEST_F(HeatFusionTest, ALookThatKnowsLittleSaysNothing) {
+  // A border between cold and hot: the point may fall on either side.
+  const BoxWorld world{
+      {{{-1, -1, 2}, {1, 1, 2.5}, [](const Eigen::Vector3d& p) { return p.x() < 0.001 ? 20.0 : 60.0; }}}};
+  build(world);
+  HeatFusion heat(*calibration_.thermal, {});
+  heat.fuse(map_, picture(world, looking_ahead()), at(looking_ahead()), 0, pool_);
+  EXPECT_TRUE(std::isinf(known_at(0, 0, 2).second));
+  EXPECT_NEAR(known_at(-0.2, 0, 2).first, 20, 0.05);
+  EXPECT_NEAR(known_at(0.2, 0, 2).first, 60, 0.05);
 }
 
 TEST_F(HeatFusionTest, NothingFromAskew) {
@@ -148,7 +160,7 @@ TEST_F(HeatFusionTest, NothingFromAskew) {
   HeatFusion heat(*calibration_.thermal, {});
   EXPECT_EQ(heat.fuse(map_, picture(world, askew), at(askew), 0, pool_).observed, 0U);
   HeatRules rules;
-  rules.angle = false;
+  rules.angle = rules.weights = false;
   HeatFusion lax(*calibration_.thermal, rules);
   EXPECT_GT(lax.fuse(map_, picture(world, askew), at(askew), 0, pool_).observed, 0U);
 }
