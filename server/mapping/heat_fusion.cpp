@@ -14,13 +14,14 @@ namespace {
 constexpr float kKelvin = 273.15F;
 constexpr float kLeastCosine = 0.2588F;  ///< Of 75 degrees.
 constexpr float kPixelError = 0.7F;      ///< Of where a point falls in the picture, pixels.
+constexpr std::size_t kSpread =
+    2;  ///< Pixels over which the lens spreads a point: a thin warm thing is not as warm as it is, at its ridge too.
 constexpr float kReflection = 0.95F;
 constexpr double kExposureSeconds = 0.010;  ///< A pixel of a microbolometer follows what it sees so slowly.
 constexpr double kAfterShutterSeconds = 0.3;
-constexpr float kAfterShutter = 10;      ///< Times the variance.
-constexpr float kMostVariance = 9;       ///< K^2; a look that knows less says nothing.
-constexpr float kKnownVariance = 0.25F;  ///< K^2; what is known better tells the offset of a picture.
-constexpr float kContradiction = 25;     ///< Variances; a look that is farther off than that tells of a change.
+constexpr float kAfterShutter = 10;   ///< Times the variance.
+constexpr float kMostVariance = 9;    ///< K^2; a look that knows less says nothing.
+constexpr float kContradiction = 25;  ///< Variances; a look that is farther off than that tells of a change.
 constexpr std::size_t kLeastCompared = 300;
 /// How an offset may have wandered when nothing tells it: at once, and as a random walk.
 constexpr double kUntoldKelvin = 0.3, kWanderKelvin = 0.05;
@@ -60,6 +61,27 @@ class Differences {
   std::size_t count_ = 0;
 };
 
+/// The largest value within kSpread pixels, along both axes.
+std::vector<float> largest_around(const std::vector<float>& values, std::size_t width, std::size_t height,
+                                  server::WorkerPool& pool) {
+  std::vector<float> across(values.size()), both(values.size());
+  pool.for_each(height, [&](std::size_t y) {
+    const float* row = &values[y * width];
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t first = x > kSpread ? x - kSpread : 0, end = std::min(width, x + kSpread + 1);
+      across[y * width + x] = *std::max_element(row + first, row + end);
+    }
+  });
+  pool.for_each(height, [&](std::size_t y) {
+    const std::size_t first = y > kSpread ? y - kSpread : 0, end = std::min(height, y + kSpread + 1);
+    for (std::size_t row = first; row < end; ++row) {
+      for (std::size_t x = 0; x < width; ++x)
+        both[y * width + x] = std::max(both[y * width + x], across[row * width + x]);
+    }
+  });
+  return both;
+}
+
 }  // namespace
 
 /// What one picture says of one voxel.
@@ -73,7 +95,7 @@ struct HeatFusion::Look {
 
 struct HeatFusion::Prepared {
   std::vector<float> celsius;
-  std::vector<float> gradient;  ///< Kelvin a pixel.
+  std::vector<float> gradient;  ///< Kelvin a pixel: the steepest within kSpread.
   float reflected = 0;
 };
 
@@ -114,35 +136,35 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, server::Worke
       }
     }
   });
+  const auto noise = static_cast<float>(2 * calibration_.netd_kelvin);
   pool.for_each(height, [&](std::size_t y) {
     const std::size_t above = (y > 0 ? y - 1 : y) * width, below = (y + 1 < height ? y + 1 : y) * width;
     for (std::size_t x = 0; x < width; ++x) {
       const std::size_t left = x > 0 ? x - 1 : x, right = x + 1 < width ? x + 1 : x;
       const float dx = 0.5F * (prepared.celsius[y * width + right] - prepared.celsius[y * width + left]);
       const float dy = 0.5F * (prepared.celsius[below + x] - prepared.celsius[above + x]);
-      prepared.gradient[y * width + x] = std::sqrt(dx * dx + dy * dy);
+      // What noise alone makes is none.
+      prepared.gradient[y * width + x] = std::max(0.0F, std::sqrt(dx * dx + dy * dy) - noise);
     }
   });
+  prepared.gradient = largest_around(prepared.gradient, width, height, pool);
   return prepared;
 }
 
 void HeatFusion::find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
                              HeatReport& report) {
-  // What is known well tells it; where there is too little of that, whatever is known.
-  Differences well_known, known;
+  // Everything that is known tells it, by how well it is known.
+  Differences differences;
   for (const auto& chunk : looks) {
     for (const Look& look : chunk) {
       if (map.head(look.block).heat < 0) continue;
       const HeatBlock& heat = map.heat(look.block);
       const float variance = heat.variance[look.voxel];
-      if (std::isinf(variance)) continue;
-      Differences& differences = variance < kKnownVariance ? well_known : known;
-      differences.add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+      if (variance < kMostVariance) {
+        differences.add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+      }
     }
   }
-  const bool is_well_known = well_known.count() >= kLeastCompared;
-  if (!is_well_known) known.add(well_known);
-  const Differences& differences = is_well_known ? well_known : known;
   report.compared = differences.count();
   if (report.compared >= kLeastCompared) {
     const double middle = differences.quantile(0.5);

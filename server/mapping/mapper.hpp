@@ -45,7 +45,7 @@ class Mapper {
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
   /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
   UnitMesh whole_mesh(const fusion::Progress& progress = {}) const;
-  static constexpr double kSystematic = 0.6;
+  static constexpr double kSystematic = 0.5;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
   const VoxelMap& map() const { return map_; }
