@@ -184,6 +184,8 @@ export function addLayoutTests(browser) {
     await page.keyboard.press('?');
     await page.locator('dialog[open]').waitFor();
     assert.equal(await page.evaluate(() => document.querySelector('dialog').matches(':modal')), true);
+    const licences = await page.getByRole('link', { name: 'Licences' }).evaluate((link) => link.href);
+    assert.match(await (await fetch(licences)).text(), /In the client: three/);
     await page.getByText('Single keys act').click();
     await page.keyboard.press('Escape');
     await page.locator('dialog').waitFor({ state: 'detached' });
