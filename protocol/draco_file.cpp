@@ -5,10 +5,10 @@
 #include <draco/metadata/geometry_metadata.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -34,7 +34,10 @@ double nearest_multiple(float value, float step) {
   return std::floor(static_cast<double>(value) / static_cast<double>(step) + 0.5);
 }
 
-Quantised<std::array<float, 3>> quantised_positions(std::span<const std::array<float, 3>> positions_m, float step_m) {
+/// Nothing when the lattice would have 2^24 steps or more along an axis: floats do not hold them.
+std::optional<Quantised<std::array<float, 3>>> quantised_positions(std::span<const std::array<float, 3>> positions_m,
+                                                                   float step_m) {
+  constexpr double kMostSteps = (1 << 24) - 1;
   Quantised<std::array<float, 3>> lattice;
   lattice.step = step_m;
   lattice.values.reserve(positions_m.size());
@@ -50,6 +53,7 @@ Quantised<std::array<float, 3>> quantised_positions(std::span<const std::array<f
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double steps =
           (static_cast<double>(value[axis]) - static_cast<double>(lattice.origin[axis])) / static_cast<double>(step_m);
+      if (!(steps >= 0 && steps <= kMostSteps)) return std::nullopt;
       lattice.largest = std::max(lattice.largest, static_cast<std::uint32_t>(steps));
     }
   }
@@ -185,9 +189,9 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
     add_positions(input.positions_m);
   } else {
     const auto lattice = quantised_positions(input.positions_m, input.position_step_m);
-    if (std::bit_width(lattice.largest) > 24) return internal("the scene has too many position steps");
-    options.SetAttributeOptions(add_positions(lattice.values),
-                                quantisation_options(lattice.origin, lattice.largest, lattice.step));
+    if (!lattice) return internal("the scene is too large for its position step");
+    options.SetAttributeOptions(add_positions(lattice->values),
+                                quantisation_options(lattice->origin, lattice->largest, lattice->step));
   }
   add_attribute<ColourBytes>(mesh, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, input.colours);
   int temperature_attribute = -1;

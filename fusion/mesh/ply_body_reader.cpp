@@ -13,7 +13,8 @@ namespace spectra::fusion {
 
 namespace {
 
-constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max());
+/// Metres. Beyond it stand numbers for "none", such as the lowest float.
+constexpr double kLargestCoordinate = 1e30;
 
 bool is_face_element(const PlyElement& element) {
   const std::string name = lower_case(element.name);
@@ -30,7 +31,8 @@ struct Box {
 };
 
 bool is_position(const Vec3d& p) {
-  return std::abs(p.x) <= kFloatMax && std::abs(p.y) <= kFloatMax && std::abs(p.z) <= kFloatMax;
+  return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
+         std::abs(p.z) <= kLargestCoordinate;
 }
 
 }  // namespace
@@ -105,7 +107,7 @@ Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElement& e
     BOOST_OUTCOME_TRY(hand_on(raw, element));
   }
   if (facts_.left_out_vertex_count == element.count) {
-    return failure(ErrorCode::BadValue, "no vertex has a finite position within the range of a float");
+    return failure(ErrorCode::BadValue, "no vertex has a position (a finite one, within 1e30 m)");
   }
   return success();
 }
@@ -141,16 +143,22 @@ Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& elemen
   return result;
 }
 
-/// Holes are at one place that no triangle uses, or that is far from everything.
+/// Holes are at one place that is far from everything, or at 0 0 0 where no triangle uses it; or have a coordinate that stands for none.
 void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
-  sample_.conclude();
+  sample_.conclude(interpretation_.metres_per_unit);
   facts_.bulk = sample_.bulk();
   facts_.origin = interpretation_.origin.value_or(scene_origin(facts_.min, facts_.max, facts_.bulk));
+  if (interpretation_.hole) return;
+  facts_.hole = sample_.coordinate_hole();
   const auto& hole = sample_.hole();
-  if (!hole || interpretation_.hole) return;
+  if (!hole) return;
   const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),
                                    [&](std::uint64_t vertex) { return faces.is_referenced(vertex); });
-  if (hole->is_far || !is_used) facts_.hole = hole->place;
+  // Elsewhere in the scene it is what was measured again and again.
+  if (hole->is_far || (!is_used && hole->place == Vec3d{}))
+    facts_.hole = Hole{hole->place};
+  else if (is_used)
+    facts_.crowded_place = hole->place;
 }
 
 /// Brings the positions to metres, and finds those that are none.
@@ -162,9 +170,9 @@ void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t fi
   sample_.add(first_vertex, positions);
   Box box{facts_.min, facts_.max};
   bool all_good = true;
-  const std::optional<Vec3d>& hole = interpretation_.hole;
+  const std::optional<Hole>& hole = interpretation_.hole;
   if (hole) {
-    for (const Vec3d& p : positions) all_good = all_good && p != *hole;
+    for (const Vec3d& p : positions) all_good = all_good && !hole->has(p);
   }
   for (const Vec3d& p : positions) {
     all_good = all_good && is_position(p);
@@ -174,7 +182,7 @@ void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t fi
     box = {facts_.min, facts_.max};
     if (is_left_out_.is_empty()) is_left_out_.resize(header_.find("vertex")->count);
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      const bool is_hole = positions[i] == hole;
+      const bool is_hole = hole && hole->has(positions[i]);
       if (is_position(positions[i]) && !is_hole) {
         box.add(positions[i]);
       } else {

@@ -92,27 +92,38 @@ class Notes {
   void about_positions() {
     const std::uint64_t nowhere_count = facts_.left_out_vertex_count - facts_.hole_count;
     add("left_out_vertices", nowhere_count,
-        counted(nowhere_count, "vertex", "vertices") + " without a finite position left out");
+        counted(nowhere_count, "vertex", "vertices") + " without a position (not a number, or beyond 1e30 m) left out");
     if (facts_.hole_count > 0) {
       add("hole_vertices", facts_.hole_count,
-          counted(facts_.hole_count, "vertex", "vertices") + " in exactly one place, " + hole_text() +
+          counted(facts_.hole_count, "vertex", "vertices") + hole_text() +
               ", taken for holes and left out with their temperatures, like vertices without a position; written as "
               "nan they need no guess");
+    }
+    if (facts_.crowded_place) {
+      add("crowded_place", 1,
+          "many vertices are in exactly one place, " + place_text(*facts_.crowded_place) +
+              ", and faces use them, so that they are kept; where they stand for holes, write nan there or leave them "
+              "out of the faces");
     }
     add("left_out_faces", facts_.faces.left_out_face_count,
         counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
     about_rounding();
   }
 
-  /// The place of the holes in the numbers of the file.
+  /// What tells the holes, in the numbers of the file.
   std::string hole_text() const {
-    const Vec3d& place = *hole_;
-    std::string text;
-    for (const auto& [slot, metres] : {std::pair{kX, place.x}, std::pair{kY, place.y}, std::pair{kZ, place.z}}) {
-      text += (text.empty() ? "" : " ") +
-              value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
+    if (hole_->axes == std::array{true, true, true}) return " in exactly one place, " + place_text(hole_->place);
+    for (const auto& [slot, axis, name] : {std::tuple{kX, 0U, "x"}, std::tuple{kY, 1U, "y"}, std::tuple{kZ, 2U, "z"}}) {
+      const double metres = std::array{hole_->place.x, hole_->place.y, hole_->place.z}[axis];
+      if (hole_->axes[axis]) return std::string(" whose ") + name + " is " + coordinate_text(slot, metres);
     }
-    return text;
+    return "";
+  }
+  std::string coordinate_text(std::size_t slot, double metres) const {
+    return value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
+  }
+  std::string place_text(const Vec3d& place) const {
+    return coordinate_text(kX, place.x) + ' ' + coordinate_text(kY, place.y) + ' ' + coordinate_text(kZ, place.z);
   }
 
   /// What the file, or keeping positions as floats, has lost of them.
@@ -402,7 +413,7 @@ class Notes {
   const PlySurvey& survey_;
   const ReadOptions& options_;
   const PlyBodyFacts& facts_;
-  const std::optional<Vec3d>& hole_;
+  const std::optional<Hole>& hole_;
   const PlyElement& vertices_;
   std::vector<Note> notes_;
 };

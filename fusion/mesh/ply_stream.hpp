@@ -26,7 +26,7 @@ namespace spectra::fusion {
 /// Some vertices in the file's order. The spans are valid during the call only.
 struct PlyVertexBlock {
   std::uint64_t first_vertex = 0;
-  std::span<const Vec3d> positions;            ///< Metres; finite, within the range of float, but for those left out.
+  std::span<const Vec3d> positions;            ///< Metres; finite, within 1e30, but for those left out.
   std::span<const Rgb8> visible;               ///< Empty when the file has no colours.
   std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
   /// Those without a position, by their index in the block, rising: to be left out of the scene. No triangle has them.
@@ -47,12 +47,13 @@ struct PlyBodyFacts {
   Vec3d min, max;            ///< Of all positions.
   std::optional<Bulk> bulk;  ///< Where nearly all of them are, when that is more than one place.
   Vec3d origin;              ///< What to tell them from, as scene_origin.hpp says.
-  /// A place that nothing is but holes, found in this reading: PlyStream::leave_out_hole() takes it.
-  std::optional<Vec3d> hole;
+  /// What stands for holes, found in this reading: PlyStream::leave_out_hole() takes it.
+  std::optional<Hole> hole;
   FaceFacts faces;
   TemperatureFacts temperature;
-  std::uint64_t left_out_vertex_count = 0;      ///< Without a finite position within the range of float, and holes.
+  std::uint64_t left_out_vertex_count = 0;      ///< Without a position within 1e30 m, and holes.
   std::uint64_t hole_count = 0;                 ///< Left out because they are at the place of holes.
+  std::optional<Vec3d> crowded_place;           ///< Many vertices are there, and faces use them: it may be a hole.
   std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
   std::uint64_t clamped_colour_count = 0;       ///< Vertices whose colour was out of range or no number.
   std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
@@ -69,7 +70,7 @@ struct PlyInterpretation {
   TemperatureConversion temperature;
   double metres_per_unit;
   std::optional<Vec3d> origin;  ///< Absent: chosen.
-  std::optional<Vec3d> hole;    ///< Vertices there are no part of the scene; in metres.
+  std::optional<Hole> hole;     ///< Vertices there are no part of the scene.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the

@@ -66,8 +66,9 @@ void PositionSample::add(std::uint64_t first_vertex, std::span<const Vec3d> posi
   }
 }
 
-void PositionSample::conclude() {
+void PositionSample::conclude(double metres) {
   find_hole();
+  find_coordinate_hole(metres);
   find_bulk();
   if (!hole_) return;
   if (!bulk_) {
@@ -102,6 +103,35 @@ void PositionSample::find_hole() {
   hole_ = {first->position, {}, false};
   for (auto entry = first; entry != last; ++entry) hole_->vertices.push_back(entry->vertex);
   entries_.erase(first, last);
+}
+
+void PositionSample::find_coordinate_hole(double metres) {
+  constexpr std::array kCustomary{-9999.0, -99999.0, -32768.0, -32767.0, -999.0, 9999.0, 32767.0, 99999.0, -1e30, 1e30};
+  for (std::size_t axis = 0; axis < kAxes.size() && !coordinate_hole_; ++axis) {
+    for (const double number : kCustomary) {
+      const double value = number * metres;
+      std::size_t count = 0;
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (const Entry& entry : entries_) {
+        const double at = entry.position.*kAxes[axis];
+        if (at == value) {
+          ++count;
+        } else {
+          low = std::min(low, at);
+          high = std::max(high, at);
+        }
+      }
+      if (count < kFewestInAHole || entries_.size() - count < kFewestElsewhere) continue;
+      const double gap = std::max(low - value, value - high);
+      if (!(gap > high - low)) continue;
+      Hole hole{{}, {false, false, false}};
+      hole.place.*kAxes[axis] = value;
+      hole.axes[axis] = true;
+      std::erase_if(entries_, [&hole](const Entry& entry) { return hole.has(entry.position); });
+      coordinate_hole_ = hole;
+      break;
+    }
+  }
 }
 
 void PositionSample::find_bulk() {

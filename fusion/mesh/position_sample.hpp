@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -14,6 +15,16 @@ struct Bulk {
   Vec3d min, max;
 
   double extent() const;
+};
+
+/// What stands for "no position" in a file: a place, or one coordinate, such as the height of cells that nobody has measured.
+struct Hole {
+  Vec3d place;                                 ///< Metres.
+  std::array<bool, 3> axes{true, true, true};  ///< Which of its coordinates tell.
+
+  bool has(const Vec3d& p) const {
+    return (!axes[0] || p.x == place.x) && (!axes[1] || p.y == place.y) && (!axes[2] || p.z == place.z);
+  }
 };
 
 /// A place that stands for "no position", as files without nan write the holes of an organised cloud.
@@ -32,10 +43,13 @@ class PositionSample {
   /// The vertices that come next in the file; positions that are not finite are passed over.
   void add(std::uint64_t first_vertex, std::span<const Vec3d> positions);
 
-  /// Looks for hole and bulk, in time and memory of the sample.
-  void conclude();
+  /// Looks for holes and bulk, in time and memory of the sample. `metres` in one unit of the file.
+  void conclude(double metres);
   /// One place that has a dozen vertices of the sample and eight times as many as any other, when the others are a dozen too.
   const std::optional<HolePlace>& hole() const { return hole_; }
+  /// One coordinate that is a customary number for "none" (-9999, -32768, ...) in a dozen vertices of the sample, farther from all others than
+  /// those are from each other.
+  const std::optional<Hole>& coordinate_hole() const { return coordinate_hole_; }
   /// Around the medians of the coordinates, 32 times as far as half of the vertices are; nullopt when that is one place.
   const std::optional<Bulk>& bulk() const { return bulk_; }
 
@@ -45,6 +59,7 @@ class PositionSample {
     Vec3d position;
   };
   void choose_next();
+  void find_coordinate_hole(double metres);
   void find_hole();
   void find_bulk();
 
@@ -53,6 +68,7 @@ class PositionSample {
   std::uint64_t next_vertex_ = 0;
   std::vector<Entry> entries_;
   std::optional<HolePlace> hole_;
+  std::optional<Hole> coordinate_hole_;
   std::optional<Bulk> bulk_;
 };
 

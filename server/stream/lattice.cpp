@@ -153,8 +153,15 @@ protocol::Result<TileLattice> tile_lattice(const Tile& tile, float step_m) {
   }
   for (std::size_t v = 0; v < count; ++v) {
     if (!rounding.is_drawn(v)) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      lattice.points[v][axis] = static_cast<std::int32_t>(rounded[v][axis] - lowest[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      constexpr double kMostSteps = std::numeric_limits<std::int32_t>::max();
+      const double steps = rounded[v][axis] - lowest[axis];
+      if (!(steps <= kMostSteps)) {
+        return protocol::refusal(protocol::RpcErrorCode::InternalError,
+                                 "vertex " + std::to_string(v) + " is too far from the others for the position step");
+      }
+      lattice.points[v][axis] = static_cast<std::int32_t>(steps);
+    }
   }
   for (std::size_t axis = 0; axis < 3; ++axis) lattice.origin_m[axis] = static_cast<float>(lowest[axis] * finest_m);
   lattice.step_m = static_cast<float>(finest_m);

@@ -164,6 +164,48 @@ TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
   EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
 }
 
+/// 50 x 50 cells of 60 m with 900 m relief; one in twenty has this height.
+LoadedScene terrain(const std::string& height) {
+  std::vector<std::string> lines;
+  for (int i = 0; i < 2500; ++i) {
+    const std::string own = std::to_string(450 + 450 * std::sin(i * 0.01));
+    lines.push_back(std::to_string(60 * (i % 50)) + ' ' + std::to_string(60 * (i / 50)) + ' ' +
+                    (i % 20 == 7 ? height : own) + " 20");
+  }
+  return loaded(
+      text_file("property float temperature\n", lines, "element face 1\n" + std::string(kFaces), "3 0 1 50\n"));
+}
+
+TEST(FieldKinds, HeightsWrittenAsANumberForNoneAreHoles) {
+  for (const char* none : {"-9999", "-32768", "-3.4028234663852886e38", "99999"}) {
+    const LoadedScene scene = terrain(none);
+    EXPECT_EQ(scene.mesh.vertex_count(), 2500U - 125U) << none;
+    EXPECT_EQ(note_count(scene, "hole_vertices") + note_count(scene, "left_out_vertices"), 125U) << none;
+  }
+  EXPECT_NE(note_text(terrain("-9999"), "hole_vertices").find("125 vertices whose z is -9999"), std::string::npos);
+  // A height that could be one is kept: among the others, or no customary number.
+  EXPECT_EQ(terrain("999").mesh.vertex_count(), 2500U);
+  EXPECT_EQ(terrain("-9998").mesh.vertex_count(), 2500U);
+}
+
+TEST(FieldKinds, ASpotThatIsMeasuredOftenIsNoHole) {
+  for (const Vec3d& place : {Vec3d{500'001.5, 4'200'001.25, 100.02}, Vec3d{500'004, 4'200'004, 100}}) {
+    const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(20, place)));
+    EXPECT_EQ(scene.mesh.vertex_count(), 420U) << place.x;
+  }
+}
+
+TEST(FieldKinds, ACrowdedPlaceThatFacesUseIsSaid) {
+  std::vector<std::string> lines;
+  for (int i = 0; i < 400; ++i) lines.push_back(std::to_string(i % 20 - 10) + ' ' + std::to_string(i / 20 - 10) + " 5");
+  lines.resize(600, "0 0 0");
+  std::string face = "203";
+  for (int i = 397; i < 600; ++i) face += ' ' + std::to_string(i);
+  const LoadedScene scene = loaded(text_file("", lines, "element face 1\n" + std::string(kFaces), face + '\n'));
+  EXPECT_EQ(scene.mesh.vertex_count(), 600U);
+  EXPECT_NE(note_text(scene, "crowded_place").find("exactly one place, 0 0 0, and faces use them"), std::string::npos);
+}
+
 TEST(FieldKinds, HolesWrittenAsANumberTakeTheirFacesWithThem) {
   const std::string faces = "element face 2\n" + std::string(kFaces);
   const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(20, {-1, -1, -1}), faces, "3 0 1 20\n4 1 2 400 20\n"));

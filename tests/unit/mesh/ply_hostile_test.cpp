@@ -147,7 +147,7 @@ std::vector<HostileFile> hostile_files() {
       {"infinite position", binary_position(std::numeric_limits<float>::infinity()), std::nullopt, ""},
       {"position beyond float",
        head("ascii", "element vertex 1\nproperty double x\nproperty double y\nproperty double z\n") + "0 1e300 0\n",
-       Code::BadValue, "no vertex has a finite position"},
+       Code::BadValue, "no vertex has a position (a finite one, within 1e30 m)"},
       {"NaN positions alone", head("ascii", vertices("2")) + "nan 0 0\n0 nan 0\n", Code::BadValue, "no vertex"},
       {"letters for a number", head("ascii", vertices("2")) + "0 0 0\n0 zero 0\n", Code::BadValue, "vertex 1"},
       {"decimal commas", head("ascii", vertices("1")) + "0,5 0 0\n", Code::BadValue, "decimal comma"},

@@ -360,9 +360,11 @@ TEST(SceneOrigin, KeepsASinglePointExactly) {
 }
 
 TEST(SceneOrigin, BearsTheLargestExtent) {
-  const LoadedScene scene = loaded(ascii_head(2, kXyz) + "-3.4e38 0 1e-40\n3.4e38 0 3e38\n");
-  EXPECT_EQ(scene.mesh.positions()[0].x, -3.4e38F);
-  EXPECT_EQ(scene.mesh.positions()[1].z, 3e38F);
+  const LoadedScene scene = loaded(ascii_head(3, kXyz) + "-1e30 0 1e-40\n1e30 0 9e29\n3.4e38 0 0\n");
+  EXPECT_EQ(scene.mesh.positions()[0].x, -1e30F);
+  EXPECT_EQ(scene.mesh.positions()[1].z, 9e29F);
+  EXPECT_EQ(scene.mesh.vertex_count(), 2U) << "beyond that stand numbers for none";
+  EXPECT_EQ(note_count(scene, "left_out_vertices"), 1U);
 }
 
 std::string grid_scene(std::uint32_t side) {
