@@ -129,6 +129,55 @@ double file_rounding(const Box& box) {
   return farthest * 0x1p-23;
 }
 
+double squared_distance(const Vec3f& a, const Vec3f& b) {
+  const double x = static_cast<double>(a.x) - static_cast<double>(b.x);
+  const double y = static_cast<double>(a.y) - static_cast<double>(b.y);
+  const double z = static_cast<double>(a.z) - static_cast<double>(b.z);
+  return x * x + y * y + z * z;
+}
+
+/// Vertices of the scene that are not where the thermal ones of the same number are, but for what a float in the coordinates of the file is
+/// rounded by; those farthest apart first.
+std::vector<std::uint32_t> moved_vertices(const MultispectralMesh& scene, std::span<const Vec3f> thermal) {
+  const auto is_same = [](double origin, float a, float b) {
+    const double rounding = (std::abs(origin + static_cast<double>(a)) + std::abs(origin)) * 0x1p-23;
+    return std::abs(static_cast<double>(a) - static_cast<double>(b)) <= rounding;
+  };
+  const std::span<const Vec3f> places = scene.positions();
+  std::vector<std::uint32_t> moved;
+  for (std::uint32_t v = 0; v < places.size(); ++v) {
+    if (!is_same(scene.origin.x, places[v].x, thermal[v].x) || !is_same(scene.origin.y, places[v].y, thermal[v].y) ||
+        !is_same(scene.origin.z, places[v].z, thermal[v].z)) {
+      moved.push_back(v);
+    }
+  }
+  std::sort(moved.begin(), moved.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const double one = squared_distance(places[a], thermal[a]), other = squared_distance(places[b], thermal[b]);
+    return one != other ? one > other : a < b;
+  });
+  return moved;
+}
+
+/// Whether the vertices of both are in the same order, within `tolerance` of each other: where one has moved, no other is nearer. Looked at is a
+/// sample of those, the farthest among them.
+bool is_in_order(const MultispectralMesh& scene, std::span<const Vec3f> thermal, double tolerance) {
+  constexpr std::size_t kFarthest = 64, kOthers = 64;
+  const std::span<const Vec3f> places = scene.positions();
+  if (largest_difference(places, thermal) > tolerance) return false;
+  const std::vector<std::uint32_t> moved = moved_vertices(scene, thermal);
+  const std::size_t pace = std::max<std::size_t>(1, moved.size() / kOthers);
+  for (std::size_t i = 0; i < moved.size(); i += i < kFarthest ? 1 : pace) {
+    const Vec3f& place = places[moved[i]];
+    const double own = squared_distance(place, thermal[moved[i]]);
+    constexpr double kClearly = 0.98;
+    if (std::any_of(thermal.begin(), thermal.end(),
+                    [&](const Vec3f& p) { return squared_distance(place, p) < kClearly * own; })) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// Vertices whose triangles do not close round them. Where the triangles run the same way round, the neighbours that come
 /// before and after a vertex are the same ones.
 std::vector<bool> border_vertices(const MultispectralMesh& mesh) {
@@ -376,8 +425,7 @@ Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, Lo
   const Box thermal_box = core_box(thermal.mesh);
   if (thermal.mesh.vertex_count() == mesh.vertex_count()) {
     const double tolerance = std::max(kSamePlace * scene_box.diagonal(), file_rounding(scene_box));
-    const double difference = largest_difference(mesh.positions(), positions_in(mesh, thermal.mesh));
-    if (difference <= tolerance) {
+    if (is_in_order(mesh, positions_in(mesh, thermal.mesh), tolerance)) {
       const std::span<const float> celsius = thermal.mesh.temperature_celsius();
       std::copy(celsius.begin(), celsius.end(), mesh.temperature_celsius().begin());
       scene.notes.push_back({"thermal_joined_in_order", mesh.vertex_count(),

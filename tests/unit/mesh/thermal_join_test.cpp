@@ -66,6 +66,27 @@ TEST(ThermalJoin, BearsTheRoundingOfFiles) {
   EXPECT_EQ(note_count(scene.value(), "thermal_joined_in_order"), 3U);
 }
 
+TEST(ThermalJoin, TakesSmallThingsInALargeSceneByPlaceWhereTheirOrderDiffers) {
+  // A map of 4 km, a ten-thousandth of which is larger than a label of 6 cm with four vertices in it.
+  std::string visible, thermal, label = "2000 2000 5 31\n2000.02 2000 5 32\n2000.04 2000 5 33\n2000.06 2000 5 34\n";
+  for (int i = 0; i < 100; ++i) {
+    const std::string place = std::to_string(400 * (i % 10)) + ' ' + std::to_string(400 * (i / 10)) + " 0";
+    visible += place + '\n';
+    thermal += place + " 20\n";
+  }
+  visible += "2000.06 2000 5\n2000.02 2000 5\n2000 2000 5\n2000.04 2000 5\n";
+  const auto scene = joined(visible_file(visible, 104), thermal_file(thermal + label, 104));
+  ASSERT_TRUE(scene);
+  EXPECT_EQ(note_count(scene.value(), "thermal_joined_in_order"), 0U);
+  const auto celsius = scene.value().mesh.temperature_celsius();
+  EXPECT_EQ((std::vector<float>(celsius.begin() + 100, celsius.end())), (std::vector<float>{34, 32, 31, 33}));
+  // Moved as a whole, less than neighbours are apart, it is the same order.
+  const auto moved = joined(visible_file("0 0 0\n100 0 0\n100.02 0 0\n", 3),
+                            thermal_file("0 0 0 1\n100.004 0 0 2\n100.024 0 0 3\n", 3));
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(note_count(moved.value(), "thermal_joined_in_order"), 3U);
+}
+
 TEST(ThermalJoin, TakesTheNearestWithinTheDistance) {
   const std::string visible = visible_file("1000.1 0 0\n1001.2 0 0\n1009 0 0\n", 3);
   const std::string thermal = thermal_file("1000 0 0 20\n1001 0 0 21\n1002 0 0 22\n1003 0 0 nan\n", 4);
