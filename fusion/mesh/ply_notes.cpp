@@ -59,6 +59,11 @@ std::vector<std::string> unused_names(const PlyElement& element, const PlySlots&
   return names;
 }
 
+/// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
+constexpr std::array<std::string_view, 9> kNeedAttention = {
+    "hole_vertices", "crowded_place",  "rounded_positions", "coarse_positions",        "clamped_colours",
+    "texture",       "unused_options", "no_temperature",    "implausible_temperatures"};
+
 class Notes {
  public:
   Notes(const PlyHeader& header, const PlyInterpretation& interpretation, const ReadOptions& options,
@@ -85,8 +90,10 @@ class Notes {
   }
 
  private:
-  void add(const char* id, std::uint64_t count, std::string message) {
-    if (count > 0) notes_.push_back({id, count, std::move(message)});
+  void add(std::string_view id, std::uint64_t count, std::string message) {
+    if (count == 0) return;
+    const bool needs_attention = std::find(kNeedAttention.begin(), kNeedAttention.end(), id) != kNeedAttention.end();
+    notes_.push_back({std::string(id), count, std::move(message), needs_attention});
   }
 
   void about_positions() {
@@ -339,6 +346,13 @@ class Notes {
               "look like counts of a sensor or another quantity: --temperature-scale A --temperature-offset B "
               "(degC = A value + B), or --temperature-property NAME" +
               no_data);
+    } else if (constexpr double kColdestBelieved = 200;
+               property.type != PlyScalar::Float32 && property.type != PlyScalar::Float64 && facts.too_hot_count == 0 &&
+               static_cast<double>(facts.lowest) >= kColdestBelieved) {
+      add(kId, facts.finite_count,
+          range +
+              "are whole numbers that are hard to believe: hundredths of a degree are --temperature-scale 0.01, tenths "
+              "0.1");
     } else if (facts.too_hot_count > 0) {
       const std::string value = value_text(static_cast<double>(facts.highest), PlyScalar::Float32);
       add(kId, facts.too_hot_count,

@@ -164,6 +164,28 @@ TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
   EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
 }
 
+TEST(FieldKinds, WhatIsProbablyNotMeantNeedsAttention) {
+  const auto needs = [](const LoadedScene& scene, const std::string& id) {
+    for (const Note& note : scene.notes) {
+      if (note.id == id) return note.needs_attention;
+    }
+    ADD_FAILURE() << id << " is not there";
+    return false;
+  };
+  const auto temperatures = [](const char* type, const std::vector<std::string>& values) {
+    std::vector<std::string> lines;
+    for (const std::string& value : values) lines.push_back("0 0 0 " + value);
+    return loaded(text_file(std::string("property ") + type + " temperature\n", lines));
+  };
+  EXPECT_TRUE(needs(temperatures("float", {"291", "293", "295"}), "implausible_temperatures"));
+  const LoadedScene hundredths = temperatures("short", {"1750", "2150", "2656"});
+  EXPECT_TRUE(needs(hundredths, "implausible_temperatures"));
+  EXPECT_NE(note_text(hundredths, "implausible_temperatures").find("--temperature-scale 0.01"), std::string::npos);
+  EXPECT_EQ(note_text(temperatures("short", {"18", "25", "900"}), "implausible_temperatures"), "");
+  EXPECT_TRUE(needs(loaded(text_file("property float scalar_value\n", {"0 0 0 1"})), "no_temperature"));
+  EXPECT_FALSE(needs(temperatures("float", {"20", "nan"}), "missing_temperatures"));
+}
+
 /// 50 x 50 cells of 60 m with 900 m relief; one in twenty has this height.
 LoadedScene terrain(const std::string& height) {
   std::vector<std::string> lines;
