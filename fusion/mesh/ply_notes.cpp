@@ -154,8 +154,8 @@ class Notes {
     constexpr double kTooCoarse = 1.0 / 20'000;
     if (facts_.origin != Vec3d{} && rounding > kTooCoarse * bulk.extent()) {
       add("rounded_positions", vertices_.count,
-          "Positions are floats far from 0, which the file itself rounds to " + short_number(rounding) +
-              " m; write them as double, or closer to 0");
+          "Positions are declared as floats and far from 0, where floats are rounded to " + short_number(rounding) +
+              " m; declare them as double, or write them closer to 0");
     }
     constexpr double kMillimetre = 0.001;
     const double kept = largest_rounding(bulk, facts_.origin);
@@ -413,7 +413,8 @@ class Notes {
     add("triangulated_strips", faces.strip_count,
         counted(faces.strip_count, "triangle strip", "triangle strips") + " cut into triangles");
     add("triangulated_polygons", faces.polygon_count,
-        counted(faces.polygon_count, "polygon", "polygons") + " of more than three corners cut into triangles");
+        counted(faces.polygon_count, "polygon", "polygons") +
+            " of more than three corners cut into triangles from the first corner, which is right for convex ones");
     add("degenerate_faces", faces.degenerate_triangle_count,
         counted(faces.degenerate_triangle_count, "triangle", "triangles") + " with the same vertex twice left out");
     add("incomplete_faces", faces.incomplete_face_count,

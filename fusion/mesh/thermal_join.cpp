@@ -129,6 +129,15 @@ double file_rounding(const Box& box) {
   return farthest * 0x1p-23;
 }
 
+/// -infinity where there is none.
+float largest_finite(std::span<const float> values) {
+  float largest = -std::numeric_limits<float>::infinity();
+  for (const float value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  }
+  return largest;
+}
+
 double squared_distance(const Vec3f& a, const Vec3f& b) {
   const double x = static_cast<double>(a.x) - static_cast<double>(b.x);
   const double y = static_cast<double>(a.y) - static_cast<double>(b.y);
@@ -386,6 +395,17 @@ Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, c
                              percent_text(joined_count, count) + ") have the temperature of the nearest place of " +
                              thermal.mesh.name + " within " + distance_text(reach) + " (half of them within " +
                              distance_text(median_m) + ", the farthest at " + distance_text(farthest_m) + ")"});
+  const float hottest = largest_finite(thermal.mesh.temperature_celsius());
+  const float kept = largest_finite(mesh.temperature_celsius());
+  constexpr float kNoticed = 1;
+  if (hottest - kept > kNoticed) {
+    scene.notes.push_back({"thermal_extremes_lost", 1,
+                           "The hottest reading of " + thermal.mesh.name + ", " +
+                               number_text(static_cast<double>(hottest)) +
+                               " degC, has no vertex of the scene at it: the scene's hottest has " +
+                               number_text(static_cast<double>(kept)) + " degC; give the finer file as the scene",
+                           true});
+  }
   if (joined_count < count) {
     scene.notes.push_back({"thermal_not_reached", count - joined_count,
                            std::to_string(count - joined_count) + " vertices have no thermal place within " +

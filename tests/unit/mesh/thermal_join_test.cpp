@@ -29,6 +29,14 @@ std::string thermal_file(const std::string& lines, int count) {
          "property float temperature\nend_header\n" + lines;
 }
 
+/// The same lines, each with something more.
+std::string visible_with(std::string lines, const std::string& more) {
+  for (std::size_t at = lines.find('\n'); at != std::string::npos; at = lines.find('\n', at + more.size() + 1)) {
+    lines.insert(at, more);
+  }
+  return lines;
+}
+
 Result<LoadedScene> joined(const std::string& visible, const std::string& thermal, double distance = 0) {
   const test::TemporaryFolder folder;
   return read_ply_with_thermal(folder.write("v.ply", visible), folder.write("t.ply", thermal), {}, distance);
@@ -85,6 +93,21 @@ TEST(ThermalJoin, TakesSmallThingsInALargeSceneByPlaceWhereTheirOrderDiffers) {
                             thermal_file("0 0 0 1\n100.004 0 0 2\n100.024 0 0 3\n", 3));
   ASSERT_TRUE(moved);
   EXPECT_EQ(note_count(moved.value(), "thermal_joined_in_order"), 3U);
+}
+
+TEST(ThermalJoin, TellsThatAHotReadingFoundNoVertex) {
+  std::string visible, thermal;
+  for (int i = 0; i < 100; ++i) visible += std::to_string(i % 10) + ' ' + std::to_string(i / 10) + " 0\n";
+  for (int i = 0; i < 361; ++i) {
+    thermal +=
+        std::to_string(0.5 * (i % 19)) + ' ' + std::to_string(0.5 * (i / 19)) + (i == 181 ? " 0 500\n" : " 0 20\n");
+  }
+  const auto scene = joined(visible_file(visible, 100), thermal_file(thermal, 361));
+  ASSERT_TRUE(scene);
+  EXPECT_EQ(note_count(scene.value(), "thermal_extremes_lost"), 1U);
+  const auto kept = joined(visible_file(visible, 100), thermal_file(visible_with(visible, " 20"), 100));
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(note_count(kept.value(), "thermal_extremes_lost"), 0U);
 }
 
 TEST(ThermalJoin, TakesTheNearestWithinTheDistance) {
