@@ -15,7 +15,7 @@ if(Python3_FOUND)
     COMMAND ${Python3_EXECUTABLE} ${package_folder}/describe.py completion $<TARGET_FILE:spectra> > ${package_made}/spectra
     COMMAND ${Python3_EXECUTABLE} ${package_folder}/notices.py ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR}/web/dist > ${package_made}/licences.txt
     COMMAND gzip -9nc ${package_made}/licences.txt > ${package_made}/third-party-notices.gz
-    COMMAND gzip -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${package_made}/changelog.gz
+    COMMAND gzip -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${package_made}/CHANGELOG.md.gz
     DEPENDS spectra VERBATIM)
 endif()
 
@@ -24,7 +24,7 @@ install(DIRECTORY web/dist/ DESTINATION share/spectra/web PATTERN ".has_module" 
 install(FILES ${package_made}/licences.txt DESTINATION share/spectra/web)
 install(FILES ${package_made}/spectra.1.gz DESTINATION share/man/man1)
 install(FILES ${package_made}/spectra DESTINATION share/bash-completion/completions)
-install(FILES ${package_made}/third-party-notices.gz ${package_made}/changelog.gz ${package_folder}/copyright
+install(FILES ${package_made}/third-party-notices.gz ${package_made}/CHANGELOG.md.gz ${package_folder}/copyright
   docs/operations.md docs/access.md docs/ingest.md docs/store.md DESTINATION share/doc/spectra)
 install(DIRECTORY deploy/proxy/ DESTINATION share/doc/spectra/examples)
 install(PROGRAMS ${package_folder}/hand-over DESTINATION lib/spectra)
