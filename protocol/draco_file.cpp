@@ -161,6 +161,27 @@ Result<void> check(const DracoFileInput& input, DracoKeeping keeping, int speed)
   return success();
 }
 
+/// An edge that very many triangles share, as no surface has one: Draco's edgebreaker takes time by the square of their number.
+bool has_crowded_edge(std::size_t vertex_count, std::span<const TileTriangle> triangles) {
+  constexpr std::uint32_t kMost = 256;
+  std::vector<std::uint32_t> valence(vertex_count);
+  for (const TileTriangle& triangle : triangles) {
+    for (const std::uint32_t vertex : triangle) ++valence[vertex];
+  }
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+  for (const TileTriangle& triangle : triangles) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const auto [a, b] = std::minmax(triangle[corner], triangle[(corner + 1) % 3]);
+      if (a != b && valence[a] > kMost && valence[b] > kMost) edges.emplace_back(a, b);
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (std::size_t i = kMost; i < edges.size(); ++i) {
+    if (edges[i] == edges[i - kMost]) return true;
+  }
+  return false;
+}
+
 int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
   if (is_point_cloud)
     return keeping == DracoKeeping::Shape ? draco::POINT_CLOUD_KD_TREE_ENCODING
@@ -172,6 +193,8 @@ int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
 
 Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed) {
   BOOST_OUTCOME_TRYV(check(input, keeping, speed));
+  if (keeping == DracoKeeping::Shape && has_crowded_edge(input.positions_m.size(), input.triangles))
+    keeping = DracoKeeping::Order;
   DracoFile file;
   draco::Mesh mesh;
   mesh.set_num_points(static_cast<std::uint32_t>(input.positions_m.size()));

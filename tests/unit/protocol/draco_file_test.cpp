@@ -285,5 +285,27 @@ TEST(DracoFile, RefusesArraysThatDoNotMatch) {
   EXPECT_TRUE(draco_file(scene.input(0), DracoKeeping::Shape, 7).has_error());
 }
 
+TEST(DracoFile, WithAnEdgeOfVeryManyTrianglesKeepsEveryOne) {
+  const std::vector<TileTriangle> same(50'000, TileTriangle{0, 1, 2});
+  const Scene scene = numbered({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, same);
+  const auto file = draco_file(scene.input(0.01F), DracoKeeping::Shape, 5);
+  ASSERT_TRUE(file) << file.error().message;
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(file.value().bytes.data()), file.value().bytes.size());
+  draco::Decoder decoder;
+  const auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
+  ASSERT_TRUE(mesh.ok());
+  EXPECT_EQ(mesh.value()->num_faces(), same.size());
+}
+
+TEST(DracoFile, RefusesASceneThatIsTooLargeForItsStep) {
+  for (const float far : {3e38F, -3.4e38F, 1e30F}) {
+    const Scene scene = numbered({{0, 0, far}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+    const auto file = draco_file(scene.input(0.01F), DracoKeeping::Shape, 5);
+    ASSERT_FALSE(file) << far;
+    EXPECT_NE(file.error().message.find("too large for its position step"), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace spectra::protocol
