@@ -25,6 +25,9 @@ inline constexpr int kWrongUsage = 2;
 struct ServeOptions {
   std::optional<std::filesystem::path> scene;  ///< Absent: the demo scene.
   std::optional<std::filesystem::path> thermal;
+  std::optional<std::filesystem::path> frames;                        ///< Mapped into a live map.
+  bool is_demo_drive = false;                                         ///< A simulated robot maps into a live map.
+  std::optional<double> voxel_m;                                      ///< Of what is mapped.
   bool is_live = false;                                               ///< Begins with an empty map.
   std::optional<std::filesystem::path> store;                         ///< Keeps the blocks of a live map.
   std::uint64_t history_bytes = store::StoreOptions{}.history_bytes;  ///< Of the store.
@@ -107,8 +110,10 @@ struct CertificateOptions {
 };
 
 struct MapOptions {
-  std::filesystem::path frames;                ///< A folder of them.
-  std::filesystem::path output;                ///< The mesh.
+  std::filesystem::path frames;  ///< A folder of them.
+  std::filesystem::path output;  ///< The mesh; empty: none.
+  std::string to;                ///< A server to send it to while it grows; empty: none.
+  std::optional<std::filesystem::path> token_file;
   std::optional<std::filesystem::path> poses;  ///< Absent: the folder's.
   std::optional<std::filesystem::path> vignetting;
   double voxel_m = 0.01;

@@ -4,16 +4,19 @@
 #include <chrono>
 #include <cmath>
 #include <future>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/app/unit_sender.hpp"
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/map_ply.hpp"
 #include "server/mapping/mapper.hpp"
@@ -97,8 +100,17 @@ void print_figures(const mapping::Mapper& mapper, const mapping::UnitMesh& mesh,
 int run_map(const MapOptions& options) {
   using Clock = std::chrono::steady_clock;
   const Interruption interruption;
-  if (options.output.extension() != ".ply")
+  if (options.output.empty() && options.to.empty()) {
+    return fail(kWrongUsage, "name a file to write (OUT.ply), a server to send to (--to URL), or both");
+  }
+  if (!options.output.empty() && options.output.extension() != ".ply")
     return fail(kWrongUsage, options.output.string() + ": the output must end in .ply");
+  std::optional<UnitSender> sender;
+  if (!options.to.empty()) {
+    auto opened = UnitSender::to(options.to, options.token_file);
+    if (const auto* wrong = std::get_if<std::string>(&opened)) return fail(kWrongUsage, *wrong);
+    sender.emplace(std::get<UnitSender>(std::move(opened)));
+  }
   const auto begin = Clock::now();
   auto folder = mapping::FrameFolder::open(options.frames, options.poses);
   if (!folder) return fail(folder.error());
@@ -127,6 +139,11 @@ int run_map(const MapOptions& options) {
     const auto before = Clock::now();
     mapper.fuse(loaded.frame, folder.value().trajectory(), faults);
     frame_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - before).count());
+    if (sender) {
+      const auto problem =
+          sender->send_changes(mapper, folder.value().trajectory().at(loaded.frame.time_s), row + 1 == count, pool);
+      if (problem) return fail(kJobFailed, *problem);
+    }
     fusion::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
   }
   const mapping::UnitMesh mesh = mapper.whole_mesh(progress);
@@ -135,10 +152,16 @@ int run_map(const MapOptions& options) {
     print_faults(faults);
     return fail(kJobFailed, options.frames.string() + ": none of its frames gives a surface; nothing was written");
   }
-  const auto written = mapping::write_map_ply(options.output, mesh, mapper.begin_s(), progress);
+  const auto written = options.output.empty()
+                           ? fusion::Result<void>(fusion::success())
+                           : mapping::write_map_ply(options.output, mesh, mapper.begin_s(), progress);
   line.end();
   print_faults(faults);
   if (!written) return fail(written.error());
+  if (sender) {
+    fmt::print("sent         {} units, {} of them again, {} refused\n", sender->sent_count(), sender->again_count(),
+               sender->refused_count());
+  }
   print_figures(mapper, mesh, frame_ms, std::chrono::duration<double>(Clock::now() - begin).count());
   return kDone;
 }

@@ -64,6 +64,18 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--listen", options.listen, "Where to listen, ADDRESS:PORT; port 0 picks a free one")
       ->capture_default_str();
   command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
+  command
+      ->add_option("--map", options.frames,
+                   "Begin with an empty map and fill it with what is made of a folder of frames")
+      ->excludes(scene)
+      ->excludes("--demo");
+  command->add_flag("--demo-drive", options.is_demo_drive, "Begin with an empty map that a simulated robot fills")
+      ->excludes(scene)
+      ->excludes("--demo")
+      ->excludes("--map");
+  command
+      ->add_option("--voxel", options.voxel_m, "The size of a voxel in metres, of --map (0.01) and --demo-drive (0.02)")
+      ->check(CLI::Range(0.001, 1.0));
   command->add_flag("--live", options.is_live, "Begin with an empty map, made of the blocks that are put into it")
       ->excludes(scene)
       ->excludes("--demo");
@@ -251,7 +263,11 @@ void add_certificate(CLI::App& app, CertificateOptions& options, Run& run) {
 void add_map(CLI::App& app, MapOptions& options, Run& run) {
   auto* command = app.add_subcommand("map", "Make a multispectral mesh of depth, colour and thermal frames");
   command->add_option("frames", options.frames, "A folder with frames.txt, poses.txt and calibration.json")->required();
-  command->add_option("output", options.output, "The mesh to write, a PLY file")->required();
+  command->add_option("output", options.output, "The mesh to write, a PLY file");
+  command->add_option("--to", options.to,
+                      "A server to whose map it is sent while it grows, such as http://127.0.0.1:8080");
+  command->add_option("--token-file", options.token_file,
+                      "A file that holds the token of the role ingest; else SPECTRA_TOKEN in the environment");
   command->add_option("--voxel", options.voxel_m, "The size of a voxel in metres")
       ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str();

@@ -19,6 +19,7 @@
 #include "server/app/http_api.hpp"
 #include "server/app/invitation.hpp"
 #include "server/app/log_setup.hpp"
+#include "server/app/map_feed.hpp"
 #include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/serve_setup.hpp"
@@ -80,7 +81,7 @@ class SceneLoader {
   SceneLoader(const ServeOptions& options, ServedScene& served, MapKeeper& map, HttpServer& server)
       : thread_([this, &options, &served, &map, &server] {
           try {
-            if (options.is_live || options.store) {
+            if (options.is_live || options.store || options.frames || options.is_demo_drive) {
               served.progress.set("Reading the map");
               if (const auto problem = map.restore()) throw std::runtime_error(*problem);
               served.progress.set(std::nullopt);
@@ -147,6 +148,14 @@ int run_serve(const ServeOptions& options) {
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
   auto& setup = std::get<ServeSetup>(looked);
   raise_descriptor_limit();
+  std::optional<FrameStream> frames;
+  if (options.frames) {
+    auto folder = mapping::FrameFolder::open(*options.frames);
+    if (!folder) return fail(folder.error());
+    frames = stream_of(std::move(folder).value());
+  } else if (options.is_demo_drive) {
+    frames = demo_drive_stream();
+  }
 
   NetOptions net;
   if (setup.tokens) {
@@ -196,12 +205,17 @@ int run_serve(const ServeOptions& options) {
   }
   api.set_metrics(server->metrics());
   for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
+  std::unique_ptr<MapFeed> feed;
   if (options.invited) print_invitation(*server, *net.access, *options.invited);
   if (options.is_insecure && !is_loopback(setup.listen))
     spdlog::warn("anybody on the network may watch and operate (--insecure)");
   std::fflush(stdout);
 
   SceneLoader loader(options, *served, map, *server);
+  if (frames) {
+    feed = std::make_unique<MapFeed>(std::move(*frames), options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01),
+                                     map, [&loader] { return loader.is_done(); });
+  }
   server->run();
   if (!loader.is_done()) {
     // Reading cannot be interrupted, and nothing of it needs to be put in order.
@@ -215,6 +229,7 @@ int run_serve(const ServeOptions& options) {
     spdlog::default_logger()->flush();
     std::_Exit(kDone);
   }).detach();
+  feed.reset();
   // Whoever still answers does so to a server that is there.
   map.end();
   served->pool.stop();

@@ -21,6 +21,7 @@ constexpr double kExposureSeconds = 0.010;  ///< A pixel of a microbolometer fol
 constexpr double kAfterShutterSeconds = 0.3;
 constexpr float kAfterShutter = 10;   ///< Times the variance.
 constexpr float kMostVariance = 9;    ///< K^2; a look that knows less says nothing.
+constexpr float kNewHeat = 1000;      ///< Kelvin by which a first temperature counts as a change.
 constexpr float kContradiction = 25;  ///< Variances; a look that is farther off than that tells of a change.
 constexpr std::size_t kLeastCompared = 300;
 /// How an offset may have wandered when nothing tells it: at once, and as a random walk.
@@ -253,7 +254,18 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
   const float trusted =
       report.spread_kelvin > 0 ? static_cast<float>(rules_.trusted_gap_s) : std::numeric_limits<float>::infinity();
   pool.for_each(looks.size(), [&](std::size_t chunk) {
+    // The looks of a block follow each other.
+    std::int32_t block = -1;
+    float warmest = 0;
+    const auto note = [&] {
+      if (block >= 0) map.head(block).warmed += warmest;
+    };
     for (const Look& look : looks[chunk]) {
+      if (look.block != block) {
+        note();
+        block = look.block;
+        warmest = 0;
+      }
       HeatBlock& heat = map.heat(look.block);
       float& celsius = heat.celsius[look.voxel];
       float& variance = heat.variance[look.voxel];
@@ -263,7 +275,7 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
       if (std::isinf(variance)) {
         celsius = seen;
         variance = r;
-        map.head(look.block).warmed = 1e3F;
+        warmest = kNewHeat;
       } else {
         const float elapsed = std::max(0.0F, now - heat.seen_s[look.voxel]);
         float predicted = variance + process * std::min(elapsed, trusted);
@@ -273,11 +285,11 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
         const float gain = predicted / (predicted + r);
         celsius += gain * innovation;
         variance = (1 - gain) * predicted;
-        BlockHead& head = map.head(look.block);
-        head.warmed = std::max(head.warmed, std::abs(celsius - before));
+        warmest = std::max(warmest, std::abs(celsius - before));
       }
       heat.seen_s[look.voxel] = now;
     }
+    note();
   });
   return report;
 }

@@ -113,11 +113,21 @@ void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLo
   figures_.largest_offset_kelvin = std::max(figures_.largest_offset_kelvin, std::abs(report.offset_kelvin));
 }
 
-UnitMesh Mapper::whole_mesh(const fusion::Progress& progress) const {
-  std::vector<UnitMesh> units(map_.units().size());
+MeshRules Mapper::mesh_rules() const {
   MeshRules rules = settings_.mesh;
   rules.least_sigma_kelvin =
       std::max(rules.least_sigma_kelvin, static_cast<float>(kSystematic * figures_.spread_kelvin));
+  return rules;
+}
+
+std::vector<PublishedUnit> Mapper::changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
+                                                 server::WorkerPool& pool) {
+  return publisher.take(map_, mesh_rules(), eye, pool);
+}
+
+UnitMesh Mapper::whole_mesh(const fusion::Progress& progress) const {
+  std::vector<UnitMesh> units(map_.units().size());
+  const MeshRules rules = mesh_rules();
   std::size_t done = 0;
   constexpr std::size_t kGroup = 64;
   while (done < units.size()) {

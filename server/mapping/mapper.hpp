@@ -11,6 +11,7 @@
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/heat_fusion.hpp"
 #include "server/mapping/surface_mesh.hpp"
+#include "server/mapping/unit_publisher.hpp"
 #include "server/mapping/voxel_map.hpp"
 
 namespace spectra::mapping {
@@ -48,12 +49,17 @@ class Mapper {
   static constexpr double kSystematic = 0.5;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
+  /// What has changed since the last call with this publisher.
+  std::vector<PublishedUnit> changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
+                                           server::WorkerPool& pool);
+
   const VoxelMap& map() const { return map_; }
   const MapperFigures& figures() const { return figures_; }
   /// The time of the first frame, which seen_s counts from.
   double begin_s() const { return begin_s_.value_or(0); }
 
  private:
+  MeshRules mesh_rules() const;
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);

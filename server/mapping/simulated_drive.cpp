@@ -116,12 +116,13 @@ auto mixed(const RenderedPicture& picture, std::size_t pixel, const fusion::Tria
 
 SimulatedDrive::SimulatedDrive(const DriveOptions& options, const fusion::Progress& progress)
     : options_(options), truth_(fusion::true_demo_scene({options.vertex_count, options.seed}, progress)) {
-  calibration_.depth.camera = pinhole(640, 480, 585);
+  const int n = options.finer_than;
+  calibration_.depth.camera = pinhole(640 / n, 480 / n, 585.0 / n);
   auto& colour = calibration_.colour.emplace();
-  colour.camera = pinhole(640, 480, 525);
+  colour.camera = pinhole(640 / n, 480 / n, 525.0 / n);
   colour.from_depth.translation() = Eigen::Vector3d(-0.025, 0, 0);
   auto& thermal = calibration_.thermal.emplace();
-  thermal.camera = pinhole(384, 288, 290);
+  thermal.camera = pinhole(384 / n, 288 / n, 290.0 / n);
   thermal.from_depth.translation() = Eigen::Vector3d(0.045, 0.012, 0);
   thermal.from_depth.linear() = Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.3, 0.9, 0.1).normalized()).toRotationMatrix();
   thermal.netd_kelvin = kWhiteKelvin;

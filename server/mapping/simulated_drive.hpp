@@ -17,6 +17,7 @@ struct DriveOptions {
   double depth_hz = 10;  ///< Of depth and colour.
   double thermal_hz = 12.5;
   std::uint64_t seed = 1;  ///< Another number, other noise and another path through the same kind of office.
+  int finer_than = 1;      ///< 2: half as many pixels each way.
   std::uint64_t vertex_count = 400'000;  ///< Of the true surfaces.
   double pose_drift_m =
       0;  ///< Random walk of the told poses, metres after a second; turns drift by as many radians a metre.

@@ -183,12 +183,46 @@ class Mesher {
 
 }  // namespace
 
+namespace {
+
+/// Leaves out vertices that no triangle has: those of triangles without area.
+void drop_unused(UnitMesh& mesh) {
+  std::vector<std::uint32_t> place(mesh.positions.size(), 0);
+  for (const fusion::Triangle& t : mesh.triangles) {
+    for (const std::uint32_t v : t) place[v] = 1;
+  }
+  std::uint32_t next = 0;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (place[i] == 0) continue;
+    mesh.positions[next] = mesh.positions[i];
+    mesh.colours[next] = mesh.colours[i];
+    mesh.celsius[next] = mesh.celsius[i];
+    mesh.sigma_kelvin[next] = mesh.sigma_kelvin[i];
+    mesh.seen_s[next] = mesh.seen_s[i];
+    mesh.edges[next] = mesh.edges[i];
+    place[i] = next++;
+  }
+  mesh.positions.resize(next);
+  mesh.colours.resize(next);
+  mesh.celsius.resize(next);
+  mesh.sigma_kelvin.resize(next);
+  mesh.seen_s.resize(next);
+  mesh.edges.resize(next);
+  for (fusion::Triangle& t : mesh.triangles) {
+    for (std::uint32_t& v : t) v = place[v];
+  }
+}
+
+}  // namespace
+
 UnitMesh mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules) {
   Mesher mesher(map, rules);
   for (const std::int32_t block : map.units()[static_cast<std::size_t>(unit)].blocks) {
     if (block >= 0) mesher.add_block(block);
   }
-  return mesher.take();
+  UnitMesh mesh = mesher.take();
+  drop_unused(mesh);
+  return mesh;
 }
 
 UnitMesh joined(const std::vector<UnitMesh>& units) {

@@ -322,8 +322,8 @@ class Sending {
       const auto interval = std::chrono::duration<double>(1 / *limits_.blocks_per_s);
       not_before_ = std::max(not_before_, Clock::now()) + std::chrono::duration_cast<Clock::duration>(interval);
     }
-    const protocol::IngestHeader header{protocol::IngestKind::Put, next_sequence_++,
-                                        static_cast<std::uint16_t>(block->target.size()),
+    const auto kind = block->ply.empty() ? protocol::IngestKind::Remove : protocol::IngestKind::Put;
+    const protocol::IngestHeader header{kind, next_sequence_++, static_cast<std::uint16_t>(block->target.size()),
                                         static_cast<std::uint32_t>(block->ply.size())};
     under_way_.emplace(header.sequence, index);
     sent_.blocks += 1;

@@ -30,7 +30,7 @@ std::variant<IngestAddress, std::string> parsed_ingest_address(std::string_view 
 /// A block that is about to be sent.
 struct OutgoingBlock {
   std::string target;  ///< As docs/protocol.md, "A stream of blocks", has it.
-  std::string ply;
+  std::string ply;     ///< Empty: the block is to be taken out.
 };
 
 /// What is sent; all functions are called by send_blocks, in its thread.

@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 import zlib
 
 SPECTRA = os.environ["SPECTRA_BIN"]
@@ -118,6 +119,53 @@ class Frames(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("nothing was written", done.stderr)
         self.assertFalse(os.path.exists(self.output))
+
+    def server(self, *arguments):
+        """A server on a free port; its address."""
+        child = subprocess.Popen([SPECTRA, "serve", *arguments, "--listen", "127.0.0.1:0", "--web", self.folder], stdout=subprocess.PIPE,
+                                 stderr=subprocess.DEVNULL, text=True)
+        self.addCleanup(child.stdout.close)
+        self.addCleanup(child.wait)
+        self.addCleanup(child.terminate)
+        return child.stdout.readline().split()[-1]
+
+    @staticmethod
+    def blocks(url):
+        with urllib.request.urlopen(url + "/api/v1/blocks?limit=1000") as answer:
+            return json.load(answer)["blocks"]
+
+    def wait_for_blocks(self, url, count):
+        for _ in range(400):
+            found = self.blocks(url)
+            if len(found) >= count:
+                return found
+            time.sleep(0.05)
+        self.fail("the map stays empty")
+
+    def test_sends_units_to_a_server(self):
+        self.write("index.html", "")
+        url = self.server("--live")
+        done = subprocess.run([SPECTRA, "map", self.folder, self.output, "--to", url, "--voxel", "0.02"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(" 0 refused", done.stdout)
+        blocks = self.blocks(url)
+        self.assertTrue(all(block["id"].startswith("unit_") for block in blocks))
+        mesh = json.loads(subprocess.run([SPECTRA, "info", "--json", self.output], capture_output=True, text=True, check=True).stdout)
+        # Units have vertices of their own where they meet.
+        self.assertGreaterEqual(sum(block["vertex_count"] for block in blocks), mesh["vertex_count"])
+        self.assertEqual(sum(block["triangle_count"] for block in blocks), mesh["triangle_count"])
+        self.assertEqual(subprocess.run([SPECTRA, "map", self.folder], capture_output=True).returncode, 2)
+
+    def test_a_server_maps_frames_itself(self):
+        self.write("index.html", "")
+        self.assertGreater(len(self.wait_for_blocks(self.server("--map", self.folder, "--voxel", "0.02"), 4)), 3)
+        done = subprocess.run([SPECTRA, "serve", "--map", self.path("none"), "--listen", "127.0.0.1:0"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("no folder of frames", done.stderr)
+
+    def test_a_simulated_robot_fills_a_map(self):
+        self.write("index.html", "")
+        self.assertGreater(len(self.wait_for_blocks(self.server("--demo-drive"), 20)), 19)
 
     def test_an_end_in_the_middle_leaves_nothing(self):
         before = set(os.listdir(self.folder))
