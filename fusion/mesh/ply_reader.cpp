@@ -197,7 +197,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
   }
   scene.mesh.has_temperature = true;
   report(options.progress, kJoiningPhase, 0);
-  BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene));
+  BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene, options.progress));
   const auto missing_count = static_cast<std::uint64_t>(
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
                     [](float celsius) { return std::isnan(celsius); }));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -216,8 +217,9 @@ void for_ranges(std::size_t count, Work work) {
 /// The thermal surface under a scene's vertices.
 class PlaceJoin {
  public:
-  PlaceJoin(const MultispectralMesh& scene, const MultispectralMesh& thermal)
-      : scene_(scene),
+  PlaceJoin(const MultispectralMesh& scene, const MultispectralMesh& thermal, const Progress& progress)
+      : progress_(progress),
+        scene_(scene),
         thermal_(thermal),
         positions_(positions_in(scene, thermal)),
         is_border_(border_vertices(thermal)),
@@ -230,8 +232,15 @@ class PlaceJoin {
   /// Looks from every vertex of the scene, not further than `most`.
   void look(double most) {
     places_.assign(scene_.vertex_count(), {});
+    std::atomic<std::size_t> done_count = 0;
     for_ranges(scene_.vertex_count(), [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin; v < end; ++v) {
+        if (v % kReportedAt == 0) {
+          const std::size_t done = done_count += kReportedAt;
+          report(progress_, kJoiningPhase,
+                 kBuildingShare + (1 - kBuildingShare) * std::min(1.0, static_cast<double>(done) /
+                                                                           static_cast<double>(scene_.vertex_count())));
+        }
         const Vec3f& place = scene_.positions()[v];
         const auto hit = surface_.find(place, most);
         if (!hit) continue;
@@ -335,6 +344,11 @@ class PlaceJoin {
     return celsius[hit.corners[static_cast<std::size_t>(heaviest)]];
   }
 
+  static constexpr std::size_t kReportedAt = 4096;
+  /// Of the time, until places can be looked for.
+  static constexpr double kBuildingShare = 0.1;
+
+  const Progress& progress_;
   const MultispectralMesh& scene_;
   const MultispectralMesh& thermal_;
   std::vector<Vec3f> positions_;
@@ -365,9 +379,9 @@ std::string percent_text(std::uint64_t part, std::uint64_t whole) {
 }
 
 Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, const Box& scene_box,
-                           const Box& thermal_box, LoadedScene& scene) {
+                           const Box& thermal_box, LoadedScene& scene, const Progress& progress) {
   MultispectralMesh& mesh = scene.mesh;
-  PlaceJoin join(mesh, thermal.mesh);
+  PlaceJoin join(mesh, thermal.mesh, progress);
   double reach = join_distance_m;
   if (reach > 0) {
     join.look(reach);
@@ -439,7 +453,8 @@ Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal)
   return success();
 }
 
-Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene) {
+Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
+                          const Progress& progress) {
   MultispectralMesh& mesh = scene.mesh;
   const Box scene_box = core_box(mesh);
   const Box thermal_box = core_box(thermal.mesh);
@@ -455,7 +470,7 @@ Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, Lo
       return success();
     }
   }
-  return join_by_place(thermal, join_distance_m, scene_box, thermal_box, scene);
+  return join_by_place(thermal, join_distance_m, scene_box, thermal_box, scene, progress);
 }
 
 }  // namespace spectra::fusion

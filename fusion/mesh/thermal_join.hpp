@@ -2,6 +2,7 @@
 
 #include "fusion/error.hpp"
 #include "fusion/mesh/ply_reader.hpp"
+#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 
@@ -17,8 +18,9 @@ Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal)
 ///   vertices, or three times what the surfaces are apart in the middle (two reconstructions of one thing never
 ///   coincide), or half an edge of the coarser of the two, but at most a fiftieth of the scene. Beyond the border of the thermal surface it reaches one spacing, or a third of the distance.
 ///   What is not reached is missing. Any number of threads, the same answer.
-/// Notes are added to the scene's: "thermal_joined_in_order", or "thermal_joined_nearest" with how many and how far, and
+/// `progress` is told of kJoiningPhase. Notes are added to the scene's: "thermal_joined_in_order", or "thermal_joined_nearest" with how many and how far, and
 /// "thermal_not_reached". Unsupported when less than a tenth of either scene reaches the other.
-Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene);
+Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
+                          const Progress& progress = {});
 
 }  // namespace spectra::fusion

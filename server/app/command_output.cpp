@@ -56,7 +56,7 @@ std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
   std::vector<ProgressStage> stages;
   if (thermal) stages.push_back({fusion::kReadingThermalPhase, "reading " + thermal->filename().string(), 1});
   stages.push_back({fusion::kReadingPhase, "reading " + scene.filename().string(), 1});
-  if (thermal) stages.push_back({fusion::kJoiningPhase, "joining temperatures", 2});
+  if (thermal) stages.push_back({fusion::kJoiningPhase, "joining temperatures", 40});
   stages.push_back({fusion::kSurveyPhase, "surveying " + scene.filename().string(), 0.3});
   stages.insert(stages.end(), std::move_iterator(next.begin()), std::move_iterator(next.end()));
   return stages;

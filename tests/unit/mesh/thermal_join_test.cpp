@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <mutex>
 #include <random>
 #include <string>
 #include <vector>
@@ -93,6 +94,30 @@ TEST(ThermalJoin, TakesSmallThingsInALargeSceneByPlaceWhereTheirOrderDiffers) {
                             thermal_file("0 0 0 1\n100.004 0 0 2\n100.024 0 0 3\n", 3));
   ASSERT_TRUE(moved);
   EXPECT_EQ(note_count(moved.value(), "thermal_joined_in_order"), 3U);
+}
+
+TEST(ThermalJoin, TellsHowFarItIs) {
+  const auto grid = [](int side, double step, const char* more) {
+    std::string lines;
+    for (int i = 0; i < side * side; ++i) {
+      lines += std::to_string(step * (i % side)) + ' ' + std::to_string(step * (i / side)) + " 0" + more + '\n';
+    }
+    return lines;
+  };
+  const test::TemporaryFolder folder;
+  std::vector<double> shares;
+  std::mutex mutex;
+  ReadOptions options;
+  options.progress = [&](std::string_view phase, double share) {
+    const std::lock_guard lock(mutex);
+    if (phase == kJoiningPhase) shares.push_back(share);
+  };
+  ASSERT_TRUE(read_ply_with_thermal(folder.write("v.ply", visible_file(grid(150, 1, ""), 22'500)),
+                                    folder.write("t.ply", thermal_file(grid(75, 2, " 20"), 5625)), options, 0));
+  EXPECT_GE(shares.size(), 5U);
+  EXPECT_EQ(shares.front(), 0);
+  EXPECT_GT(*std::max_element(shares.begin(), shares.end()), 0.9);
+  EXPECT_LE(*std::max_element(shares.begin(), shares.end()), 1);
 }
 
 TEST(ThermalJoin, TellsThatAHotReadingFoundNoVertex) {
