@@ -454,7 +454,9 @@ std::optional<HttpReply> HttpConnection::upgrade_refusal_of(const Request& reque
 }
 
 HttpReply HttpConnection::static_reply(const HttpRequest& request) const {
-  const std::string path = request.target.path == "/login" ? "/login.html" : request.target.path;
+  std::string path = request.target.path;
+  if (path == "/login") path = "/login.html";
+  if (path == "/licences") path = "/licences.txt";
   const auto file = context_.files.find(path);
   if (!file) {
     if (path == "/") return text_reply(200, std::string(kNoWebClient), "text/html; charset=utf-8");
