@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "server/access/role.hpp"
 #include "server/app/version.hpp"
 #include "server/net/prometheus_text.hpp"
+#include "server/stream/duration_histogram.hpp"
 
 namespace spectra::server {
 namespace {
@@ -21,6 +23,18 @@ class Metrics {
   }
   void counter(std::string name, std::string help, double value) {
     metrics_.push_back({std::move(name), std::move(help), value, true, "", ""});
+  }
+  /// One of several of a name, told apart by whose it is.
+  void of_role(std::string name, std::string help, AccessRole role, double value, bool is_counter) {
+    metrics_.push_back({std::move(name), std::move(help), value, is_counter, "role", std::string(to_string(role))});
+  }
+  void durations(std::string name, std::string help, const std::string& what, const DurationHistogram& histogram) {
+    const auto counts = histogram.counts();
+    Metric metric{std::move(name), std::move(help), 0, false, "what", what};
+    metric.distribution = {{DurationHistogram::kBounds_s.begin(), DurationHistogram::kBounds_s.end()},
+                           {counts.counts.begin(), counts.counts.end()},
+                           counts.sum_s};
+    metrics_.push_back(std::move(metric));
   }
   void info(std::string name, std::string help, std::string label, std::string text) {
     metrics_.push_back({std::move(name), std::move(help), 1, false, std::move(label), std::move(text)});
@@ -95,6 +109,32 @@ std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
               as_double(served.cache.hit_count()));
   out.counter("spectra_frame_cache_misses_total", "Frames that had to be encoded.",
               as_double(served.cache.miss_count()));
+  const EncodingTimes& times = served.cache.times();
+  for (const auto& [what, histogram] :
+       {std::pair{"geometry", &times.geometry}, std::pair{"fusing", &times.fusing},
+        std::pair{"colours", &times.colours}, std::pair{"raw_layer", &times.raw_layer}}) {
+    out.durations("spectra_encoding_seconds", "What making the frames of a tile took.", what, *histogram);
+  }
+  for (const AccessRole role : kRoles) {
+    out.of_role("spectra_role_viewers", "Viewers connected now, by role.", role,
+                static_cast<double>(net.of(role).viewers), false);
+  }
+  for (const AccessRole role : kRoles) {
+    out.of_role("spectra_role_frames_sent_total", "Tile frames sent, by role.", role,
+                as_double(net.of(role).frames_sent), true);
+  }
+  for (const AccessRole role : kRoles) {
+    out.of_role("spectra_role_frame_bytes_sent_total", "Their bytes, by role.", role,
+                as_double(net.of(role).frame_bytes_sent), true);
+  }
+  for (const AccessRole role : kRoles) {
+    out.of_role("spectra_role_queued_bytes", "Messages that wait for viewers, by role.", role,
+                static_cast<double>(net.of(role).queued_bytes), false);
+  }
+  for (const AccessRole role : kRoles) {
+    out.of_role("spectra_role_viewers_cut_total", "Viewers cut by a deadline or a full queue, by role.", role,
+                as_double(net.of(role).viewers_cut), true);
+  }
   if (const auto scene = served.scenes.current()) {
     out.gauge("spectra_scene_revision", "Revision of the scene served.", scene->revision());
     out.gauge("spectra_scene_vertices", "Vertices of the scene served.", as_double(scene->vertex_count()));

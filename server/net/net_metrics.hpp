@@ -1,7 +1,11 @@
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+
+#include "server/access/role.hpp"
 
 namespace spectra::server {
 
@@ -25,6 +29,20 @@ struct NetMetrics {
   std::atomic<std::uint64_t> blocks_received{0};  ///< Over /ingest.
   std::atomic<std::uint64_t> block_bytes_received{0};
   std::atomic<std::uint64_t> blocks_refused{0};
+
+  /// Of the viewers of one role.
+  struct OfRole {
+    std::atomic<std::int64_t> viewers{0};  ///< Now.
+    std::atomic<std::uint64_t> viewers_cut{0};
+    std::atomic<std::uint64_t> frames_sent{0};
+    std::atomic<std::uint64_t> frame_bytes_sent{0};
+    std::atomic<std::int64_t> queued_bytes{0};  ///< Messages that wait now.
+  };
+  OfRole& of(AccessRole role) { return of_role_[static_cast<std::size_t>(role)]; }
+  const OfRole& of(AccessRole role) const { return of_role_[static_cast<std::size_t>(role)]; }
+
+ private:
+  std::array<OfRole, kRoles.size()> of_role_;
 };
 
 }  // namespace spectra::server

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace spectra::server {
 
-/// One number for /metrics.
+/// One number, or one distribution, for /metrics.
 struct Metric {
   std::string name;
   std::string help;
@@ -13,9 +16,17 @@ struct Metric {
   bool is_counter = false;  ///< Only ever rises; its name ends in _total.
   std::string label_name;   ///< Empty: no label.
   std::string label_value;
+
+  /// How often values were up to each bound, and beyond the last.
+  struct Distribution {
+    std::vector<double> bounds;
+    std::vector<std::uint64_t> counts;  ///< One more than bounds; not cumulative.
+    double sum = 0;
+  };
+  std::optional<Distribution> distribution = {};  ///< Instead of the value.
 };
 
-/// The metrics in the text format of Prometheus.
+/// The metrics in the text format of Prometheus. Those of one name, which differ in their label, stand one after the other.
 std::string prometheus_text(std::span<const Metric> metrics);
 
 }  // namespace spectra::server

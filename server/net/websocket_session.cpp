@@ -59,6 +59,8 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   is_open_ = true;
   context_.metrics.viewers += 1;
   context_.metrics.viewers_total += 1;
+  NetMetrics::OfRole& of_role = context_.metrics.of(who_.role);
+  of_role.viewers += 1;
   try {
     client_ = context_.viewers(self);
     client_->opened();
@@ -70,6 +72,8 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   if (client_) client_->closed();
   client_.reset();
   context_.metrics.viewers -= 1;
+  of_role.viewers -= 1;
+  of_role.queued_bytes -= static_cast<std::int64_t>(std::exchange(control_bytes_, 0));
   context_.remove(this);
 }
 
@@ -128,6 +132,7 @@ asio::awaitable<void> WebSocketSession::write_messages() {
                                                       asio::buffer(text.end)};
       if (!co_await write(buffers, true)) co_return;
       control_bytes_ -= text.size_bytes();
+      context_.metrics.of(who_.role).queued_bytes -= static_cast<std::int64_t>(text.size_bytes());
       context_.metrics.messages_sent += 1;
       continue;
     }
@@ -138,6 +143,8 @@ asio::awaitable<void> WebSocketSession::write_messages() {
         if (!co_await write(buffers, false)) co_return;
         context_.metrics.frames_sent += 1;
         context_.metrics.frame_bytes_sent += frame->size_bytes();
+        context_.metrics.of(who_.role).frames_sent += 1;
+        context_.metrics.of(who_.role).frame_bytes_sent += frame->size_bytes();
         continue;
       }
       may_have_frame_ = false;
@@ -226,9 +233,11 @@ void WebSocketSession::wake() {
 void WebSocketSession::send(OutgoingText text) {
   if (is_ended_ || closing_) return;
   control_bytes_ += text.size_bytes();
+  context_.metrics.of(who_.role).queued_bytes += static_cast<std::int64_t>(text.size_bytes());
   control_.push_back(std::move(text));
   if (control_bytes_ > context_.options.limits.control_queue_bytes) {
     context_.metrics.viewers_cut += 1;
+    context_.metrics.of(who_.role).viewers_cut += 1;
     close({websocket::close_code::policy_error, "messages to you pile up unread"});
     return;
   }
@@ -248,6 +257,7 @@ void WebSocketSession::end(bool is_cut, std::string_view why) {
   is_ended_ = true;
   if (is_cut) {
     context_.metrics.viewers_cut += 1;
+    context_.metrics.of(who_.role).viewers_cut += 1;
     spdlog::info("a viewer is cut: {}", why);
   } else {
     spdlog::debug("a viewer's session ended: {}", why);

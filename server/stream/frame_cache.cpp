@@ -69,6 +69,10 @@ std::uint64_t FrameCache::miss_count() const {
   return state_->miss_count();
 }
 
+const EncodingTimes& FrameCache::times() const {
+  return state_->times;
+}
+
 // Revisions start somewhere else in each run of the server, so that a viewer who comes back after a restart with
 // revisions of the last run does not name encodings of this one by accident.
 FrameCache::State::State(std::size_t capacity_bytes)

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/stream/duration_histogram.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/viewer_stream.hpp"
 
@@ -204,6 +205,8 @@ struct FrameCache::State {
   std::size_t size_bytes() const;
   std::uint64_t hit_count() const;
   std::uint64_t miss_count() const;
+
+  EncodingTimes times;
 
  private:
   struct Issued {

@@ -27,6 +27,7 @@ protocol::Result<std::shared_ptr<const EncodedTile>> geometry_of(const RawEncodi
 protocol::Result<Payload> encoded_layer(const RawEncoding& encoding, FrameCache::State& cache) {
   const Demand& demand = encoding.demand;
   BOOST_OUTCOME_TRY(const auto geometry, geometry_of(encoding, cache));
+  const TimedWork watch(cache.times.raw_layer);
   if (RawDemand::kLayers[encoding.layer] == Layer::Visible) {
     return encoded_visible_layer(*encoding.tile, *geometry, demand.encoder_speed, demand.colour_transform);
   }

@@ -14,7 +14,10 @@ namespace {
 /// Why it failed; empty when it did not.
 std::string encode_geometry(Encoding& encoding, FrameCache::State& cache) {
   const Demand& demand = encoding.demand;
-  auto result = encoded_tile(*encoding.tile, demand.position_step_m, demand.encoder_speed);
+  auto result = [&] {
+    const TimedWork watch(cache.times.geometry);
+    return encoded_tile(*encoding.tile, demand.position_step_m, demand.encoder_speed);
+  }();
   if (!result) return result.error().message;
   encoding.made_geometry = cache.store_geometry(demand.geometry_key(encoding.tile), std::move(result).value());
   return {};
@@ -24,7 +27,7 @@ std::string encode_colours(Encoding& encoding, FrameCache::State& cache) {
   const Demand& demand = encoding.demand;
   auto result =
       encoded_tile_colours(*encoding.tile, *encoding.geometry, *demand.plan, encoding.look, encoding.colour_bits,
-                           demand.encoder_speed, demand.colour_transform, demand.carries_marks());
+                           demand.encoder_speed, demand.colour_transform, demand.carries_marks(), &cache.times);
   if (!result) return result.error().message;
   encoding.made_colours = std::move(result).value();
   cache.store_colours(demand.colour_key(*encoding.geometry, encoding.colour_bits, encoding.look),

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include "fusion/temperature_codes.hpp"
 #include "protocol/draco_codec.hpp"
+#include "server/stream/duration_histogram.hpp"
 #include "server/stream/lattice.hpp"
 
 namespace spectra::server {
@@ -25,8 +27,12 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
 
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
                                                const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
-                                               int encoder_speed, protocol::ColourTransform transform, bool has_marks) {
+                                               int encoder_speed, protocol::ColourTransform transform, bool has_marks,
+                                               EncodingTimes* times) {
+  std::optional<TimedWork> watch;
+  if (times != nullptr) watch.emplace(times->fusing);
   const std::vector<fusion::Rgb8> fused = fused_colours(tile, plan, look);
+  if (times != nullptr) watch.emplace(times->colours);
   std::vector<protocol::ColourBytes> colours(geometry.input_of_decoded.size());
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];

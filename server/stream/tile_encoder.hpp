@@ -14,6 +14,8 @@
 
 namespace spectra::server {
 
+struct EncodingTimes;
+
 using Payload = std::shared_ptr<const std::vector<std::byte>>;
 
 /// The geometry of a tile as it goes over the wire, and how to put colours into its decoded order. Immutable.
@@ -29,12 +31,12 @@ struct EncodedTile {
 protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed);
 
 /// Fuses a tile under a look of it and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile; with
-/// which vertices are highlighted where it `has_marks`.
+/// which vertices are highlighted where it `has_marks`. `times` is told of both.
 protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
                                                const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
                                                int encoder_speed,
                                                protocol::ColourTransform transform = protocol::ColourTransform::None,
-                                               bool has_marks = false);
+                                               bool has_marks = false, EncodingTimes* times = nullptr);
 
 /// The visible colours of a tile in the decoded vertex order of `geometry`.
 protocol::Result<Payload> encoded_visible_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,

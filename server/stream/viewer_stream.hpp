@@ -95,6 +95,8 @@ struct ResumedTile {
   bool has_raw_layers = false;  ///< Both, in the form that it subscribes to.
 };
 
+struct EncodingTimes;
+
 /// Encoded geometry and colours, each made once and shared by every viewer with the same need; bounded in bytes, the
 /// least recently used goes first. Thread-safe. One for the whole server.
 class FrameCache {
@@ -104,6 +106,7 @@ class FrameCache {
   std::size_t size_bytes() const;
   std::uint64_t hit_count() const;   ///< Colour frames that were there when a viewer needed them.
   std::uint64_t miss_count() const;  ///< Encodings (geometry or colours) that had to be made.
+  const EncodingTimes& times() const;
 
   struct State;  ///< Seen by server/stream only; outlives the cache while a job of a stream still uses it.
   const std::shared_ptr<State>& state() { return state_; }

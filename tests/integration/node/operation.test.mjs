@@ -1,10 +1,11 @@
-// What whoever runs a server is told: its log as text and as JSON, on standard error and in a file.
+// What whoever runs a server is told: its log as text and as JSON, on standard error and in a file; what it counts, and the dashboard of it.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
+import { SpectraClient } from "./spectra_client.mjs";
 import { binary, serve } from "./spectra_server.mjs";
 
 const scratch = mkdtempSync(path.join(tmpdir(), "spectra-operation-"));
@@ -45,6 +46,37 @@ test("a file takes the log, and goes on where it ended", async () => {
     assert.equal(said.length, run);
     assert.match(said[0], /^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} info serving the live map/);
   }
+});
+
+test("the dashboard asks for what the server counts, and viewers are counted by role", async () => {
+  const server = await serve(["--demo"]);
+  const viewer = await SpectraClient.connect(server.url);
+  const complete = viewer.notification("stream.complete", 30_000);
+  await viewer.request("scene.subscribe", { channels: ["fused"] });
+  await complete;
+  const text = await (await fetch(`${server.url}/metrics`)).text();
+  const value = (line) => Number(new RegExp(`^${line.replace(/[{}+]/g, "\\$&")} (\\S+)$`, "m").exec(text)?.[1]);
+  // On loopback without tokens everybody is an admin.
+  assert.equal(value('spectra_role_viewers{role="admin"}'), 1);
+  assert.equal(value('spectra_role_viewers{role="viewer"}'), 0);
+  assert.equal(value('spectra_role_frames_sent_total{role="admin"}'), value("spectra_frames_sent_total"));
+  assert.ok(value('spectra_role_frame_bytes_sent_total{role="admin"}') > 100_000);
+  for (const what of ["geometry", "fusing", "colours"]) {
+    const count = value(`spectra_encoding_seconds_count{what="${what}"}`);
+    assert.ok(count > 0, `${what}: ${count}`);
+    assert.equal(value(`spectra_encoding_seconds_bucket{what="${what}",le="+Inf"}`), count);
+    assert.ok(value(`spectra_encoding_seconds_sum{what="${what}"}`) > 0);
+  }
+  const dashboard = readFileSync(new URL("../../../deploy/grafana/spectra.json", import.meta.url), "utf8");
+  const names = new Set(dashboard.match(/\b(spectra|process)_[a-z_]+/g));
+  assert.ok(names.size > 20);
+  for (const name of names) assert.match(text, new RegExp(`^${name}[ {]`, "m"), name);
+  viewer.close();
+  await viewer.closed;
+  const after = () => fetch(`${server.url}/metrics`).then((response) => response.text());
+  while (!/^spectra_role_viewers\{role="admin"\} 0$/m.test(await after())) await new Promise((resolve) => setTimeout(resolve, 20));
+  assert.match(await after(), /^spectra_role_queued_bytes\{role="admin"\} 0$/m);
+  assert.equal(await server.stop(), 0);
 });
 
 test("a log that cannot be is said before anything is served", () => {
