@@ -152,7 +152,8 @@ class Notes {
     }
     // Float coordinates far from 0 have been rounded before they came here.
     constexpr double kTooCoarse = 1.0 / 20'000;
-    if (facts_.origin != Vec3d{} && rounding > kTooCoarse * bulk.extent()) {
+    constexpr double kNoticed = 1e-5;  // metres
+    if (facts_.origin != Vec3d{} && rounding > std::max(kNoticed, kTooCoarse * bulk.extent())) {
       add("rounded_positions", vertices_.count,
           "Positions are declared as floats and far from 0, where floats are rounded to " + short_number(rounding) +
               " m; declare them as double, or write them closer to 0");

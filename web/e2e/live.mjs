@@ -10,10 +10,15 @@ const STEP_M = (SIDE - 1) * SCALE;
 /** Puts a block of a grid of 4 by 4 into the map, as any mapper would. Returns the revision of the map that has it. */
 async function put(server, column, row, { celsius = 20, height = 0, age_s = 0 } = {}) {
   const observed_at = Date.now() / 1000 - age_s;
-  const reply = await fetch(`${server.url}api/v1/blocks/b${column}.${row}?observed_at=${observed_at}`, {
-    method: 'PUT',
-    body: patch(column, row, { side: SIDE, scale: SCALE, celsius, height }),
-  });
+  const send = () =>
+    fetch(`${server.url}api/v1/blocks/b${column}.${row}?observed_at=${observed_at}`, {
+      method: 'PUT',
+      body: patch(column, row, { side: SIDE, scale: SCALE, celsius, height }),
+    });
+  let reply = await send();
+  // As the robot begins the map is not open yet: to be tried again, says docs/protocol.md.
+  for (const end = Date.now() + 10_000; reply.status === 503 && Date.now() < end; reply = await send())
+    await new Promise((resolve) => setTimeout(resolve, 50));
   assert.equal(reply.status, 200, await reply.text());
   return (await (await fetch(`${server.url}api/v1/scene`)).json()).revision;
 }

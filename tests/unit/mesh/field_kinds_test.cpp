@@ -164,6 +164,14 @@ TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
   EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
 }
 
+TEST(FieldKinds, WhatNobodyCanMeasureIsNoRounding) {
+  // A speck of half a millimetre, 3 m from 0: floats are a quarter of a micrometre apart there.
+  std::vector<std::string> lines;
+  for (int i = 0; i < 40; ++i)
+    lines.push_back("3.000" + std::to_string(i % 7) + " 2.001 1.000" + std::to_string(i % 3));
+  EXPECT_EQ(note_count(loaded(text_file("", lines)), "rounded_positions"), 0U);
+}
+
 TEST(FieldKinds, WhatIsProbablyNotMeantNeedsAttention) {
   const auto needs = [](const LoadedScene& scene, const std::string& id) {
     for (const Note& note : scene.notes) {
