@@ -70,6 +70,7 @@ struct BlockChange {
   float moved = 0;  ///< Of kDistanceOne.
   float recoloured = 0;
   bool has_surface = false;
+  bool is_free = false;
 };
 
 struct Kernel {
@@ -96,7 +97,7 @@ BlockChange fuse_distances(const Kernel& kernel, GridPlace at, VoxelBlock& block
              growth = static_cast<float>(kBehindSigmas * kernel.noise.growth_per_m),
              from = static_cast<float>(kernel.noise.from_m);
   float moved = 0;
-  std::int32_t surfaces = 0;
+  std::int32_t surfaces = 0, filled = 0;
   const auto corner = kernel.depth.view.corner(at);
   for (int row = 0; row < kBlockEdge * kBlockEdge; ++row) {
     const auto first = kernel.depth.view.row(corner, row);
@@ -121,10 +122,11 @@ BlockChange fuse_distances(const Kernel& kernel, GridPlace at, VoxelBlock& block
       const bool is_surface = std::min(std::abs(next), std::abs(old)) < 0.5F * kDistanceOne;
       moved = std::max(moved, is_surface ? std::abs(next - old) : 0.0F);
       surfaces |= is_surface ? 1 : 0;
+      filled |= next < 0.5F * kDistanceOne ? 1 : 0;
       nears[i] = w > 0 && std::abs(metres) < 2 * kernel.voxel_m ? pixel[i] : -1;
     }
   }
-  return {moved, 0, surfaces != 0};
+  return {moved, 0, surfaces != 0, filled == 0};
 }
 
 float fuse_channel(std::uint16_t& channel, std::uint8_t level, float share) {
@@ -254,8 +256,7 @@ bool may_be_seen(const DepthLook& look, const KernelCamera& camera, GridPlace at
 
 }  // namespace
 
-std::vector<std::int32_t> fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
-                                     server::WorkerPool& pool) {
+void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, server::WorkerPool& pool) {
   const double voxel_m = map.voxel_m();
   const Kernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
                       depth.frame.depth_m.data(),
@@ -264,7 +265,13 @@ std::vector<std::int32_t> fuse_depth(VoxelMap& map, const DepthLook& depth, cons
                       static_cast<float>(kTruncationVoxels * voxel_m),
                       static_cast<float>(kBehindVoxels * voxel_m),
                       static_cast<float>(voxel_m)};
-  for (const GridPlace& place : blocks_near_surface(depth, voxel_m, pool)) map.ensure(place);
+  std::vector<std::uint8_t> is_near;
+  for (const GridPlace& place : blocks_near_surface(depth, voxel_m, pool)) {
+    const auto block = static_cast<std::size_t>(map.ensure(place));
+    if (block >= is_near.size()) is_near.resize(static_cast<std::size_t>(map.block_end()), 0);
+    is_near[block] = 1;
+  }
+  is_near.resize(static_cast<std::size_t>(map.block_end()), 0);
 
   // All blocks that a pixel sees, or looks through.
   const float radius_m = static_cast<float>(0.5 * std::sqrt(3.0) * kBlockEdge * voxel_m);
@@ -304,13 +311,17 @@ std::vector<std::int32_t> fuse_depth(VoxelMap& map, const DepthLook& depth, cons
       VoxelBlock& voxels = map.voxels(blocks[i]);
       const BlockChange change = fuse_distances(kernel, head.at, voxels, near);
       head.has_surface = change.has_surface;
+      head.is_free = change.is_free;
       head.moved += change.moved / kDistanceOne * static_cast<float>(kTruncationVoxels);
       if (colour != nullptr && change.has_surface) {
         head.recoloured += fuse_colours(*colour, colour_camera, is_depth_camera, kernel, head.at, voxels, near);
       }
     }
   });
-  return blocks;
+  // What holds nothing needs no room, unless something is about to come there.
+  for (const std::int32_t block : blocks) {
+    if (map.head(block).is_free && is_near[static_cast<std::size_t>(block)] == 0) map.remove(block);
+  }
 }
 
 FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, server::WorkerPool& pool) {

@@ -29,13 +29,11 @@ struct ColourLook {
 };
 
 /// Fuses a depth picture, and a colour picture if there is one, into truncated signed distances along the line of sight (Curless and
-/// Levoy, SIGGRAPH 1996). Blocks near what is seen are made; all others before it are cleared towards free. Returns the blocks that were
-/// looked at, in rising order. The same bytes for any number of threads.
+/// Levoy, SIGGRAPH 1996). Blocks near what is seen are made; all others before it are cleared towards free, and taken out when nothing is left in them. The same bytes for any number of threads.
 ///
 /// A mean is kept as distance += (new - distance) w / (W + w), rounded to the nearest whole number but at least by one step towards the
 /// new value, so that it never stalls however heavy W is; W is at most kWeightMost.
-std::vector<std::int32_t> fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
-                                     server::WorkerPool& pool);
+void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, server::WorkerPool& pool);
 
 /// How well a depth picture fits the map where a pose puts it: pixels of a grid where both have something.
 struct FitOfDepth {

@@ -99,9 +99,17 @@ struct Drawing {
     const float beside = kBesideVoxels / static_cast<float>(kTruncationVoxels) * kDistanceOne;
     const float metres = static_cast<float>(kTruncationVoxels) * voxel_m / kDistanceOne;
     const auto corner = view.corner(map.head(index).at);
+    std::array<std::uint16_t, kBlockVoxels> near;
+    std::size_t count = 0;
+    const auto most = static_cast<std::int16_t>(beside);
     for (std::size_t voxel = 0; voxel < kBlockVoxels; ++voxel) {
+      near[count] = static_cast<std::uint16_t>(voxel);
+      const bool is_near = block.distance[voxel] <= most && block.distance[voxel] >= -most && block.weight[voxel] > 0;
+      count += is_near ? 1 : 0;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t voxel = near[i];
       const auto distance = static_cast<float>(block.distance[voxel]);
-      if (std::abs(distance) > beside || block.weight[voxel] == 0) continue;
       const int x = static_cast<int>(voxel) % kBlockEdge, y = static_cast<int>(voxel) / kBlockEdge % kBlockEdge,
                 z = static_cast<int>(voxel) / (kBlockEdge * kBlockEdge);
       const float gx = slope(block, voxel, x, 1), gy = slope(block, voxel, y, kBlockEdge),
@@ -112,10 +120,10 @@ struct Drawing {
       // gradient is larger.
       const float back = std::clamp(-distance / squared, -2 / std::sqrt(squared), 2 / std::sqrt(squared));
       std::array<float, 3> p{}, n{};
-      for (std::size_t i = 0; i < 3; ++i) {
-        n[i] = gx * view.step(0)[i] + gy * view.step(1)[i] + gz * view.step(2)[i];
-        p[i] = corner[i] + static_cast<float>(x) * view.step(0)[i] + static_cast<float>(y) * view.step(1)[i] +
-               static_cast<float>(z) * view.step(2)[i] + back * n[i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        n[k] = gx * view.step(0)[k] + gy * view.step(1)[k] + gz * view.step(2)[k];
+        p[k] = corner[k] + static_cast<float>(x) * view.step(0)[k] + static_cast<float>(y) * view.step(1)[k] +
+               static_cast<float>(z) * view.step(2)[k] + back * n[k];
       }
       if (p[2] < kNearest) continue;
       const float along = -(n[0] * p[0] + n[1] * p[1] + n[2] * p[2]);

@@ -27,8 +27,8 @@ std::vector<std::int32_t> neighbours_of(const VoxelMap& map, GridPlace at) {
 }
 
 /// The blocks noted more since the unit was looked at than it takes to tell it; the notes are taken back.
-bool take_notes(VoxelMap& map, const MapUnit& unit) {
-  float moved = 0, warmed = 0, recoloured = 0;
+bool take_notes(VoxelMap& map, MapUnit& unit) {
+  float moved = unit.moved, warmed = 0, recoloured = 0;
   for (const std::int32_t block : unit.blocks) {
     if (block < 0) continue;
     const BlockHead& head = map.head(block);
@@ -40,6 +40,7 @@ bool take_notes(VoxelMap& map, const MapUnit& unit) {
       recoloured <= UnitPublisher::kRecolouredLevels) {
     return false;
   }
+  unit.moved = 0;
   for (const std::int32_t block : unit.blocks) {
     if (block >= 0) map.head(block).moved = map.head(block).warmed = map.head(block).recoloured = 0;
   }
@@ -98,7 +99,7 @@ std::vector<PublishedUnit> UnitPublisher::take(VoxelMap& map, const MeshRules& r
                                                server::WorkerPool& pool) {
   std::vector<std::int32_t> looked_at;
   std::vector<std::uint8_t> is_noted(map.units().size(), 0);
-  for (std::size_t i = 0; i < is_noted.size(); ++i) is_noted[i] = take_notes(map, map.units()[i]) ? 1 : 0;
+  for (std::size_t i = 0; i < is_noted.size(); ++i) is_noted[i] = take_notes(map, map.unit(i)) ? 1 : 0;
   // A cell reaches one voxel into the next units, so that what changes there changes it, too.
   for (std::size_t i = 0; i < is_noted.size(); ++i) {
     const GridPlace at = map.units()[i].at;

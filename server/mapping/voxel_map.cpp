@@ -1,5 +1,6 @@
 #include "server/mapping/voxel_map.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace spectra::mapping {
@@ -35,7 +36,7 @@ std::int32_t VoxelMap::ensure(GridPlace block) {
   const GridPlace place = coarser(block, 2);
   const auto [entry, is_new] = unit_by_place_.try_emplace(key_of(place), static_cast<std::int32_t>(units_.size()));
   if (is_new) {
-    units_.push_back({place, {}});
+    units_.push_back({place, {}, 0});
     units_.back().blocks.fill(-1);
   }
   const std::int32_t unit = entry->second;
@@ -72,7 +73,9 @@ void VoxelMap::remove(std::int32_t block) {
     heat_.give_back(gone.heat);
     --heat_count_;
   }
-  units_[static_cast<std::size_t>(gone.unit)].blocks[index_within(gone.at, 2)] = -1;
+  MapUnit& unit = units_[static_cast<std::size_t>(gone.unit)];
+  unit.blocks[index_within(gone.at, 2)] = -1;
+  unit.moved = std::max(unit.moved, gone.moved);
   gone = {};
   voxels_.give_back(block);
   --block_count_;

@@ -53,6 +53,7 @@ struct BlockHead {
   std::int32_t unit = -1;    ///< Whose it is; -1: not in use.
   std::int32_t heat = -1;    ///< Its temperatures; -1: none.
   bool has_surface = false;  ///< Some voxel is near a surface.
+  bool is_free = true;       ///< Nothing but unseen space and what is well before surfaces.
   /// At most so much has changed since the unit was meshed: distance in voxels, temperature in kelvin, colour in levels.
   float moved = 0, warmed = 0, recoloured = 0;
 };
@@ -60,6 +61,7 @@ struct BlockHead {
 struct MapUnit {
   GridPlace at;                                    ///< In units.
   std::array<std::int32_t, kBlocksOfUnit> blocks;  ///< Index of each; -1: none.
+  float moved = 0;                                 ///< As BlockHead::moved, of blocks that were taken out.
 };
 
 /// Blocks of voxels in pools, found by their place: a hash of units of 4^3 blocks. What changes its structure is for one thread; different
@@ -90,6 +92,7 @@ class VoxelMap {
   HeatBlock& heat(std::int32_t block) { return heat_.at(head(block).heat); }
   const HeatBlock& heat(std::int32_t block) const { return heat_.at(head(block).heat); }
   const std::vector<MapUnit>& units() const { return units_; }
+  MapUnit& unit(std::size_t index) { return units_[index]; }
 
   std::size_t block_count() const { return block_count_; }
   std::size_t heat_count() const { return heat_count_; }

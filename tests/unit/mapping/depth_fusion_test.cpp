@@ -51,13 +51,16 @@ TEST_F(DepthFusion, PutsAWallWhereItIs) {
 TEST_F(DepthFusion, ClearsWhatIsGone) {
   VoxelMap map(kVoxel);
   const BoxWorld with{{wall(), {{-0.2, -0.2, 1.2}, {0.2, 0.2, 1.3}, {}}}}, without{{wall()}};
-  for (int i = 0; i < 3; ++i) look(map, with, looking_ahead(), pool_);
+  look(map, with, looking_ahead(), pool_);
   const auto is_before_wall = [](const UnitMesh& mesh) {
     return std::any_of(mesh.positions.begin(), mesh.positions.end(), [](const auto& p) { return p.z < 1.8F; });
   };
   EXPECT_TRUE(is_before_wall(mesh_of(map)));
-  for (int i = 0; i < 40; ++i) look(map, without, looking_ahead(), pool_);
+  for (int i = 0; i < 60; ++i) look(map, without, looking_ahead(), pool_);
   EXPECT_FALSE(is_before_wall(mesh_of(map)));
+  VoxelMap never(kVoxel);
+  for (int i = 0; i < 61; ++i) look(never, without, looking_ahead(), pool_);
+  EXPECT_EQ(map.block_count(), never.block_count()) << "no room is kept for what is gone";
 }
 
 TEST_F(DepthFusion, LeavesOutWhatLiesAtAnEdge) {
