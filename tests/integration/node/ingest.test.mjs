@@ -152,13 +152,15 @@ test("a server that stops answers what it can and says goodbye", async () => {
   assert.ok(!sender.answers.has(last) || sender.answers.get(last).method === "ingest.acknowledged");
 });
 
-test("every acknowledged block is there after kill -9, byte for byte", { timeout: 300_000 }, async (t) => {
+const KILL_ROUNDS = Number(process.env.SPECTRA_KILL_ROUNDS ?? 6);
+
+test("every acknowledged block is there after kill -9, byte for byte", { timeout: 60_000 + 20_000 * KILL_ROUNDS }, async (t) => {
   const store = path.join(scratch, "killed.sqlite");
   const acknowledged = new Map();
   const underWay = new Map();
   let rounds = 0;
   let told = 0;
-  for (; rounds < Number(process.env.SPECTRA_KILL_ROUNDS ?? 6); rounds += 1) {
+  for (; rounds < KILL_ROUNDS; rounds += 1) {
     const server = await serve(["--live", "--store", store]);
     const there = await blocksOf(server);
     for (const [id, hash] of acknowledged) {
