@@ -40,6 +40,17 @@ export function addAccessTests(browser) {
     assert.ok(!other.url().includes('#'), other.url());
     await tablet.close();
 
+    // Out, and in again.
+    await page.keyboard.press('?');
+    await page.getByRole('link', { name: 'Log out' }).click();
+    await page.getByRole('button', { name: 'Log out' }).click();
+    await page.locator('#token').waitFor();
+    await page.goto(server.url);
+    assert.equal(new URL(page.url()).pathname, '/login');
+    await page.locator('#token').fill(operator);
+    await page.keyboard.press('Enter');
+    await settled(page);
+
     // The token is taken back: the page does not go on looking alive.
     token('--remove', 'bridge');
     server.signal('SIGHUP');
