@@ -277,7 +277,7 @@ export class PictureRenderer {
       }
     });
     if (count === 0) return;
-    // The last one, for the browser's tools and e2e/fusing_time.mjs.
+    // The last one, for the browser's tools and tests/bench/fusion/browser_bench.mjs.
     performance.clearMeasures(FUSED_MEASURE);
     performance.measure(FUSED_MEASURE, { start });
   }

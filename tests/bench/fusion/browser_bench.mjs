@@ -1,12 +1,12 @@
 // How long a setting takes that is made in the browser, beside the robot's way over a link of 5 Mbit/s and a round trip of 100 ms. Drawing apart,
 // which software does here.
 //
-//   node e2e/fusing_time.mjs SCENE.ply        after a build of the program and of the client
-import { linkProxy } from '../../tests/integration/node/link_proxy.mjs';
-import { openClient, settled, startBrowser, startServer } from './harness.mjs';
+//   node browser_bench.mjs SCENE.ply        after a build of the program and of the client
+import { linkProxy } from '../../integration/node/link_proxy.mjs';
+import { openClient, settled, startBrowser, startServer } from '../../../web/e2e/harness.mjs';
 
 const scene = process.argv[2];
-if (scene === undefined) throw new Error('usage: node e2e/fusing_time.mjs SCENE.ply');
+if (scene === undefined) throw new Error('usage: node browser_bench.mjs SCENE.ply');
 const METHODS = [
   'visible_only',
   'thermal_only',
