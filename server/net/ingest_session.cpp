@@ -55,7 +55,8 @@ asio::awaitable<void> IngestSession::run(UpgradeRequest request) {
   ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
     if (kind == websocket::frame_type::pong) pings_.answered({payload.data(), payload.size()}, Clock::now());
     if (kind != websocket::frame_type::close || !has_unknown_close(ws_) || closing_) return;
-    closing_.emplace(websocket::close_code::protocol_error);
+    close(websocket::close_code::protocol_error, "");
+    is_close_answered_ = true;
     ws_.async_close(*closing_, [self = shared_from_this()](const error_code&) {});
   });
 
@@ -240,7 +241,7 @@ asio::awaitable<void> IngestSession::write_answers() {
   const protocol::IngestHello hello{
       protocol::kIngestProtocol, {limits.block_size_bytes, protocol::kIngestTargetSize}, credit()};
   if (!co_await write(protocol::notification_text("ingest.hello", protocol::to_json(hello)))) co_return;
-  while (!is_ended_) {
+  while (!is_ended_ && !is_close_answered_) {
     if (!answers_.empty()) {
       const Answer next = std::move(answers_.front());
       answers_.pop_front();

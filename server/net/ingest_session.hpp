@@ -87,6 +87,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   bool is_stopping_ = false;
   bool is_ended_ = false;
   bool is_writing_ = false;
+  bool is_close_answered_ = false;  ///< By the control callback; nothing more may be written.
   PingWatch pings_{Clock::now()};
   bool is_within_message_ = false;
   bool is_waiting_for_room_ = false;

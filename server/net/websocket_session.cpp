@@ -119,7 +119,7 @@ asio::awaitable<bool> WebSocketSession::write(Buffers buffers, bool is_text) {
 }
 
 asio::awaitable<void> WebSocketSession::write_messages() {
-  while (!is_ended_) {
+  while (!is_ended_ && !is_close_answered_) {
     if (closing_) {
       co_await ws_.async_close(*closing_, kAwait);
       end(false, "closed by the server");
@@ -207,7 +207,8 @@ asio::awaitable<void> WebSocketSession::ping(std::string payload) {
 void WebSocketSession::refuse_unknown_close() {
   // Not beside a close that has begun.
   if (!has_unknown_close(ws_) || closing_) return;
-  closing_.emplace(websocket::close_code::protocol_error);
+  close(websocket::close_code::protocol_error);
+  is_close_answered_ = true;
   ws_.async_close(*closing_, [self = shared_from_this()](const error_code&) {});
 }
 

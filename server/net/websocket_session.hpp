@@ -75,6 +75,7 @@ class WebSocketSession final : public ViewerPeer,
   bool is_open_ = false;
   bool is_ended_ = false;
   bool is_writing_ = false;
+  bool is_close_answered_ = false;  ///< By the control callback; nothing more may be written.
   bool may_have_frame_ = false;
   std::optional<boost::beast::websocket::close_reason> closing_;
   Clock::time_point close_deadline_ = Clock::time_point::max();

@@ -123,6 +123,17 @@ TEST_F(IngestSessionTest, GreetsWithLimitsAndCredit) {
                                               {"credit", {{"blocks", 4}, {"bytes", 50'000}}}}));
 }
 
+TEST_F(IngestSessionTest, AnswersACloseCodeThatIsNobodysOnce) {
+  for (const std::string& code : {std::string("\x13\x88", 2), std::string("\xff\xff", 2)}) {
+    RawWebSocket peer = sender();
+    next(peer, "ingest.hello");
+    peer.send_frame(8, code);
+    EXPECT_EQ(peer.receive_close_code(), 1002U);
+    EXPECT_FALSE(peer.receive_text(milliseconds(1000))) << "nothing follows";
+    EXPECT_TRUE(eventually([this] { return server_->metrics().connections_open == 0; }));
+  }
+}
+
 TEST_F(IngestSessionTest, WantsItsSubprotocolAndAnOriginOfItsList) {
   for (const auto* subprotocol : {"", "spectra.v1", "spectra.ingest.v2"}) {
     EXPECT_EQ(status_of(RawWebSocket(server_->port(), "", subprotocol, "/ingest").upgrade_response()), 400);
