@@ -10,8 +10,10 @@
 namespace spectra::mapping {
 namespace {
 
-constexpr std::size_t kLeastEvidence = 200;  ///< Pixels of fit_of that match.
-constexpr double kLeastFit = 0.5;            ///< Of those where both have something.
+constexpr std::size_t kLeastEvidence = 200;   ///< Pixels of fit_of that match.
+constexpr double kLeastFit = 0.5;             ///< Of those where both have something.
+constexpr double kFarthestVoxels = 1 << 29;   ///< A place is counted in 32 bits; what a camera sees is added to it.
+constexpr std::size_t kEnoughSpreads = 4096;  ///< For their median to stand.
 
 std::string seconds_text(double seconds) {
   std::string text = std::to_string(seconds);
@@ -57,6 +59,11 @@ bool Mapper::find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& 
   answer = trajectory.at(time_s);
   if (answer.state == PoseState::Unknown) {
     faults.add(FaultKind::NoPose, "at " + seconds_text(time_s) + " no pose is known within 100 ms");
+    return false;
+  }
+  if (answer.state == PoseState::Known &&
+      !(answer.pose.translation().lpNorm<Eigen::Infinity>() < kFarthestVoxels * settings_.voxel_m)) {
+    faults.add(FaultKind::NoPose, "at " + seconds_text(time_s) + " the pose is farther from 0 than voxels are counted");
     return false;
   }
   if (answer.state == PoseState::Jumping || answer.jumps_before > jumps_seen_) {
@@ -105,7 +112,7 @@ void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLo
   const HeatReport report =
       heat_->fuse(map_, frame.thermal, beside(pose, calibration_.thermal->from_depth), moment - *begin_s_, pool_);
   ++(report.is_frozen ? figures_.frozen_frames : figures_.thermal_frames);
-  if (report.spread_kelvin > 0) {
+  if (report.spread_kelvin > 0 && spreads_kelvin_.size() < kEnoughSpreads) {
     const auto at = std::upper_bound(spreads_kelvin_.begin(), spreads_kelvin_.end(), report.spread_kelvin);
     spreads_kelvin_.insert(at, report.spread_kelvin);
     figures_.spread_kelvin = spreads_kelvin_[spreads_kelvin_.size() / 2];

@@ -69,6 +69,21 @@ TEST_F(MapperTest, DoesNotWaitForAMissingModality) {
   EXPECT_FALSE(mapper.whole_mesh().positions.empty());
 }
 
+TEST_F(MapperTest, SaysThatAPoseIsFartherThanItCounts) {
+  Trajectory far;
+  for (int i = 0; i <= 10; ++i) {
+    Eigen::Isometry3d pose = pose_at(0.05 * i);
+    pose.translation().y() -= 1e9;
+    far.add(0.05 * i, pose);
+  }
+  Mapper mapper(calibration_, settings_, pool_);
+  mapper.fuse(frame_at(0.1), far, faults_);
+  mapper.fuse(frame_at(0.2), far, faults_);
+  EXPECT_EQ(mapper.figures().depth_frames, 0U);
+  EXPECT_EQ(mapper.map().block_count(), 0U);
+  EXPECT_EQ(faults_.all()[static_cast<std::size_t>(FaultKind::NoPose)].count, 2U);
+}
+
 TEST_F(MapperTest, FusesNothingWithoutAPose) {
   Mapper mapper(calibration_, settings_, pool_);
   mapper.fuse(frame_at(7), trajectory_, faults_);
