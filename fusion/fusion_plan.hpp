@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "fusion/base/error.hpp"
+#include "fusion/base/vertex_types.hpp"
 #include "fusion/colour/palette.hpp"
-#include "fusion/error.hpp"
 #include "fusion/settings.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
-#include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
 

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 
 namespace spectra::fusion {
 

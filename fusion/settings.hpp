@@ -5,10 +5,10 @@
 #include <string>
 
 #include "fusion/age.hpp"
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/vertex_types.hpp"
 #include "fusion/parameter.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
-#include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
 

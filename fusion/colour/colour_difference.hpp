@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::fusion {
 

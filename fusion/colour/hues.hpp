@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::fusion {
 

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "fusion/base/progress.hpp"
+#include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/openmesh_kernel.hpp"
-#include "fusion/progress.hpp"
-#include "fusion/vertex_types.hpp"
 
 namespace spectra::fusion {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "fusion/mesh/up_axis.hpp"
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/up_axis.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::fusion {
 

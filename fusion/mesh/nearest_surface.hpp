@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "fusion/mesh/bounds.hpp"
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/bounds.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::fusion {
 

@@ -3,7 +3,7 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <cstddef>
 
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 /// What OpenMesh wants to know of a point type.
 template <>

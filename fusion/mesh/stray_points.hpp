@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "fusion/mesh/bounds.hpp"
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/bounds.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::fusion {
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
+#include "fusion/base/progress.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
-#include "fusion/progress.hpp"
 
 namespace spectra::fusion {
 

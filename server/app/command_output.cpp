@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "fusion/mesh/scene_survey.hpp"
+#include "fusion/files/scene_survey.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/progress_line.hpp"
 

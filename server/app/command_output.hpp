@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "fusion/error.hpp"
-#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/files/ply_reader.hpp"
 #include "server/app/progress_line.hpp"
 
 namespace spectra::server {

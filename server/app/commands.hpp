@@ -7,12 +7,12 @@
 #include <variant>
 #include <vector>
 
-#include "fusion/mesh/read_options.hpp"
-#include "protocol/draco_file.hpp"
+#include "fusion/files/read_options.hpp"
+#include "protocol/codec/draco_file.hpp"
 #include "server/access/role.hpp"
 #include "server/app/log_setup.hpp"
-#include "server/app/settings_text.hpp"
 #include "server/net/net_options.hpp"
+#include "server/session/settings_text.hpp"
 #include "server/store/block_store.hpp"
 
 namespace spectra::server {

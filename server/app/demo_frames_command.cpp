@@ -6,9 +6,9 @@
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/frame_folder_writer.hpp"
 #include "server/mapping/simulated_drive.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::server {
 

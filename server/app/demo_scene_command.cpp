@@ -1,8 +1,8 @@
-#include "fusion/mesh/demo_scene.hpp"
+#include "fusion/demo/demo_scene.hpp"
 
 #include <string>
 
-#include "fusion/mesh/ply_writer.hpp"
+#include "fusion/files/ply_writer.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"

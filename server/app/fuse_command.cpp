@@ -7,13 +7,13 @@
 #include <utility>
 #include <vector>
 
-#include "fusion/mesh/ply_fuse.hpp"
+#include "fusion/files/ply_fuse.hpp"
 #include "fusion/registry.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
-#include "server/app/fused_file.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/exports/fused_file.hpp"
 
 namespace spectra::server {
 namespace {

@@ -9,10 +9,10 @@
 #include "fusion/mesh/topology.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
-#include "server/app/fused_file.hpp"
-#include "server/app/fusion_messages.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/exports/fused_file.hpp"
+#include "server/session/conversions.hpp"
 
 namespace spectra::server {
 namespace {

@@ -3,7 +3,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include "fusion/mesh/output_file.hpp"
+#include "fusion/files/output_file.hpp"
 #include "server/app/progress_line.hpp"
 
 namespace spectra::server {

@@ -17,10 +17,10 @@
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/unit_sender.hpp"
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/map_ply.hpp"
 #include "server/mapping/mapper.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::server {
 namespace {

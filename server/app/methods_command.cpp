@@ -8,7 +8,7 @@
 #include "fusion/colour/palette.hpp"
 #include "fusion/registry.hpp"
 #include "server/app/commands.hpp"
-#include "server/app/fusion_messages.hpp"
+#include "server/session/conversions.hpp"
 
 namespace spectra::server {
 namespace {

@@ -11,13 +11,13 @@
 #include <string>
 #include <variant>
 
-#include "fusion/mesh/demo_scene.hpp"
+#include "fusion/demo/demo_scene.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/config_file.hpp"
 #include "server/app/progress_line.hpp"
-#include "server/app/version.hpp"
 #include "server/net/limit_table.hpp"
+#include "server/session/version.hpp"
 #include "server/store/time_text.hpp"
 
 namespace spectra::server {

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "fusion/progress.hpp"
+#include "fusion/base/progress.hpp"
 
 namespace spectra::server {
 

@@ -14,14 +14,14 @@
 #include <string>
 #include <vector>
 
-#include "fusion/progress.hpp"
-#include "server/app/block_options.hpp"
+#include "fusion/base/progress.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/net/ingest_client.hpp"
 #include "server/net/request_target.hpp"
+#include "server/sources/block_options.hpp"
 #include "server/store/block_record.hpp"
 
 namespace spectra::server {

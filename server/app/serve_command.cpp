@@ -12,21 +12,21 @@
 #include <stdexcept>
 #include <thread>
 
-#include "fusion/mesh/demo_scene.hpp"
+#include "fusion/demo/demo_scene.hpp"
 #include "server/access/access_control.hpp"
+#include "server/api/http_api.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
-#include "server/app/http_api.hpp"
 #include "server/app/invitation.hpp"
 #include "server/app/log_setup.hpp"
-#include "server/app/map_feed.hpp"
-#include "server/app/map_keeper.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/serve_setup.hpp"
-#include "server/app/served_scene.hpp"
-#include "server/app/viewer_session.hpp"
 #include "server/net/http_server.hpp"
 #include "server/net/tls_identity.hpp"
+#include "server/session/served_scene.hpp"
+#include "server/session/viewer_session.hpp"
+#include "server/sources/map_feed.hpp"
+#include "server/sources/map_keeper.hpp"
 #include "server/stream/first_picture.hpp"
 
 namespace spectra::server {
@@ -189,7 +189,8 @@ int run_serve(const ServeOptions& options) {
     if (!opened) return fail(kJobFailed, opened.error().message);
     store = std::move(opened).value();
   }
-  MapKeeper map(*served, std::move(store), options.at);
+  MapKeeper map(served->scenes, served->pool, std::move(store), options.at);
+  served->mark_baseline = [&map](BaselineDone done) { map.mark_baseline(std::move(done)); };
   HttpApi api(*served, map);
   std::unique_ptr<HttpServer> server;
   try {

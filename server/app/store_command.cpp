@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <string>
 
-#include "fusion/mesh/output_file.hpp"
-#include "fusion/progress.hpp"
+#include "fusion/base/progress.hpp"
+#include "fusion/files/output_file.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/interruption.hpp"

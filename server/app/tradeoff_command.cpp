@@ -7,9 +7,9 @@
 
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
-#include "server/app/fused_file.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
+#include "server/exports/fused_file.hpp"
 #include "server/tradeoff/measure.hpp"
 #include "server/tradeoff/report.hpp"
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "server/app/command_output.hpp"
-#include "server/app/map_feed.hpp"
 #include "server/mapping/map_ply.hpp"
 #include "server/net/request_target.hpp"
+#include "server/sources/map_feed.hpp"
 
 namespace spectra::server {
 namespace {

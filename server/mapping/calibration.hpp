@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 #include "server/mapping/camera.hpp"
 
 namespace spectra::mapping {

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/picture_file.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::mapping {
 

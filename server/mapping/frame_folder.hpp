@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/picture_file.hpp"
 #include "server/mapping/trajectory.hpp"

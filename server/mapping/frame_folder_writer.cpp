@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
-#include "fusion/mesh/output_file.hpp"
-#include "fusion/mesh/ply_writer.hpp"
+#include "fusion/files/output_file.hpp"
+#include "fusion/files/ply_writer.hpp"
 
 namespace spectra::mapping {
 namespace {

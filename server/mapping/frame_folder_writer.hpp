@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "fusion/error.hpp"
-#include "fusion/progress.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/progress.hpp"
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/simulated_drive.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::mapping {
 

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/picture_file.hpp"
 #include "server/mapping/trajectory.hpp"
 #include "server/mapping/voxel_map.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::mapping {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "fusion/mesh/output_file.hpp"
-#include "fusion/mesh/ply_encoder.hpp"
+#include "fusion/files/output_file.hpp"
+#include "fusion/files/ply_encoder.hpp"
 
 namespace spectra::mapping {
 namespace {

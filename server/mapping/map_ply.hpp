@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <string>
 
-#include "fusion/error.hpp"
-#include "fusion/progress.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/progress.hpp"
 #include "server/mapping/surface_mesh.hpp"
 
 namespace spectra::mapping {

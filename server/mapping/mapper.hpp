@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "fusion/error.hpp"
-#include "fusion/progress.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/progress.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/depth_frame.hpp"
 #include "server/mapping/frame_folder.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "fusion/error.hpp"
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/vertex_types.hpp"
 
 namespace spectra::mapping {
 

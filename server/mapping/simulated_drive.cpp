@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "fusion/mesh/demo/noise.hpp"
-#include "fusion/mesh/demo_scene.hpp"
+#include "fusion/demo/demo_scene.hpp"
+#include "fusion/demo/noise.hpp"
 #include "server/mapping/picture_renderer.hpp"
 
 namespace spectra::mapping {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "fusion/base/progress.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
-#include "fusion/progress.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/trajectory.hpp"

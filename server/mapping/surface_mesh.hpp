@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/vertex_types.hpp"
 #include "server/mapping/voxel_map.hpp"
 
 namespace spectra::mapping {

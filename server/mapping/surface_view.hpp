@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/camera.hpp"
 #include "server/mapping/voxel_map.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::mapping {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 
 namespace spectra::mapping {
 

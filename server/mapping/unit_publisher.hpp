@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/surface_mesh.hpp"
-#include "server/scene/worker_pool.hpp"
 
 namespace spectra::mapping {
 

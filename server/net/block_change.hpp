@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/files/ply_reader.hpp"
 #include "server/net/block_refusal.hpp"
 
 namespace spectra::server {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "fusion/vertex_types.hpp"
+#include "fusion/base/vertex_types.hpp"
 #include "server/store/sha256.hpp"
 #include "server/store/store_error.hpp"
 

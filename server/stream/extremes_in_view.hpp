@@ -3,7 +3,7 @@
 #include <array>
 #include <optional>
 
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/viewer_stream.hpp"
 
 namespace spectra::server {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/viewer_stream.hpp"
 
 namespace spectra::server {

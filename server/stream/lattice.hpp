@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "protocol/draco_codec.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "protocol/codec/draco_codec.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server {
 

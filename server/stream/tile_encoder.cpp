@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "fusion/temperature_codes.hpp"
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "server/stream/duration_histogram.hpp"
 #include "server/stream/lattice.hpp"
 

@@ -9,7 +9,7 @@
 #include "fusion/fusion_plan.hpp"
 #include "protocol/rpc_error.hpp"
 #include "protocol/tile_frame.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/tile_look.hpp"
 
 namespace spectra::server {

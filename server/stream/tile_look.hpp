@@ -7,7 +7,7 @@
 
 #include "fusion/age.hpp"
 #include "fusion/fusion_plan.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server {
 

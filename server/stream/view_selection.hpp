@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/viewer_stream.hpp"
 
 namespace spectra::server {

@@ -12,8 +12,8 @@
 #include "fusion/fusion_plan.hpp"
 #include "fusion/settings.hpp"
 #include "protocol/tile_frame.hpp"
-#include "server/scene/scene_snapshot.hpp"
-#include "server/scene/worker_pool.hpp"
+#include "server/jobs/worker_pool.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server {
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "server/stream/lattice.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/tradeoff/stopwatch.hpp"

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "fusion/error.hpp"
-#include "fusion/progress.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "fusion/base/error.hpp"
+#include "fusion/base/progress.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server {
 

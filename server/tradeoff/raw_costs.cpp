@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "fusion/temperature_codes.hpp"
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/tradeoff/stopwatch.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 #include "fusion/fusion_plan.hpp"
 #include "server/tradeoff/measure.hpp"
 

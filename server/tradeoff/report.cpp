@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "fusion/mesh/output_file.hpp"
+#include "fusion/files/output_file.hpp"
 
 namespace spectra::server {
 

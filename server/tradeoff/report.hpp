@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fusion/error.hpp"
+#include "fusion/base/error.hpp"
 #include "server/tradeoff/measure.hpp"
 
 namespace spectra::server {

@@ -9,7 +9,7 @@
 
 #include "fusion/colour/colour_difference.hpp"
 #include "fusion/colour/palette.hpp"
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "server/stream/lattice.hpp"
 #include "server/tradeoff/surface_index.hpp"
 

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "fusion/base/error.hpp"
 #include "fusion/colour/palette.hpp"
-#include "fusion/error.hpp"
 #include "fusion/fusion_plan.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/tradeoff/measure.hpp"
 
 namespace spectra::server {

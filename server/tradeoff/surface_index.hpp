@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
-#include "fusion/vertex_types.hpp"
 
 namespace spectra::server {
 

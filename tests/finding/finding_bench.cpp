@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "fusion/mesh/demo_scene.hpp"
-#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/demo/demo_scene.hpp"
+#include "fusion/files/ply_reader.hpp"
 #include "fusion/registry.hpp"
 #include "tests/finding/finding.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "fusion/mesh/demo_scene.hpp"
+#include "fusion/demo/demo_scene.hpp"
 #include "fusion/registry.hpp"
 #include "tests/finding/finding.hpp"
 

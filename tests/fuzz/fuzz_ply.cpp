@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
-#include "fusion/mesh/ply_reader.hpp"
-#include "fusion/mesh/ply_writer.hpp"
+#include "fusion/files/ply_reader.hpp"
+#include "fusion/files/ply_writer.hpp"
 #include "fusion/mesh/topology.hpp"
 
 namespace {

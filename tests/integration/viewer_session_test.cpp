@@ -1,5 +1,5 @@
 // The application's side of a viewer over real sockets: what is said and answered, on a small generated scene.
-#include "server/app/viewer_session.hpp"
+#include "server/session/viewer_session.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "fusion/mesh/demo_scene.hpp"
-#include "protocol/draco_codec.hpp"
+#include "fusion/demo/demo_scene.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "protocol/tile_frame.hpp"
-#include "server/app/http_api.hpp"
+#include "server/api/http_api.hpp"
 #include "tests/integration/raw_client.hpp"
 #include "tests/integration/test_server.hpp"
 
@@ -137,7 +137,9 @@ class Viewer {
 
 class ViewerSessionTest : public testing::Test {
  protected:
-  explicit ViewerSessionTest() : served_(2, 64U << 20U), map_(served_, nullptr), api_(served_, map_) {
+  explicit ViewerSessionTest()
+      : served_(2, 64U << 20U), map_(served_.scenes, served_.pool, nullptr), api_(served_, map_) {
+    served_.mark_baseline = [this](server::BaselineDone done) { map_.mark_baseline(std::move(done)); };
     start(quick_options());
   }
 

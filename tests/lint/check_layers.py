@@ -38,10 +38,8 @@ for top in ("fusion", "protocol", "server"):
             if bracket == "<" and (is_standard(name) or name.startswith(tuple(rules["system"]))):
                 continue
             if folder is None:
-                if relative != "server/main.cpp":
-                    violations.append(f"{relative}:{number}: this folder has no row in layers.json")
-                    break
-                folder = "server/app"
+                violations.append(f"{relative}:{number}: this folder has no row in layers.json")
+                break
             allowed = name.startswith(tuple(rules["folders"][folder]))
             forbidden = name.startswith(tuple(rules["forbidden"].get(folder, [])) or ("\0",))
             if not allowed or forbidden:

@@ -17,11 +17,16 @@ def outcome(files):
         return subprocess.run([sys.executable, check, folder], capture_output=True, text=True).returncode
 
 
-assert outcome({"fusion/a.cpp": '#include <vector>\n#include "fusion/a.hpp"\n'}) == 0
+assert outcome({"fusion/a.cpp": '#include <vector>\n#include "fusion/base/a.hpp"\n'}) == 0
 assert outcome({"fusion/a.cpp": '#include "protocol/tile_frame.hpp"\n'}) == 1
 assert outcome({"fusion/a.cpp": "#include <nlohmann/json.hpp>\n"}) == 1
 assert outcome({"fusion/mesh/a.cpp": "#include <boost/asio.hpp>\n"}) == 1
+assert outcome({"fusion/mesh/a.cpp": '#include "fusion/files/a.hpp"\n'}) == 1
+assert outcome({"fusion/a.cpp": '#include "fusion/mesh/a.hpp"\n'}) == 1
 assert outcome({"protocol/a.cpp": '#include "fusion/a.hpp"\n'}) == 1
+assert outcome({"protocol/codec/a.cpp": '#include "fusion/base/a.hpp"\n'}) == 0
+assert outcome({"protocol/codec/a.cpp": '#include "fusion/mesh/a.hpp"\n'}) == 1
+assert outcome({"server/a.cpp": "#include <vector>\n#include <draco/mesh/mesh.h>\n"}) == 1
 assert outcome({"server/stream/a.cpp": "#include <boost/beast.hpp>\n"}) == 1
 assert outcome({"server/net/a.cpp": "#include <boost/beast.hpp>\n"}) == 0
 assert outcome({"web/src/draw/a.ts": "import { Mesh } from 'three';\nimport type { Vec3 } from '../protocol/messages';\n"}) == 0
@@ -36,4 +41,4 @@ assert outcome({"web/src/ui/A.svelte": "<script lang=\"ts\">\n  import '../decod
 assert outcome({"web/src/draw/a.test.ts": "import { Store } from '../state/store.svelte';\n", "fusion/a.cpp": ""}) == 0
 assert outcome({"web/src/scene/a.ts": "export const a = 1;\n"}) == 1
 assert outcome({}) == 1
-print("19 of 19 trees judged rightly")
+print("24 of 24 trees judged rightly")

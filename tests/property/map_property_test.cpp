@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/scene/coarse_tile.hpp"
-#include "server/scene/living_map.hpp"
-#include "server/scene/tile_place.hpp"
+#include "server/map/coarse_tile.hpp"
+#include "server/map/living_map.hpp"
+#include "server/map/tile_place.hpp"
 
 namespace spectra::server {
 namespace {

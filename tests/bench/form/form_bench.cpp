@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "fusion/mesh/ply_reader.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "fusion/files/ply_reader.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/viewer_stream.hpp"
 #include "tests/unit/stream/form.hpp"

@@ -27,10 +27,10 @@
 #include <thread>
 #include <vector>
 
-#include "fusion/mesh/ply_reader.hpp"
-#include "fusion/mesh/ply_writer.hpp"
-#include "server/scene/scene_snapshot.hpp"
-#include "server/scene/worker_pool.hpp"
+#include "fusion/files/ply_reader.hpp"
+#include "fusion/files/ply_writer.hpp"
+#include "server/jobs/worker_pool.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "comparison.hpp"
-#include "fusion/mesh/ply_reader.hpp"
+#include "fusion/files/ply_reader.hpp"
 #include "server/mapping/mapper.hpp"
 
 using namespace spectra;

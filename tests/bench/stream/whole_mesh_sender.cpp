@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
+#include "fusion/files/ply_reader.hpp"
 #include "fusion/fusion_plan.hpp"
-#include "fusion/mesh/ply_reader.hpp"
 
 namespace {
 

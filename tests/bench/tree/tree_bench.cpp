@@ -19,15 +19,15 @@
 #include <thread>
 #include <vector>
 
+#include "fusion/files/ply_reader.hpp"
 #include "fusion/fusion_plan.hpp"
-#include "fusion/mesh/ply_reader.hpp"
-#include "server/scene/scene_snapshot.hpp"
-#include "server/scene/surface.hpp"
+#include "fusion/mesh/surface.hpp"
+#include "server/map/scene_snapshot.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/view_selection.hpp"
 #include "server/stream/viewer_stream.hpp"
 #include "tests/bench/processor_time.hpp"
-#include "tests/unit/scene/generated_scene.hpp"
+#include "tests/unit/map/generated_scene.hpp"
 
 namespace {
 

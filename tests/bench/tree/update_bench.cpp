@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "fusion/mesh/demo_scene.hpp"
-#include "server/scene/living_map.hpp"
+#include "fusion/demo/demo_scene.hpp"
+#include "server/map/living_map.hpp"
 #include "tests/bench/processor_time.hpp"
 
 namespace {

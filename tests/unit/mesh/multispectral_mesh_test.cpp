@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "allocation_meter.hpp"
+#include "tests/unit/files/allocation_meter.hpp"
 
 namespace spectra::fusion {
 namespace {

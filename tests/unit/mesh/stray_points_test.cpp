@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "fusion/mesh/scene_survey.hpp"
-#include "loaded.hpp"
+#include "fusion/files/scene_survey.hpp"
+#include "tests/unit/files/loaded.hpp"
 
 namespace spectra::fusion {
 namespace {

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "protocol/incoming_message.hpp"
 #include "protocol/messages/fusion_messages.hpp"
 #include "protocol/messages/ingest_messages.hpp"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fusion/fusion_plan.hpp"
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server::testing {
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "server/scene/position_index.hpp"
+#include "fusion/mesh/position_index.hpp"
 #include "server/stream/lattice.hpp"
 
 namespace spectra::server::testing {

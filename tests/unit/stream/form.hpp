@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "server/scene/scene_snapshot.hpp"
+#include "server/map/scene_snapshot.hpp"
 
 namespace spectra::server::testing {
 

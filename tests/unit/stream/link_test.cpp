@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "fake_scene.hpp"
-#include "fusion/mesh/ply_reader.hpp"
-#include "protocol/draco_codec.hpp"
+#include "fusion/files/ply_reader.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "simulated_link.hpp"
 
 namespace spectra::server {

@@ -1,4 +1,4 @@
-#include "server/scene/position_step.hpp"
+#include "server/map/position_step.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "form.hpp"
 #include "server/stream/lattice.hpp"
-#include "tests/unit/scene/generated_scene.hpp"
+#include "tests/unit/map/generated_scene.hpp"
 
 namespace spectra::server {
 namespace {

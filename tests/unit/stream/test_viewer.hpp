@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "protocol/draco_codec.hpp"
+#include "protocol/codec/draco_codec.hpp"
 #include "protocol/tile_frame.hpp"
 #include "server/stream/viewer_stream.hpp"
 

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "fusion/base/vertex_types.hpp"
+
+namespace spectra::fusion {
+
+/// Smallest and largest coordinates of something, metres relative to the scene's origin.
+struct Bounds {
+  Vec3f min, max;
+  friend bool operator==(const Bounds&, const Bounds&) = default;
+};
+
+}  // namespace spectra::fusion

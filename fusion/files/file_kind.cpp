@@ -1,0 +1,53 @@
+#include "fusion/files/file_kind.hpp"
+
+#include <array>
+
+namespace spectra::fusion {
+
+namespace {
+
+struct Kind {
+  std::string_view beginning;
+  std::string_view name;
+};
+
+using namespace std::string_view_literals;
+
+constexpr std::array<Kind, 23> kKinds = {{
+    {"PK\x03\x04"sv, "a ZIP archive: unpack it first"sv},
+    {"\x1f\x8b"sv, "gzip data: unpack it first"sv},
+    {"BZh"sv, "bzip2 data: unpack it first"sv},
+    {"\xfd"
+     "7zXZ"sv,
+     "xz data: unpack it first"sv},
+    {"\x28\xb5\x2f\xfd"sv, "Zstandard data: unpack it first"sv},
+    {"7z\xbc\xaf"sv, "a 7-Zip archive: unpack it first"sv},
+    {"Rar!"sv, "a RAR archive: unpack it first"sv},
+    {"\xff\xfe"sv, "text in UTF-16: save it as ASCII or UTF-8"sv},
+    {"\xfe\xff"sv, "text in UTF-16: save it as ASCII or UTF-8"sv},
+    {"glTF"sv, "a GLB file: convert it to PLY"sv},
+    {"DRACO"sv, "a Draco file: convert it to PLY"sv},
+    {"LASF"sv, "a LAS file: convert it to PLY"sv},
+    {"ASTM-E57"sv, "an E57 file: convert it to PLY"sv},
+    {"# .PCD"sv, "a PCD file: convert it to PLY"sv},
+    {"VERSION ."sv, "a PCD file: convert it to PLY"sv},
+    {"solid"sv, "an STL file: convert it to PLY"sv},
+    {"OFF"sv, "an OFF file: convert it to PLY"sv},
+    {"COFF"sv, "an OFF file: convert it to PLY"sv},
+    {"mtllib"sv, "an OBJ file: convert it to PLY"sv},
+    {"v "sv, "an OBJ file: convert it to PLY"sv},
+    {"{"sv, "JSON: convert it to PLY"sv},
+    {"<"sv, "XML or HTML: convert it to PLY"sv},
+    {"version https://git-lfs"sv, "a Git LFS pointer: fetch the file itself (git lfs pull)"sv},
+}};
+
+}  // namespace
+
+std::string_view file_kind(std::string_view first_bytes) {
+  for (const Kind& kind : kKinds) {
+    if (first_bytes.starts_with(kind.beginning)) return kind.name;
+  }
+  return {};
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,238 @@
+#include "fusion/files/ply_body_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "fusion/files/ply_values.hpp"
+#include "fusion/files/scene_origin.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// Metres. Beyond it stand numbers for "none", such as the lowest float.
+constexpr double kLargestCoordinate = 1e30;
+
+bool is_face_element(const PlyElement& element) {
+  const std::string name = lower_case(element.name);
+  return element.count > 0 && (name == "face" || name == "tristrips");
+}
+
+struct Box {
+  Vec3d min, max;
+
+  void add(const Vec3d& p) {
+    min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
+    max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
+  }
+};
+
+bool is_position(const Vec3d& p) {
+  return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
+         std::abs(p.z) <= kLargestCoordinate;
+}
+
+}  // namespace
+
+PlyBodyReader::PlyBodyReader(BlockFile& file, const PlyHeader& header, const PlyInterpretation& interpretation,
+                             const PlyHandlers& handlers)
+    : file_(file),
+      header_(header),
+      interpretation_(interpretation),
+      handlers_(handlers),
+      sample_(header.find("vertex")->count) {}
+
+Result<PlyBodyFacts> PlyBodyReader::read() {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  facts_.min = {kInfinity, kInfinity, kInfinity};
+  facts_.max = {-kInfinity, -kInfinity, -kInfinity};
+  facts_.temperature = interpretation_.survey.face_temperature;
+  facts_.temperature.missing_count = 0;  // That was of faces.
+  facts_.clamped_colour_count = interpretation_.survey.clamped_colour_count;
+
+  const PlyElement* const vertices = header_.find("vertex");
+  const bool has_faces_first = std::any_of(header_.elements.data(), vertices,
+                                           [](const PlyElement& element) { return is_face_element(element); });
+  PlyCursor cursor(file_, header_);
+  if (has_faces_first) {
+    // Which faces are left out is known once the vertices are.
+    PlyCursor first(file_, header_);
+    PlyFaceReader none(first, vertices->count, is_left_out_, handlers_.triangles);
+    BOOST_OUTCOME_TRY(read_part(Part::Vertices, none, first));
+    file_.seek(header_.size_bytes);
+  }
+  PlyFaceReader faces(cursor, vertices->count, is_left_out_, handlers_.triangles);
+  const auto result = read_part(has_faces_first ? Part::Faces : Part::Everything, faces, cursor);
+  handler_has_failed_ = handler_has_failed_ || faces.sink_has_failed();
+  BOOST_OUTCOME_TRY(result);
+
+  facts_.faces = faces.facts();
+  conclude_positions(faces);
+  if (facts_.faces.triangle_count > 0) {
+    facts_.unreferenced_vertex_count =
+        vertices->count - facts_.left_out_vertex_count - facts_.faces.referenced_vertex_count;
+  }
+  facts_.trailing_byte_count = cursor.trailing_bytes();
+  return facts_;
+}
+
+Result<void> PlyBodyReader::read_part(Part part, PlyFaceReader& faces, PlyCursor& cursor) {
+  const PlySchema& schema = interpretation_.schema;
+  const PlyElement* const vertices = header_.find("vertex");
+  const PlyElement* const polygons = header_.find("face");
+  const PlyElement* const strips = header_.find("tristrips");
+  for (const PlyElement& element : header_.elements) {
+    cursor.begin_element(element);
+    if (&element == vertices && part != Part::Faces) {
+      BOOST_OUTCOME_TRY(read_vertices(cursor, element));
+    } else if (&element == polygons && schema.corner_list && part != Part::Vertices) {
+      BOOST_OUTCOME_TRY(faces.read_faces(element, *schema.corner_list));
+    } else if (&element == strips && schema.strip_list && part != Part::Vertices) {
+      BOOST_OUTCOME_TRY(faces.read_strips(element, *schema.strip_list));
+    } else {
+      BOOST_OUTCOME_TRY(cursor.skip_element(element));
+    }
+  }
+  return success();
+}
+
+Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElement& element) {
+  PlyVertexReader reader(cursor, element, interpretation_.schema);
+  for (;;) {
+    BOOST_OUTCOME_TRY(const PlyRawVertices raw, reader.next());
+    if (raw.positions.empty()) break;
+    BOOST_OUTCOME_TRY(hand_on(raw, element));
+  }
+  if (facts_.left_out_vertex_count == element.count) {
+    return failure(ErrorCode::BadValue, "no vertex has a position (a finite one, within 1e30 m)");
+  }
+  return success();
+}
+
+Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& element) {
+  judge_positions(raw.positions, raw.first_vertex);
+  const std::size_t count = raw.positions.size();
+  const PlySchema& schema = interpretation_.schema;
+  PlyVertexBlock block;
+  block.first_vertex = raw.first_vertex;
+  block.positions = raw.positions;
+  block.left_out = left_out_;
+  if (schema.has_vertex_colours()) {
+    BOOST_OUTCOME_TRY(convert_colours(raw, element));
+    block.visible = colours_;
+  } else if (schema.has_face_colours()) {
+    block.visible =
+        std::span(interpretation_.survey.face_colours).subspan(static_cast<std::size_t>(raw.first_vertex), count);
+  }
+  if (schema.has_vertex_temperature()) {
+    convert_temperatures(raw);
+    block.temperature_celsius = temperatures_;
+  } else if (schema.has_face_temperature()) {
+    block.temperature_celsius = std::span(interpretation_.survey.face_temperature_celsius)
+                                    .subspan(static_cast<std::size_t>(raw.first_vertex), count);
+    facts_.temperature.missing_count +=
+        static_cast<std::uint64_t>(std::count_if(block.temperature_celsius.begin(), block.temperature_celsius.end(),
+                                                 [](float celsius) { return std::isnan(celsius); }));
+  }
+  if (!handlers_.vertices) return success();
+  auto result = handlers_.vertices(block);
+  handler_has_failed_ = !result;
+  return result;
+}
+
+/// Holes are at one place that is far from everything, or at 0 0 0 where no triangle uses it; or have a coordinate that stands for none.
+void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
+  sample_.conclude(interpretation_.metres_per_unit);
+  facts_.bulk = sample_.bulk();
+  facts_.origin = interpretation_.origin.value_or(scene_origin(facts_.min, facts_.max, facts_.bulk));
+  if (interpretation_.hole) return;
+  facts_.hole = sample_.coordinate_hole();
+  const auto& hole = sample_.hole();
+  if (!hole) return;
+  const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),
+                                   [&](std::uint64_t vertex) { return faces.is_referenced(vertex); });
+  // Elsewhere in the scene it is what was measured again and again.
+  if (hole->is_far || (!is_used && hole->place == Vec3d{}))
+    facts_.hole = Hole{hole->place};
+  else if (is_used)
+    facts_.crowded_place = hole->place;
+}
+
+/// Brings the positions to metres, and finds those that are none.
+void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t first_vertex) {
+  if (const double metres = interpretation_.metres_per_unit; metres != 1) {
+    for (Vec3d& p : positions) p = {p.x * metres, p.y * metres, p.z * metres};
+  }
+  left_out_.clear();
+  sample_.add(first_vertex, positions);
+  Box box{facts_.min, facts_.max};
+  bool all_good = true;
+  const std::optional<Hole>& hole = interpretation_.hole;
+  if (hole) {
+    for (const Vec3d& p : positions) all_good = all_good && !hole->has(p);
+  }
+  for (const Vec3d& p : positions) {
+    all_good = all_good && is_position(p);
+    box.add(p);
+  }
+  if (!all_good) {
+    box = {facts_.min, facts_.max};
+    if (is_left_out_.is_empty()) is_left_out_.resize(header_.find("vertex")->count);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const bool is_hole = hole && hole->has(positions[i]);
+      if (is_position(positions[i]) && !is_hole) {
+        box.add(positions[i]);
+      } else {
+        facts_.hole_count += is_hole ? 1U : 0U;
+        left_out_.push_back(static_cast<std::uint32_t>(i));
+        is_left_out_.set(first_vertex + i);
+      }
+    }
+    facts_.left_out_vertex_count += left_out_.size();
+  }
+  facts_.min = box.min;
+  facts_.max = box.max;
+}
+
+Result<void> PlyBodyReader::convert_colours(const PlyRawVertices& raw, const PlyElement& element) {
+  const ColourConversion& conversion = interpretation_.colours;
+  if (header_.format == PlyFormat::Ascii && interpretation_.schema.colour_coding == ColourCoding::Channels) {
+    // In a text file a number may be larger than its type.
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const PlyProperty& property = element.properties[*interpretation_.schema.vertex[kRed + channel]];
+      if (property.type != PlyScalar::UInt8) continue;
+      const auto& values = raw.colours[channel];
+      const auto bad =
+          std::find_if(values.begin(), values.end(), [](double value) { return value < 0 || value > 255; });
+      if (bad == values.end()) continue;
+      return failure(ErrorCode::BadValue,
+                     "vertex " + std::to_string(raw.first_vertex + static_cast<std::uint64_t>(bad - values.begin())) +
+                         " has the colour value " + number_text(*bad) + " in '" + printable(property.name) +
+                         "', which must be a whole number from 0 to 255 for the type uchar");
+    }
+  }
+  colours_.resize(raw.positions.size());
+  conversion.convert({raw.colours[0], raw.colours[1], raw.colours[2]}, colours_, facts_.clamped_colour_count);
+  return success();
+}
+
+void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
+  temperatures_.resize(raw.positions.size());
+  const TemperatureConversion& conversion = interpretation_.temperature;
+  if (left_out_.empty()) return conversion.convert(raw.temperatures, temperatures_, facts_.temperature);
+  // What is left out is not counted.
+  TemperatureFacts ignored;
+  auto next = left_out_.begin();
+  for (std::size_t i = 0; i < raw.temperatures.size(); ++i) {
+    const bool is_left_out = next != left_out_.end() && *next == i;
+    if (is_left_out) ++next;
+    conversion.convert(raw.temperatures.subspan(i, 1), std::span(temperatures_).subspan(i, 1),
+                       is_left_out ? ignored : facts_.temperature);
+  }
+  facts_.temperature.no_data_seen |= ignored.no_data_seen;
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,197 @@
+#include "fusion/files/ply_fuse.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "fusion/colour/hues.hpp"
+#include "fusion/files/output_file.hpp"
+#include "fusion/files/ply_encoder.hpp"
+#include "fusion/files/ply_stream.hpp"
+#include "fusion/files/scene_origin.hpp"
+#include "fusion/mesh/multispectral_mesh.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// The first pass: what the fusion and the output's header must know of the whole.
+struct FirstPass {
+  PlyBodyFacts facts;
+  TemperatureSummary temperature;
+};
+
+/// Calls `use` with the parts of a block that are no holes, as the first index and the number of vertices, and `use_hole`
+/// with every hole between them.
+template <class Use, class UseHole>
+Result<void> for_each_part(const PlyVertexBlock& block, Use&& use, UseHole&& use_hole) {
+  std::size_t begin = 0;
+  for (const std::uint32_t hole : block.left_out) {
+    BOOST_OUTCOME_TRY(use(begin, hole - begin));
+    BOOST_OUTCOME_TRY(use_hole(hole));
+    begin = hole + 1;
+  }
+  return use(begin, block.positions.size() - begin);
+}
+
+/// Calls `use` with the temperatures of the block's vertices that are not left out.
+template <class Use>
+Result<void> for_each_temperature(const PlyVertexBlock& block, Use&& use) {
+  if (block.temperature_celsius.empty()) return success();
+  return for_each_part(
+      block,
+      [&](std::size_t begin, std::size_t count) -> Result<void> {
+        use(block.temperature_celsius.subspan(begin, count));
+        return success();
+      },
+      [](std::uint32_t) -> Result<void> { return success(); });
+}
+
+Result<FirstPass> first_pass(PlyStream& stream) {
+  std::optional<TemperatureAccumulator> temperatures(std::in_place);
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) {
+    return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures->add(celsius); });
+  };
+  BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
+  if (stream.leave_out_hole(facts)) {
+    temperatures.emplace();
+    BOOST_OUTCOME_TRY(facts, stream.read(handlers));
+  }
+  return FirstPass{facts, temperatures->summary()};
+}
+
+/// The histogram of the file, by another pass over it; the pass's error, if any, is kept in `error`.
+Histogram file_histogram(PlyStream& stream, const TemperatureSummary& summary, std::uint32_t bins,
+                         std::optional<Error>& error) {
+  Histogram histogram;
+  histogram.minimum = summary.minimum;
+  histogram.maximum = summary.maximum;
+  histogram.counts.resize(bins);
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) {
+    return for_each_temperature(block, [&](std::span<const float> celsius) { add_to_histogram(celsius, histogram); });
+  };
+  if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
+  return histogram;
+}
+
+/// The hues of the file's colours, by another pass over it; the pass's error, if any, is kept in `error`.
+Hues file_hues(PlyStream& stream, std::optional<Error>& error) {
+  Hues hues;
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    if (block.visible.empty()) return success();
+    return for_each_part(
+        block,
+        [&](std::size_t begin, std::size_t count) -> Result<void> {
+          add_to_hues(block.visible.subspan(begin, count), hues);
+          return success();
+        },
+        [](std::uint32_t) -> Result<void> { return success(); });
+  };
+  if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
+  return hues;
+}
+
+/// The last pass: every block fused and written. What the file does not have is filled in as MultispectralMesh does.
+Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const FusionPlan& plan,
+                            PlyEncoder::Sink sink) {
+  PlyLayout layout;
+  layout.vertex_count = stream.vertex_count();
+  layout.triangle_count = facts.faces.triangle_count;
+  layout.origin = facts.origin;
+  layout.double_positions = stream.has_double_positions();
+  layout.has_temperature = stream.has_temperature();
+  PlyEncoder encoder(layout, std::move(sink));
+
+  MultispectralMesh block_mesh;
+  std::vector<Rgb8> fused;
+  PlyHandlers handlers;
+  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    const std::size_t count = block.positions.size();
+    if (block_mesh.vertex_count() != count) block_mesh.resize_vertices(count);
+    fused.resize(count);
+    std::transform(block.positions.begin(), block.positions.end(), block_mesh.positions().begin(),
+                   [&layout](const Vec3d& position) { return relative_to(layout.origin, position); });
+    std::copy(block.visible.begin(), block.visible.end(), block_mesh.visible().begin());
+    std::copy(block.temperature_celsius.begin(), block.temperature_celsius.end(),
+              block_mesh.temperature_celsius().begin());
+    plan.fuse(block_mesh.temperature_celsius(), block_mesh.visible(), fused);
+    return for_each_part(
+        block,
+        [&](std::size_t begin, std::size_t part_count) {
+          return encoder.vertices(block_mesh.positions().subspan(begin, part_count),
+                                  std::span(fused).subspan(begin, part_count),
+                                  block_mesh.temperature_celsius().subspan(begin, part_count));
+        },
+        [&](std::uint32_t hole) {
+          return encoder.left_out_vertex(block.positions[hole], block_mesh.visible()[hole],
+                                         block_mesh.temperature_celsius()[hole]);
+        });
+  };
+  handlers.triangles = [&](std::span<const Triangle> triangles) { return encoder.triangles(triangles); };
+  BOOST_OUTCOME_TRY(stream.read(handlers));
+  return encoder.finish();
+}
+
+Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
+                            const FusionSettings& settings, const PaletteTable* palette, const ReadOptions& options) {
+  std::string_view phase = kReadingPhase;
+  double begin_share = 0;
+  double end_share = 1;
+  ReadOptions watched = options;
+  if (options.progress) {
+    watched.progress = [&](std::string_view, double share) {
+      options.progress(phase, begin_share + (end_share - begin_share) * share);
+    };
+  }
+  BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, watched));
+  BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
+  std::optional<Error> pass_error;
+  SceneTemperature scene;
+  scene.summary = pass.temperature;
+  // Nobody knows how many passes the plan will ask for, so each is half of what remains of their phase.
+  const auto count_again = [&] {
+    begin_share = phase == kHistogramPhase ? end_share : 0;
+    end_share = (begin_share + 1) / 2;
+    phase = kHistogramPhase;
+  };
+  scene.histogram = [&](std::uint32_t bins) {
+    count_again();
+    return file_histogram(stream, pass.temperature, bins, pass_error);
+  };
+  scene.hues = [&] {
+    count_again();
+    return file_hues(stream, pass_error);
+  };
+  auto plan =
+      palette == nullptr ? FusionPlan::prepare(settings, scene) : FusionPlan::prepare(settings, scene, *palette);
+  if (pass_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*pass_error));
+  BOOST_OUTCOME_TRY(plan);
+
+  phase = kFusingPhase;
+  begin_share = 0;
+  end_share = 1;
+  BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
+  BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(),
+                                   [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
+  BOOST_OUTCOME_TRY(file.commit());
+  return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.faces.triangle_count,
+                   stream.notes(pass.facts)};
+}
+
+}  // namespace
+
+Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                           const FusionSettings& settings, const ReadOptions& options) {
+  return fuse_file(in, out, settings, nullptr, options);
+}
+
+Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                           const FusionSettings& settings, const PaletteTable& palette, const ReadOptions& options) {
+  return fuse_file(in, out, settings, &palette, options);
+}
+
+}  // namespace spectra::fusion

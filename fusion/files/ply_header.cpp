@@ -1,0 +1,274 @@
+#include "fusion/files/ply_header.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "fusion/files/file_kind.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+struct TypeName {
+  std::string_view name;
+  PlyScalar type;
+};
+
+constexpr std::array<TypeName, 22> kTypeNames = {
+    {{"char", PlyScalar::Int8},       {"uchar", PlyScalar::UInt8},    {"short", PlyScalar::Int16},
+     {"ushort", PlyScalar::UInt16},   {"int", PlyScalar::Int32},      {"uint", PlyScalar::UInt32},
+     {"float", PlyScalar::Float32},   {"double", PlyScalar::Float64}, {"int8", PlyScalar::Int8},
+     {"uint8", PlyScalar::UInt8},     {"int16", PlyScalar::Int16},    {"uint16", PlyScalar::UInt16},
+     {"int32", PlyScalar::Int32},     {"uint32", PlyScalar::UInt32},  {"float32", PlyScalar::Float32},
+     {"float64", PlyScalar::Float64}, {"int64", PlyScalar::Int64},    {"uint64", PlyScalar::UInt64},
+     {"long", PlyScalar::Int64},      {"ulong", PlyScalar::UInt64},   {"longlong", PlyScalar::Int64},
+     {"ulonglong", PlyScalar::UInt64}}};
+
+std::optional<PlyScalar> scalar_type(std::string_view word) {
+  const std::string name = lower_case(word);
+  for (const TypeName& entry : kTypeNames) {
+    if (entry.name == name) return entry.type;
+  }
+  return std::nullopt;
+}
+
+std::string quoted(std::string_view text) {
+  return "'" + printable(text) + "'";
+}
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  std::size_t begin = 0;
+  while ((begin = line.find_first_not_of(" \t", begin)) != std::string_view::npos) {
+    const std::size_t end = std::min(line.find_first_of(" \t", begin), line.size());
+    words.push_back(line.substr(begin, end - begin));
+    begin = end;
+  }
+  return words;
+}
+
+class HeaderParser {
+ public:
+  explicit HeaderParser(std::string_view text) : text_(text) {}
+
+  Result<PlyHeader> parse() {
+    if (text_.empty()) return failure(ErrorCode::BadHeader, "the file is empty");
+    BOOST_OUTCOME_TRY(read_first_line());
+    std::string_view line;
+    while (next_line(line)) {
+      const std::vector<std::string_view> words = words_of(line);
+      if (words.empty()) continue;
+      const std::string keyword = lower_case(words[0]);
+      if (keyword == "comment" || keyword == "obj_info") {
+        header_.comments.emplace_back(line);
+        continue;
+      }
+      if (keyword == "end_header") return finished();
+      BOOST_OUTCOME_TRY(read_line(keyword, words));
+    }
+    if (text_.size() >= kMaxPlyHeaderBytes) {
+      return failure(ErrorCode::BadHeader,
+                     "no end_header within the first " + std::to_string(kMaxPlyHeaderBytes) + " bytes");
+    }
+    return failure(ErrorCode::BadHeader, "the file ends before end_header");
+  }
+
+ private:
+  /// Passes over what editors put before the word, and finds out how lines end.
+  Result<void> read_first_line() {
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (text_.substr(0, kByteOrderMark.size()) == kByteOrderMark) position_ = kByteOrderMark.size();
+    const std::size_t begin = text_.find_first_not_of(" \t\r\n", position_);
+    const std::size_t end = begin == std::string_view::npos ? begin : text_.find_first_of("\r\n", begin);
+    if (end != std::string_view::npos) {
+      const std::size_t after = text_.find_first_not_of('\r', end);
+      line_end_ = text_[end] == '\n' || (after != std::string_view::npos && text_[after] == '\n') ? '\n' : '\r';
+    }
+    std::string_view line;
+    std::vector<std::string_view> words;
+    while (words.empty() && next_line(line)) words = words_of(line);
+    if (words.size() == 1 && lower_case(words[0]) == "ply") return success();
+    const std::string_view kind = file_kind(text_);
+    return failure(ErrorCode::BadHeader, kind.empty() ? "not a PLY file: the first line is not 'ply'"
+                                                      : "not a PLY file, but " + std::string(kind));
+  }
+
+  bool next_line(std::string_view& line) {
+    const std::size_t end = text_.find(line_end_, position_);
+    if (end == std::string_view::npos) return false;
+    line = text_.substr(position_, end - position_);
+    while (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    position_ = end + 1;
+    ++line_number_;
+    return true;
+  }
+
+  auto bad(ErrorCode code, const std::string& what) const {
+    return failure(code, "header line " + std::to_string(line_number_) + ": " + what);
+  }
+
+  Result<void> read_line(const std::string& keyword, const std::vector<std::string_view>& words) {
+    if (keyword == "format") return read_format(words);
+    if (keyword == "element") return read_element(words);
+    if (keyword == "property") return read_property(words);
+    return bad(ErrorCode::BadHeader, "unknown keyword " + quoted(words[0]));
+  }
+
+  Result<void> read_format(const std::vector<std::string_view>& words) {
+    if (has_format_) return bad(ErrorCode::BadHeader, "a second format line");
+    if (words.size() != 3) return bad(ErrorCode::BadHeader, "a format line has a name and a version");
+    const std::string format = lower_case(words[1]);
+    if (format == "ascii") {
+      header_.format = PlyFormat::Ascii;
+    } else if (format == "binary_little_endian") {
+      header_.format = PlyFormat::BinaryLittleEndian;
+    } else if (format == "binary_big_endian") {
+      header_.format = PlyFormat::BinaryBigEndian;
+    } else {
+      return bad(ErrorCode::Unsupported, "unknown format " + quoted(words[1]));
+    }
+    if (words[2] != "1.0") {
+      return bad(ErrorCode::Unsupported, "PLY version " + quoted(words[2]) + ", only 1.0 is known");
+    }
+    has_format_ = true;
+    return success();
+  }
+
+  Result<void> read_element(const std::vector<std::string_view>& words) {
+    if (words.size() != 3) return bad(ErrorCode::BadHeader, "an element line has a name and a count");
+    PlyElement element;
+    element.name = words[1];
+    const char* const end = words[2].data() + words[2].size();
+    const auto [stop, status] = std::from_chars(words[2].data(), end, element.count);
+    if (status != std::errc{} || stop != end) {
+      return bad(ErrorCode::BadHeader, "element " + quoted(words[1]) + " has the count " + quoted(words[2]) +
+                                           ", which is not a whole number from 0 to 2^64 - 1");
+    }
+    if (!element_names_.insert(element.name).second) {
+      return bad(ErrorCode::BadHeader, "a second element " + quoted(words[1]));
+    }
+    property_names_.clear();
+    header_.elements.push_back(std::move(element));
+    return success();
+  }
+
+  Result<void> read_property(const std::vector<std::string_view>& words) {
+    if (header_.elements.empty()) return bad(ErrorCode::BadHeader, "a property before any element");
+    PlyProperty property;
+    property.is_list = words.size() > 1 && lower_case(words[1]) == "list";
+    const std::size_t word_count = property.is_list ? 5 : 3;
+    if (words.size() != word_count) {
+      return bad(ErrorCode::BadHeader,
+                 "a property line is 'property TYPE NAME' or "
+                 "'property list COUNT_TYPE TYPE NAME'");
+    }
+    if (property.is_list) {
+      const auto count_type = scalar_type(words[2]);
+      if (!count_type || is_floating(*count_type)) {
+        return bad(ErrorCode::BadHeader,
+                   "a list's count has the type " + quoted(words[2]) + ", which is not a whole number's");
+      }
+      property.count_type = *count_type;
+    }
+    const auto type = scalar_type(words[word_count - 2]);
+    if (!type) return bad(ErrorCode::BadHeader, "unknown type " + quoted(words[word_count - 2]));
+    property.type = *type;
+    property.name = words[word_count - 1];
+    if (!property_names_.insert(property.name).second) {
+      return bad(ErrorCode::BadHeader,
+                 "a second property " + quoted(property.name) + " in element " + quoted(header_.elements.back().name));
+    }
+    header_.elements.back().properties.push_back(std::move(property));
+    return success();
+  }
+
+  Result<PlyHeader> finished() {
+    if (!has_format_) return failure(ErrorCode::BadHeader, "the header has no format line");
+    header_.size_bytes = position_;
+    header_.line_count = line_number_;
+    return std::move(header_);
+  }
+
+  std::string_view text_;
+  std::size_t position_ = 0;
+  char line_end_ = '\n';
+  std::uint64_t line_number_ = 0;
+  bool has_format_ = false;
+  std::set<std::string> element_names_;
+  std::set<std::string> property_names_;  ///< Of the last element.
+  PlyHeader header_;
+};
+
+}  // namespace
+
+std::string lower_case(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return result;
+}
+
+std::string printable(std::string_view name) {
+  constexpr std::size_t kMaxShown = 40;
+  std::string shown;
+  for (const char c : name.substr(0, kMaxShown)) shown += c >= ' ' && c <= '~' ? c : '?';
+  if (name.size() > kMaxShown) shown += "...";
+  return shown;
+}
+
+std::size_t size_bytes(PlyScalar type) {
+  switch (type) {
+    case PlyScalar::Int8:
+    case PlyScalar::UInt8:
+      return 1;
+    case PlyScalar::Int16:
+    case PlyScalar::UInt16:
+      return 2;
+    case PlyScalar::Int32:
+    case PlyScalar::UInt32:
+    case PlyScalar::Float32:
+      return 4;
+    case PlyScalar::Int64:
+    case PlyScalar::UInt64:
+    case PlyScalar::Float64:
+      return 8;
+  }
+  return 0;
+}
+
+bool is_floating(PlyScalar type) {
+  return type == PlyScalar::Float32 || type == PlyScalar::Float64;
+}
+
+std::string_view to_string(PlyScalar type) {
+  return std::find_if(kTypeNames.begin(), kTypeNames.end(),
+                      [type](const TypeName& entry) { return entry.type == type; })
+      ->name;
+}
+
+const PlyElement* PlyHeader::find(std::string_view name) const {
+  const auto found = std::find_if(
+      elements.begin(), elements.end(),
+      [wanted = lower_case(name)](const PlyElement& element) { return lower_case(element.name) == wanted; });
+  return found == elements.end() ? nullptr : &*found;
+}
+
+Result<PlyHeader> parse_ply_header(std::string_view text) {
+  return HeaderParser(text.substr(0, kMaxPlyHeaderBytes)).parse();
+}
+
+std::uint64_t minimum_entry_bytes(const PlyElement& element, PlyFormat format) {
+  // In a text file every value takes a character and a separator.
+  if (format == PlyFormat::Ascii) return 2 * element.properties.size();
+  std::uint64_t bytes = 0;
+  for (const PlyProperty& property : element.properties) {
+    bytes += size_bytes(property.is_list ? property.count_type : property.type);
+  }
+  return bytes;
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,448 @@
+#include "fusion/files/ply_notes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "fusion/base/distance_text.hpp"
+#include "fusion/files/ply_values.hpp"
+#include "fusion/files/scene_origin.hpp"
+#include "fusion/files/temperature_name.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t kMaxNames = 12;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMaxNames); ++i) {
+    text += (i == 0 ? "" : ", ") + printable(names[i]);
+  }
+  if (names.size() > kMaxNames) text += " and " + std::to_string(names.size() - kMaxNames) + " more";
+  return text;
+}
+
+std::string short_number(double value) {
+  std::array<char, 32> text;
+  constexpr int kDigits = 6;
+  const auto [end, status] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits);
+  return {text.data(), end};
+}
+
+/// The shortest text that is read back as a value of that type.
+std::string value_text(double value, PlyScalar type) {
+  if (type == PlyScalar::Float64) return number_text(value);
+  std::array<char, 32> text;
+  const bool is_float = type == PlyScalar::Float32 && std::abs(value) <= double{std::numeric_limits<float>::max()};
+  const auto [end, status] = is_float ? std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value))
+                                      : std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
+bool is_used(const PlySlots& slots, std::size_t property) {
+  return std::find(slots.begin(), slots.end(), std::optional(property)) != slots.end();
+}
+
+/// The properties of an element that are not read.
+std::vector<std::string> unused_names(const PlyElement& element, const PlySlots& slots,
+                                      std::optional<std::size_t> list) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    if (!is_used(slots, i) && list != i) names.push_back(element.properties[i].name);
+  }
+  return names;
+}
+
+/// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
+constexpr std::array<std::string_view, 9> kNeedAttention = {
+    "hole_vertices", "crowded_place",  "rounded_positions", "coarse_positions",        "clamped_colours",
+    "texture",       "unused_options", "no_temperature",    "implausible_temperatures"};
+
+class Notes {
+ public:
+  Notes(const PlyHeader& header, const PlyInterpretation& interpretation, const ReadOptions& options,
+        const PlyBodyFacts& facts)
+      : header_(header),
+        schema_(interpretation.schema),
+        survey_(interpretation.survey),
+        options_(options),
+        facts_(facts),
+        hole_(interpretation.hole),
+        vertices_(*header.find("vertex")) {}
+
+  std::vector<Note> take() {
+    about_positions();
+    about_colours();
+    about_temperature_property();
+    about_temperatures();
+    about_options();
+    about_what_is_skipped();
+    about_faces();
+    add("trailing_bytes", facts_.trailing_byte_count,
+        counted(facts_.trailing_byte_count, "byte", "bytes") + " after the last element left out");
+    return std::move(notes_);
+  }
+
+ private:
+  void add(std::string_view id, std::uint64_t count, std::string message) {
+    if (count == 0) return;
+    const bool needs_attention = std::find(kNeedAttention.begin(), kNeedAttention.end(), id) != kNeedAttention.end();
+    notes_.push_back({std::string(id), count, std::move(message), needs_attention});
+  }
+
+  void about_positions() {
+    const std::uint64_t nowhere_count = facts_.left_out_vertex_count - facts_.hole_count;
+    add("left_out_vertices", nowhere_count,
+        counted(nowhere_count, "vertex", "vertices") + " without a position (not a number, or beyond 1e30 m) left out");
+    if (facts_.hole_count > 0) {
+      add("hole_vertices", facts_.hole_count,
+          counted(facts_.hole_count, "vertex", "vertices") + hole_text() +
+              ", taken for holes and left out with their temperatures, like vertices without a position; written as "
+              "nan they need no guess");
+    }
+    if (facts_.crowded_place) {
+      add("crowded_place", 1,
+          "many vertices are in exactly one place, " + place_text(*facts_.crowded_place) +
+              ", and faces use them, so that they are kept; where they stand for holes, write nan there or leave them "
+              "out of the faces");
+    }
+    add("left_out_faces", facts_.faces.left_out_face_count,
+        counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
+    about_rounding();
+  }
+
+  /// What tells the holes, in the numbers of the file.
+  std::string hole_text() const {
+    if (hole_->axes == std::array{true, true, true}) return " in exactly one place, " + place_text(hole_->place);
+    for (const auto& [slot, axis, name] : {std::tuple{kX, 0U, "x"}, std::tuple{kY, 1U, "y"}, std::tuple{kZ, 2U, "z"}}) {
+      const double metres = std::array{hole_->place.x, hole_->place.y, hole_->place.z}[axis];
+      if (hole_->axes[axis]) return std::string(" whose ") + name + " is " + coordinate_text(slot, metres);
+    }
+    return "";
+  }
+  std::string coordinate_text(std::size_t slot, double metres) const {
+    return value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
+  }
+  std::string place_text(const Vec3d& place) const {
+    return coordinate_text(kX, place.x) + ' ' + coordinate_text(kY, place.y) + ' ' + coordinate_text(kZ, place.z);
+  }
+
+  /// What the file, or keeping positions as floats, has lost of them.
+  void about_rounding() {
+    if (!facts_.bulk) return;
+    const Bulk& bulk = *facts_.bulk;
+    const std::array<std::pair<double, double>, 3> axes = {
+        {{bulk.min.x, bulk.max.x}, {bulk.min.y, bulk.max.y}, {bulk.min.z, bulk.max.z}}};
+    double rounding = 0;
+    bool is_all_float = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const PlyScalar type = vertices_.properties[*schema_.vertex[kX + axis]].type;
+      is_all_float = is_all_float && (type == PlyScalar::Float32 || size_bytes(type) < 4);
+      if (type != PlyScalar::Float32) continue;
+      const double furthest = std::max(std::abs(axes[axis].first), std::abs(axes[axis].second));
+      const auto stored = static_cast<float>(furthest / options_.scale());
+      const float next = std::nextafter(stored, 0.0F);
+      rounding = std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.scale());
+    }
+    // Float coordinates far from 0 have been rounded before they came here.
+    constexpr double kTooCoarse = 1.0 / 20'000;
+    constexpr double kNoticed = 1e-5;  // metres
+    if (facts_.origin != Vec3d{} && rounding > std::max(kNoticed, kTooCoarse * bulk.extent())) {
+      add("rounded_positions", vertices_.count,
+          "Positions are declared as floats and far from 0, where floats are rounded to " + short_number(rounding) +
+              " m; declare them as double, or write them closer to 0");
+    }
+    constexpr double kMillimetre = 0.001;
+    const double kept = largest_rounding(bulk, facts_.origin);
+    if (!is_all_float && kept > kMillimetre) {
+      add("coarse_positions", vertices_.count,
+          "Positions are kept as floats from " + number_text(facts_.origin.x) + " " + number_text(facts_.origin.y) +
+              " " + number_text(facts_.origin.z) + ": the farthest of this large scene are off by up to " +
+              distance_text(kept) + "; cut it into parts where that matters");
+    }
+  }
+
+  void about_colours() {
+    const PlyElement* const faces = header_.find("face");
+    if (schema_.has_face_colours()) {
+      add("face_colours", faces->count,
+          "Colours of the faces carried to their corners (mean over the faces of a vertex)");
+    }
+    if (schema_.has_vertex_colours() || schema_.has_face_colours()) {
+      const bool is_of_faces = !schema_.has_vertex_colours();
+      const PlySlots& slots = is_of_faces ? schema_.face : schema_.vertex;
+      const PlyElement& element = is_of_faces ? *faces : vertices_;
+      PlyScalar type = element.properties[*slots[kRed]].type;
+      for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
+        if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
+      }
+      const std::string text = conversion_text(schema_.colour_coding, type, survey_.largest_colour);
+      if (!text.empty()) add("converted_colours", vertices_.count, text);
+    } else {
+      about_textures();
+    }
+    add("clamped_colours", facts_.clamped_colour_count,
+        counted(facts_.clamped_colour_count, "colour", "colours") +
+            " out of range taken as black or white, or as grey where there is no number");
+  }
+
+  void about_textures() {
+    std::string file;
+    bool is_textured = false;
+    for (const std::string& comment : header_.comments) {
+      const std::size_t at = lower_case(comment).find("texturefile");
+      if (at == std::string::npos) continue;
+      is_textured = true;
+      const std::size_t name = comment.find_first_not_of(" \t:=", at + std::string_view("texturefile").size());
+      if (file.empty() && name != std::string::npos) file = printable(comment.substr(name));
+    }
+    const auto is_texture_property = [](const PlyProperty& property) {
+      const std::string name = lower_case(property.name);
+      return name == "texcoord" || name == "texnumber" || name == "texture_u" || name == "u" || name == "s" ||
+             name == "texture_s" || name == "tex_u";
+    };
+    if (const PlyElement* const faces = header_.find("face")) {
+      is_textured = is_textured || std::any_of(faces->properties.begin(), faces->properties.end(), is_texture_property);
+    }
+    is_textured =
+        is_textured || std::any_of(vertices_.properties.begin(), vertices_.properties.end(), is_texture_property);
+    if (!is_textured) return;
+    add("texture", vertices_.count,
+        "The colours are in a texture" + (file.empty() ? "" : " (" + file + ")") +
+            ", which is not read: everything is grey; bake it into the vertices first, in MeshLab with Filters, "
+            "Texture, "
+            "Transfer Color: Texture to Vertex");
+  }
+
+  void about_temperature_property() {
+    if (schema_.has_face_temperature()) {
+      add("face_temperatures", header_.find("face")->count,
+          "Temperatures of the faces carried to their corners (mean over the faces of a vertex)");
+    }
+    const PlyProperty* const property = temperature_property();
+    if (property == nullptr) return about_candidates();
+    std::string others;
+    for (const PlyProperty& other : vertices_.properties) {
+      if (!other.is_list && &other != property && temperature_name(other.name).rank > 0) {
+        others += (others.empty() ? "" : ", ") + ("'" + printable(other.name) + "'");
+      }
+    }
+    if (property->name == "temperature" && others.empty()) return;
+    add("temperature_property", vertices_.count,
+        "The temperature is taken from the property '" + printable(property->name) + "'" +
+            (others.empty() ? std::string() : ", not from " + others + " (--temperature-property names another)"));
+  }
+
+  const PlyProperty* temperature_property() const {
+    if (schema_.has_vertex_temperature()) return &vertices_.properties[*schema_.vertex[kTemperature]];
+    if (schema_.has_face_temperature()) return &header_.find("face")->properties[*schema_.face[kTemperature]];
+    return nullptr;
+  }
+
+  /// No temperature was found: why, and what could be one.
+  void about_candidates() {
+    std::vector<std::string> names;
+    std::string text;
+    const auto look = [&](const PlyElement& element, const PlySlots& slots) {
+      for (std::size_t i = 0; i < element.properties.size(); ++i) {
+        const PlyProperty& property = element.properties[i];
+        const TemperatureName name = temperature_name(property.name);
+        if (is_used(slots, i)) continue;
+        if (!property.is_list && name.is_candidate) names.push_back(property.name);
+        if (property.is_list && name.rank > 0) {
+          text = "'" + printable(property.name) + "' is a list, and not taken for a temperature, which is one number";
+        }
+      }
+    };
+    look(vertices_, schema_.vertex);
+    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
+      look(*faces, schema_.face);
+    }
+    if (text.empty() && (schema_.is_temperature_doubtful || names.empty())) text = about_bare_t(names);
+    if (text.empty() && names.empty()) return;
+    if (text.empty()) text = "No property is called a temperature";
+    if (!names.empty()) text += "; --temperature-property NAME takes one of: " + joined(names);
+    add("no_temperature", std::max<std::size_t>(1, names.size()), text);
+  }
+
+  /// Why a bare t is no temperature; adds it to the names where it may be one nevertheless.
+  std::string about_bare_t(std::vector<std::string>& names) const {
+    const auto is_bare_t = [](const PlyProperty& one) { return !one.is_list && temperature_name(one.name).is_bare_t; };
+    const auto speaks_against = [](const PlyProperty& one) { return temperature_name(one.name).speaks_against_t; };
+    const auto& properties = vertices_.properties;
+    const auto t = std::find_if(properties.begin(), properties.end(), is_bare_t);
+    if (t == properties.end()) return {};
+    const auto other = std::find_if(properties.begin(), properties.end(), speaks_against);
+    std::string reason;
+    bool may_be_one = names.empty();
+    if (schema_.is_temperature_doubtful) {
+      // No sensor of temperatures counts further.
+      constexpr double kMostCounts = 65'535;
+      may_be_one = may_be_one && survey_.most_doubtful <= kMostCounts;
+      reason = "its values (" + number_text(survey_.least_doubtful) + " to " + number_text(survey_.most_doubtful) + ")";
+    } else if (other != properties.end()) {
+      reason = "'" + printable(other->name) + "' beside it";
+    } else {
+      may_be_one = may_be_one && size_bytes(t->type) < 4;
+      reason = "its type, " + std::string(to_string(t->type)) + ": whole numbers of that name count time";
+    }
+    if (may_be_one) names.push_back(t->name);
+    return "'" + printable(t->name) + "' is not taken for a temperature, because of " + reason;
+  }
+
+  void about_temperatures() {
+    const TemperatureFacts& facts = facts_.temperature;
+    add("missing_temperatures", facts.missing_count,
+        counted(facts.missing_count, "vertex", "vertices") + " without a temperature");
+    add("impossible_temperatures", facts.impossible_count,
+        counted(facts.impossible_count, "temperature", "temperatures") +
+            " at or below -273.15 degC (absolute zero) taken as missing");
+    add("no_data_temperatures", facts.no_data_count,
+        counted(facts.no_data_count, "temperature", "temperatures") + " of a --no-data value taken as missing");
+    add("over_range_temperatures", facts.over_range_count,
+        counted(facts.over_range_count, "temperature", "temperatures") +
+            " over the range of the sensor (infinite), shown as the hottest");
+    add("under_range_temperatures", facts.under_range_count,
+        counted(facts.under_range_count, "temperature", "temperatures") +
+            " under the range of the sensor (-infinite), shown as the coldest");
+    if (!options_.celsius_scale() && facts.finite_count > 0) about_plausibility(facts);
+  }
+
+  /// Nobody has said what unit it is, and degrees Celsius are hard to believe.
+  void about_plausibility(const TemperatureFacts& facts) {
+    const std::string range = "Temperatures from " + short_number(static_cast<double>(facts.lowest)) + " to " +
+                              short_number(static_cast<double>(facts.highest)) + ", taken as degC, ";
+    const std::uint64_t measured_count = facts.finite_count - facts.zero_count - facts.full_count;
+    const auto most = [measured_count](std::uint64_t count) {
+      constexpr std::uint64_t kMost = 9;
+      return count > 0 && 10 * count >= kMost * measured_count;
+    };
+    const std::string no_data = facts.full_count > 0 ? "; if 65535 stands for no data, --no-data 65535" : "";
+    const PlyProperty& property = *temperature_property();
+    const std::optional<TemperatureUnit> named = temperature_name(property.name).unit;
+    const std::string call = "'" + printable(property.name) + "'";
+    const char* const kId = "implausible_temperatures";
+    if (named == TemperatureUnit::Fahrenheit) {
+      add(kId, facts.finite_count, range + "are in Fahrenheit by the name " + call + ": --temperature-unit fahrenheit");
+    } else if (named == TemperatureUnit::Centikelvin || most(facts.centikelvin_like_count)) {
+      add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin" + no_data);
+    } else if (named == TemperatureUnit::Kelvin || most(facts.kelvin_like_count)) {
+      add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin" + no_data);
+    } else if (most(facts.tenth_kelvin_like_count)) {
+      add(kId, facts.finite_count,
+          range + "look like tenths of kelvin: --temperature-scale 0.1 --temperature-offset -273.15" + no_data);
+    } else if (size_bytes(property.type) == 1) {
+      add(kId, facts.finite_count,
+          range + "are of type " + std::string(to_string(property.type)) +
+              " and look like grey values: --temperature-scale A --temperature-offset B (degC = A value + B)");
+    } else if (facts.too_hot_count - facts.full_count > measured_count / 2) {
+      add(kId, facts.finite_count,
+          range +
+              "look like counts of a sensor or another quantity: --temperature-scale A --temperature-offset B "
+              "(degC = A value + B), or --temperature-property NAME" +
+              no_data);
+    } else if (constexpr double kColdestBelieved = 200;
+               property.type != PlyScalar::Float32 && property.type != PlyScalar::Float64 && facts.too_hot_count == 0 &&
+               static_cast<double>(facts.lowest) >= kColdestBelieved) {
+      add(kId, facts.finite_count,
+          range +
+              "are whole numbers that are hard to believe: hundredths of a degree are --temperature-scale 0.01, tenths "
+              "0.1");
+    } else if (facts.too_hot_count > 0) {
+      const std::string value = value_text(static_cast<double>(facts.highest), PlyScalar::Float32);
+      add(kId, facts.too_hot_count,
+          range + counted(facts.too_hot_count, "is", "are") + " above 3000: if " + value +
+              " stands for no data, --no-data " + value);
+    } else if (facts.too_cold_count > 0) {
+      const std::string value = value_text(static_cast<double>(facts.lowest), PlyScalar::Float32);
+      add(kId, facts.too_cold_count,
+          range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
+              " stands for no data, --no-data " + value);
+    }
+  }
+
+  /// What was said of the file and has changed nothing.
+  void about_options() {
+    if (temperature_property() == nullptr) {
+      std::vector<std::string> names;
+      if (options_.temperature_unit) names.emplace_back("--temperature-unit");
+      if (options_.temperature_scale) names.emplace_back("--temperature-scale");
+      if (options_.temperature_offset) names.emplace_back("--temperature-offset");
+      if (!options_.no_data.empty()) names.emplace_back("--no-data");
+      if (!names.empty()) {
+        add("unused_options", names.size(), "There is no temperature, so these have no effect: " + joined(names));
+      }
+      return;
+    }
+    std::vector<std::string> values;
+    for (std::size_t i = 0; i < std::min<std::size_t>(options_.no_data.size(), 64); ++i) {
+      const bool is_seen = (facts_.temperature.no_data_seen >> i & 1U) != 0;
+      if (!is_seen) values.push_back(number_text(options_.no_data[i]));
+    }
+    if (!values.empty()) {
+      add("unused_options", values.size(),
+          "No temperature of the file, in its own unit, has this --no-data value: " + joined(values));
+    }
+  }
+
+  void about_what_is_skipped() {
+    const auto of = [](std::size_t count) { return counted(count, "property", "properties"); };
+    const auto names = unused_names(vertices_, schema_.vertex, std::nullopt);
+    add("skipped_vertex_properties", names.size(), of(names.size()) + " of the vertices left out: " + joined(names));
+    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
+      const auto face_names = unused_names(*faces, schema_.face, schema_.corner_list);
+      add("skipped_face_properties", face_names.size(),
+          of(face_names.size()) + " of the faces left out: " + joined(face_names));
+    }
+    for (const PlyElement& element : header_.elements) {
+      const bool is_read =
+          &element == &vertices_ || &element == header_.find("face") || &element == header_.find("tristrips");
+      if (is_read || element.count == 0) continue;
+      add("skipped_elements", element.count,
+          "Element '" + printable(element.name) + "' with " + counted(element.count, "entry", "entries") + " left out");
+    }
+  }
+
+  void about_faces() {
+    const FaceFacts& faces = facts_.faces;
+    add("triangulated_strips", faces.strip_count,
+        counted(faces.strip_count, "triangle strip", "triangle strips") + " cut into triangles");
+    add("triangulated_polygons", faces.polygon_count,
+        counted(faces.polygon_count, "polygon", "polygons") +
+            " of more than three corners cut into triangles from the first corner, which is right for convex ones");
+    add("degenerate_faces", faces.degenerate_triangle_count,
+        counted(faces.degenerate_triangle_count, "triangle", "triangles") + " with the same vertex twice left out");
+    add("incomplete_faces", faces.incomplete_face_count,
+        counted(faces.incomplete_face_count, "face", "faces") + " of fewer than three corners left out");
+    add("unreferenced_vertices", facts_.unreferenced_vertex_count,
+        counted(facts_.unreferenced_vertex_count, "vertex", "vertices") + " of no triangle kept");
+  }
+
+  const PlyHeader& header_;
+  const PlySchema& schema_;
+  const PlySurvey& survey_;
+  const ReadOptions& options_;
+  const PlyBodyFacts& facts_;
+  const std::optional<Hole>& hole_;
+  const PlyElement& vertices_;
+  std::vector<Note> notes_;
+};
+
+}  // namespace
+
+std::string counted(std::uint64_t count, std::string_view one, std::string_view many) {
+  return std::to_string(count) + " " + std::string(count == 1 ? one : many);
+}
+
+std::vector<Note> ply_notes(const PlyHeader& header, const PlyInterpretation& interpretation,
+                            const ReadOptions& options, const PlyBodyFacts& facts) {
+  return Notes(header, interpretation, options, facts).take();
+}
+
+}  // namespace spectra::fusion

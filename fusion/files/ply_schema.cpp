@@ -1,0 +1,156 @@
+#include "fusion/files/ply_schema.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "fusion/files/temperature_name.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// The index of the property of that name, or else of the first that has it in another case; scalars only.
+std::optional<std::size_t> find_scalar(const PlyElement& element, std::string_view name) {
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& property = element.properties[i];
+    if (property.is_list) continue;
+    if (property.name == name) return i;
+    if (!found && lower_case(property.name) == lower_case(name)) found = i;
+  }
+  return found;
+}
+
+Result<void> find_positions(const PlyElement& element, PlySlots& slots) {
+  constexpr std::array<std::string_view, 3> kAxes = {"x", "y", "z"};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    slots[kX + axis] = find_scalar(element, kAxes[axis]);
+    if (!slots[kX + axis]) {
+      return failure(ErrorCode::BadHeader, "element 'vertex' has no property '" + std::string(kAxes[axis]) + "'");
+    }
+  }
+  return success();
+}
+
+/// The coding of the colours, nullopt when there are none.
+std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& slots) {
+  struct Names {
+    std::array<std::string_view, 3> names;
+    ColourCoding coding;
+  };
+  constexpr std::array<Names, 6> kNames = {{{{"red", "green", "blue"}, ColourCoding::Channels},
+                                            {{"diffuse_red", "diffuse_green", "diffuse_blue"}, ColourCoding::Channels},
+                                            {{"r", "g", "b"}, ColourCoding::Channels},
+                                            {{"rgb", "rgb", "rgb"}, ColourCoding::Packed},
+                                            {{"rgba", "rgba", "rgba"}, ColourCoding::Packed},
+                                            {{"f_dc_0", "f_dc_1", "f_dc_2"}, ColourCoding::Splat}}};
+  for (const auto& [names, coding] : kNames) {
+    const std::array<std::optional<std::size_t>, 3> indices = {
+        find_scalar(element, names[0]), find_scalar(element, names[1]), find_scalar(element, names[2])};
+    if (!indices[0] || !indices[1] || !indices[2]) continue;
+    std::copy(indices.begin(), indices.end(), slots.begin() + kRed);
+    return coding;
+  }
+  return std::nullopt;
+}
+
+/// The property whose name says temperature most plainly.
+std::optional<std::size_t> find_temperature(const PlyElement& element) {
+  std::optional<std::size_t> best;
+  int best_rank = 0;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& property = element.properties[i];
+    const int rank = property.is_list ? 0 : temperature_name(property.name).rank;
+    if (rank > best_rank) {
+      best = i;
+      best_rank = rank;
+    }
+  }
+  return best;
+}
+
+/// A floating property called t, unless one beside it tells that it is something else.
+std::optional<std::size_t> find_bare_t(const PlyElement& element) {
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& property = element.properties[i];
+    const TemperatureName name = temperature_name(property.name);
+    if (name.speaks_against_t) return std::nullopt;
+    if (!found && name.is_bare_t && !property.is_list && is_floating(property.type)) found = i;
+  }
+  return found;
+}
+
+Result<void> find_temperatures(const PlyElement& vertices, const PlyElement* faces, const ReadOptions& options,
+                               PlySchema& schema) {
+  const std::string& wanted = options.temperature_property;
+  if (!wanted.empty()) {
+    schema.vertex[kTemperature] = find_scalar(vertices, wanted);
+    if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_scalar(*faces, wanted);
+    if (schema.has_vertex_temperature() || schema.has_face_temperature()) return success();
+    std::string names;
+    for (const PlyProperty& property : vertices.properties) {
+      if (!property.is_list && names.size() < 120) names += (names.empty() ? "" : ", ") + printable(property.name);
+    }
+    return failure(ErrorCode::Unsupported,
+                   "there is no scalar property '" + printable(wanted) + "' (the vertices have " + names + ")",
+                   "temperature_property");
+  }
+  schema.vertex[kTemperature] = find_temperature(vertices);
+  if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_temperature(*faces);
+  if (!schema.has_vertex_temperature() && !schema.has_face_temperature()) {
+    schema.vertex[kTemperature] = find_bare_t(vertices);
+    schema.is_temperature_doubtful = schema.has_vertex_temperature();
+  }
+  return success();
+}
+
+/// The list of vertices that an element of faces or strips has.
+Result<std::size_t> find_corner_list(const PlyElement& element) {
+  const auto is_corner_list = [](const PlyProperty& property) {
+    const std::string name = lower_case(property.name);
+    return name == "vertex_indices" || name == "vertex_index";
+  };
+  const auto list = std::find_if(element.properties.begin(), element.properties.end(), is_corner_list);
+  const std::string subject = "element '" + printable(element.name) + "' has ";
+  if (list == element.properties.end() || !list->is_list) {
+    return failure(ErrorCode::BadHeader, subject + "no list 'vertex_indices' or 'vertex_index'");
+  }
+  if (std::find_if(std::next(list), element.properties.end(), is_corner_list) != element.properties.end()) {
+    return failure(ErrorCode::BadHeader, subject + "both 'vertex_indices' and 'vertex_index'");
+  }
+  if (is_floating(list->type)) {
+    return failure(ErrorCode::BadHeader, "the vertex indices of faces have the type " +
+                                             std::string(to_string(list->type)) + ", which is not a whole number's");
+  }
+  return static_cast<std::size_t>(list - element.properties.begin());
+}
+
+const PlyElement* with_entries(const PlyHeader& header, std::string_view name) {
+  const PlyElement* const element = header.find(name);
+  return element != nullptr && element->count > 0 ? element : nullptr;
+}
+
+}  // namespace
+
+Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options) {
+  const PlyElement* const vertices = header.find("vertex");
+  if (vertices == nullptr) return failure(ErrorCode::BadHeader, "the header has no element 'vertex'");
+  if (vertices->count == 0) return failure(ErrorCode::BadValue, "the scene is empty: it has 0 vertices");
+  PlySchema schema;
+  BOOST_OUTCOME_TRY(find_positions(*vertices, schema.vertex));
+  const PlyElement* const faces = with_entries(header, "face");
+  if (faces != nullptr) {
+    BOOST_OUTCOME_TRY(schema.corner_list, find_corner_list(*faces));
+  }
+  if (const PlyElement* const strips = with_entries(header, "tristrips")) {
+    BOOST_OUTCOME_TRY(schema.strip_list, find_corner_list(*strips));
+  }
+  auto coding = find_colours(*vertices, schema.vertex);
+  if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face);
+  schema.colour_coding = coding.value_or(ColourCoding::Channels);
+  BOOST_OUTCOME_TRY(find_temperatures(*vertices, faces, options, schema));
+  return schema;
+}
+
+}  // namespace spectra::fusion

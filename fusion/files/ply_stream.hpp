@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fusion/base/error.hpp"
+#include "fusion/base/vertex_types.hpp"
+#include "fusion/files/block_file.hpp"
+#include "fusion/files/ply_face_reader.hpp"
+#include "fusion/files/ply_header.hpp"
+#include "fusion/files/ply_reader.hpp"
+#include "fusion/files/ply_schema.hpp"
+#include "fusion/files/ply_survey.hpp"
+#include "fusion/files/position_sample.hpp"
+#include "fusion/files/read_options.hpp"
+#include "fusion/files/vertex_colour.hpp"
+#include "fusion/files/vertex_temperature.hpp"
+
+namespace spectra::fusion {
+
+/// Some vertices in the file's order. The spans are valid during the call only.
+struct PlyVertexBlock {
+  std::uint64_t first_vertex = 0;
+  std::span<const Vec3d> positions;            ///< Metres; finite, within 1e30, but for those left out.
+  std::span<const Rgb8> visible;               ///< Empty when the file has no colours.
+  std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
+  /// Those without a position, by their index in the block, rising: to be left out of the scene. No triangle has them.
+  std::span<const std::uint32_t> left_out;
+};
+
+/// Who gets the body of a file: all vertices, then all triangles. A handler that fails ends the reading with its error; an
+/// empty one is not called.
+struct PlyHandlers {
+  std::function<Result<void>(const PlyVertexBlock&)> vertices;
+  /// Triangles as they will be drawn: polygons cut into fans, strips into triangles, indices checked and of the file's
+  /// order, none with a vertex twice or one that is left out.
+  std::function<Result<void>(std::span<const Triangle>)> triangles;
+};
+
+/// What was found in the body.
+struct PlyBodyFacts {
+  Vec3d min, max;            ///< Of all positions.
+  std::optional<Bulk> bulk;  ///< Where nearly all of them are, when that is more than one place.
+  Vec3d origin;              ///< What to tell them from, as scene_origin.hpp says.
+  /// What stands for holes, found in this reading: PlyStream::leave_out_hole() takes it.
+  std::optional<Hole> hole;
+  FaceFacts faces;
+  TemperatureFacts temperature;
+  std::uint64_t left_out_vertex_count = 0;      ///< Without a position within 1e30 m, and holes.
+  std::uint64_t hole_count = 0;                 ///< Left out because they are at the place of holes.
+  std::optional<Vec3d> crowded_place;           ///< Many vertices are there, and faces use them: it may be a hole.
+  std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
+  std::uint64_t clamped_colour_count = 0;       ///< Vertices whose colour was out of range or no number.
+  std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
+};
+
+/// How the values of a file are taken.
+struct PlyInterpretation {
+  explicit PlyInterpretation(const ReadOptions& options)
+      : temperature(options), metres_per_unit(options.scale()), origin(options.origin) {}
+
+  PlySchema schema;
+  PlySurvey survey;
+  ColourConversion colours;  ///< Of the vertices.
+  TemperatureConversion temperature;
+  double metres_per_unit;
+  std::optional<Vec3d> origin;  ///< Absent: chosen.
+  std::optional<Hole> hole;     ///< Vertices there are no part of the scene.
+};
+
+/// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the
+/// ground of read_ply(), and the way to work on files larger than memory. Safe on untrusted input. What is accepted, and what
+/// colours and temperatures are recognised, is told at read_ply().
+class PlyStream {
+ public:
+  /// Opens the file, judges its header against its size, and looks at its values where their meaning depends on them.
+  static Result<PlyStream> open(const std::filesystem::path& path, const ReadOptions& options = {});
+
+  const PlyHeader& header() const { return header_; }
+  std::uint64_t vertex_count() const { return vertices().count; }
+  /// More triangles than this the bytes of the file cannot hold, if all faces are triangles.
+  std::uint64_t triangle_count_limit() const;
+  bool has_visible() const;
+  bool has_temperature() const;
+  /// Some coordinate has a type that a float cannot hold.
+  bool has_double_positions() const;
+
+  /// Reads the whole body from its beginning; may be called again.
+  Result<PlyBodyFacts> read(const PlyHandlers& handlers);
+
+  /// Where the reading found holes that are written as a number, they are left out of all later ones, and true tells that this
+  /// one is void.
+  bool leave_out_hole(const PlyBodyFacts& facts);
+
+  /// What has to be said about the file after a reading, for people.
+  std::vector<Note> notes(const PlyBodyFacts& facts) const;
+
+ private:
+  PlyStream(BlockFile file, std::string name, ReadOptions options)
+      : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)), interpretation_(options_) {}
+  Result<void> interpret();
+  Result<void> check_size() const;
+  Result<PlyBodyFacts> with_reason(Result<PlyBodyFacts> facts);
+  const PlyElement& vertices() const { return *header_.find("vertex"); }
+
+  BlockFile file_;
+  std::string name_;  ///< Of the file, for messages.
+  ReadOptions options_;
+  PlyHeader header_;
+  PlyInterpretation interpretation_;
+};
+
+}  // namespace spectra::fusion

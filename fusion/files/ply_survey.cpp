@@ -1,0 +1,227 @@
+#include "fusion/files/ply_survey.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "fusion/files/ply_cursor.hpp"
+#include "fusion/files/ply_face_reader.hpp"
+#include "fusion/files/ply_vertex_reader.hpp"
+#include "fusion/files/vertex_colour.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// Looks whether a property that is called no more than "t" is a temperature: nearly all values could be one, they are not
+/// mere shares of 1, and they do not only rise as a clock does.
+class DoubtfulTemperature {
+ public:
+  explicit DoubtfulTemperature(const ReadOptions& options) : scale_(options.celsius_scale().value_or(CelsiusScale{})) {}
+
+  void add(std::span<const double> values) {
+    for (const double value : values) {
+      if (!std::isfinite(value)) continue;
+      ++count_;
+      least_ = std::min(least_, value);
+      most_ = std::max(most_, value);
+      const double celsius = scale_.factor * value + scale_.offset;
+      constexpr double kColdest = -100;
+      constexpr double kHottest = 2000;
+      plausible_count_ += celsius > kColdest && celsius < kHottest ? 1U : 0U;
+      fall_count_ += value < last_ ? 1U : 0U;
+      last_ = value;
+    }
+  }
+
+  void conclude(PlySurvey& survey) const {
+    survey.least_doubtful = least_;
+    survey.most_doubtful = most_;
+    constexpr std::uint64_t kFewest = 16;
+    const bool is_clock = count_ >= kFewest && fall_count_ == 0 && most_ > least_;
+    const bool is_share = count_ >= kFewest && least_ >= 0 && most_ <= 1;
+    survey.is_temperature_plausible = plausible_count_ * 10 >= count_ * 9 && count_ > 0 && !is_clock && !is_share;
+  }
+
+ private:
+  CelsiusScale scale_;
+  std::uint64_t count_ = 0;
+  std::uint64_t plausible_count_ = 0;
+  std::uint64_t fall_count_ = 0;
+  double least_ = std::numeric_limits<double>::infinity();
+  double most_ = -std::numeric_limits<double>::infinity();
+  double last_ = -std::numeric_limits<double>::infinity();
+};
+
+double largest_finite(std::span<const double> values, double largest) {
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  }
+  return largest;
+}
+
+/// Sums over the faces of every vertex.
+class FaceSums {
+ public:
+  FaceSums(const PlySchema& schema, std::uint64_t vertex_count, const ReadOptions& options)
+      : schema_(schema), conversion_(options) {
+    const auto count = static_cast<std::size_t>(vertex_count);
+    if (schema.has_face_colours()) colours_.resize(count);
+    if (schema.has_face_temperature()) temperatures_.resize(count);
+  }
+
+  void add(std::span<const std::uint32_t> corners, std::array<double, kSlotCount> values, PlySurvey& survey) {
+    if (!colours_.empty()) add_colour(corners, values, survey);
+    if (temperatures_.empty()) return;
+    float celsius = 0;
+    conversion_.convert({&values[kTemperature], 1}, {&celsius, 1}, survey.face_temperature);
+    if (std::isnan(celsius)) return;
+    for (const std::uint32_t corner : corners) {
+      temperatures_[corner].sum += static_cast<double>(celsius);
+      ++temperatures_[corner].count;
+    }
+  }
+
+  Result<void> conclude(PlyScalar colour_type, PlySurvey& survey) {
+    if (!colours_.empty()) {
+      // Packed colours were unpacked before they were added.
+      const bool is_packed = schema_.colour_coding == ColourCoding::Packed;
+      BOOST_OUTCOME_TRY(const ColourConversion conversion,
+                        is_packed ? Result<ColourConversion>(ColourConversion{})
+                                  : colour_conversion(schema_.colour_coding, colour_type, survey.largest_colour));
+      survey.face_colours.resize(colours_.size());
+      for (std::size_t v = 0; v < colours_.size(); ++v) {
+        std::array<double, 3> means{};
+        std::array<std::span<const double>, 3> values;
+        for (std::size_t channel = 0; channel < 3; ++channel) {
+          means[channel] = static_cast<double>(colours_[v].sums[channel]) / static_cast<double>(colours_[v].count);
+          values[channel] = {&means[channel], 1};
+        }
+        std::uint64_t ignored = 0;
+        conversion.convert(values, std::span(survey.face_colours).subspan(v, 1),
+                           colours_[v].count == 0 ? ignored : survey.clamped_colour_count);
+      }
+      colours_ = {};
+    }
+    survey.face_temperature_celsius.reserve(temperatures_.size());
+    for (const Temperature& temperature : temperatures_) {
+      survey.face_temperature_celsius.push_back(
+          static_cast<float>(temperature.sum / static_cast<double>(temperature.count)));
+    }
+    return success();
+  }
+
+ private:
+  void add_colour(std::span<const std::uint32_t> corners, const std::array<double, kSlotCount>& values,
+                  PlySurvey& survey) {
+    std::array<double, 3> channels = {values[kRed], values[kGreen], values[kBlue]};
+    if (schema_.colour_coding == ColourCoding::Packed) {
+      ColourConversion unpacking;
+      unpacking.is_packed = true;
+      Rgb8 colour;
+      std::uint64_t ignored = 0;
+      unpacking.convert({std::span<const double>(&channels[0], 1), {}, {}}, {&colour, 1}, ignored);
+      channels = {static_cast<double>(colour.r), static_cast<double>(colour.g), static_cast<double>(colour.b)};
+    }
+    survey.largest_colour = largest_finite(channels, survey.largest_colour);
+    for (const std::uint32_t corner : corners) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        colours_[corner].sums[channel] += static_cast<float>(channels[channel]);
+      }
+      ++colours_[corner].count;
+    }
+  }
+
+  struct Colour {
+    std::array<float, 3> sums{};
+    std::uint32_t count = 0;
+  };
+  struct Temperature {
+    double sum = 0;
+    std::uint32_t count = 0;
+  };
+
+  const PlySchema& schema_;
+  const TemperatureConversion conversion_;
+  std::vector<Colour> colours_;
+  std::vector<Temperature> temperatures_;
+};
+
+/// Reads the faces for what they carry.
+Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, const PlySchema& schema,
+                          std::uint64_t vertex_count, FaceSums& sums, PlySurvey& survey) {
+  std::vector<std::uint32_t> corners;
+  std::array<double, kSlotCount> values{};
+  for (; cursor.entry < element.count; ++cursor.entry) {
+    BOOST_OUTCOME_TRY(cursor.begin_entry(element));
+    for (std::size_t p = 0; p < element.properties.size(); ++p) {
+      const PlyProperty& property = element.properties[p];
+      if (p == *schema.corner_list) {
+        BOOST_OUTCOME_TRY(read_corners(cursor, property, vertex_count, corners));
+      } else if (property.is_list) {
+        BOOST_OUTCOME_TRY(cursor.skip_list(property));
+      } else if (std::find(schema.face.begin(), schema.face.end(), std::optional(p)) == schema.face.end()) {
+        BOOST_OUTCOME_TRY(cursor.skip_values(1, property.type));
+      } else {
+        BOOST_OUTCOME_TRY(const double value, cursor.read_value(property.type));
+        for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
+          if (schema.face[slot] == p) values[slot] = value;
+        }
+      }
+    }
+    BOOST_OUTCOME_TRY(cursor.end_entry());
+    sums.add(corners, values, survey);
+  }
+  return success();
+}
+
+}  // namespace
+
+bool needs_survey(const PlyHeader& header, const PlySchema& schema) {
+  if (schema.has_face_colours() || schema.has_face_temperature() || schema.is_temperature_doubtful) return true;
+  if (!schema.has_vertex_colours() || schema.colour_coding != ColourCoding::Channels) return false;
+  const PlyElement& vertices = *header.find("vertex");
+  return std::any_of(schema.vertex.begin() + kRed, schema.vertex.begin() + kBlue + 1,
+                     [&](const auto& index) { return vertices.properties[*index].type != PlyScalar::UInt8; });
+}
+
+Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const PlySchema& schema,
+                             const ReadOptions& options) {
+  PlySurvey survey;
+  const PlyElement* const vertices = header.find("vertex");
+  const PlyElement* const faces = header.find("face");
+  const bool surveys_faces = schema.has_face_colours() || schema.has_face_temperature();
+  DoubtfulTemperature doubtful(options);
+  FaceSums sums(schema, surveys_faces ? vertices->count : 0, options);
+  PlyCursor cursor(file, header);
+  for (const PlyElement& element : header.elements) {
+    cursor.begin_element(element);
+    if (&element == vertices) {
+      PlyVertexReader reader(cursor, element, schema);
+      for (;;) {
+        BOOST_OUTCOME_TRY(const PlyRawVertices block, reader.next());
+        if (block.positions.empty()) break;
+        if (schema.colour_coding != ColourCoding::Packed) {
+          for (const auto& channel : block.colours) {
+            survey.largest_colour = largest_finite(channel, survey.largest_colour);
+          }
+        }
+        if (schema.is_temperature_doubtful) doubtful.add(block.temperatures);
+      }
+    } else if (&element == faces && surveys_faces) {
+      BOOST_OUTCOME_TRY(survey_faces(cursor, element, schema, vertices->count, sums, survey));
+    } else {
+      BOOST_OUTCOME_TRY(cursor.skip_element(element));
+    }
+  }
+  if (schema.is_temperature_doubtful) doubtful.conclude(survey);
+  if (surveys_faces) {
+    const PlyScalar colour_type =
+        schema.has_face_colours() ? faces->properties[*schema.face[kRed]].type : PlyScalar::UInt8;
+    BOOST_OUTCOME_TRY(sums.conclude(colour_type, survey));
+  }
+  return survey;
+}
+
+}  // namespace spectra::fusion

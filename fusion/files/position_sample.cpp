@@ -1,0 +1,164 @@
+#include "fusion/files/position_sample.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace spectra::fusion {
+
+namespace {
+
+constexpr std::uint64_t kMostEntries = 16'384;
+constexpr std::size_t kFewestInAHole = 12;
+constexpr std::size_t kFewestElsewhere = 12;
+/// Where many places have several vertices each, none of them is a hole.
+constexpr std::size_t kMoreThanAnyOther = 8;
+constexpr double kBulkReach = 32;
+
+constexpr std::array<double Vec3d::*, 3> kAxes = {&Vec3d::x, &Vec3d::y, &Vec3d::z};
+
+bool is_finite(const Vec3d& p) {
+  constexpr double kFloatMax = std::numeric_limits<float>::max();
+  return std::abs(p.x) <= kFloatMax && std::abs(p.y) <= kFloatMax && std::abs(p.z) <= kFloatMax;
+}
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// From a box to a point; 0 inside.
+double distance(const Bulk& box, const Vec3d& p) {
+  std::array<double, 3> gap{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double at = p.*kAxes[axis];
+    gap[axis] = std::max({0.0, box.min.*kAxes[axis] - at, at - box.max.*kAxes[axis]});
+  }
+  return std::hypot(gap[0], gap[1], gap[2]);
+}
+
+}  // namespace
+
+double Bulk::extent() const {
+  return std::max({max.x - min.x, max.y - min.y, max.z - min.z});
+}
+
+PositionSample::PositionSample(std::uint64_t vertex_count)
+    : bucket_size_(std::max<std::uint64_t>(1, (vertex_count + kMostEntries - 1) / kMostEntries)) {
+  entries_.reserve(static_cast<std::size_t>(std::min(vertex_count, kMostEntries)));
+  choose_next();
+}
+
+/// One vertex of every bucket.
+void PositionSample::choose_next() {
+  constexpr std::uint64_t kMixer = 0x9E37'79B9'7F4A'7C15U;
+  next_vertex_ = bucket_ * bucket_size_ + ((bucket_ + 1) * kMixer >> 33U) % bucket_size_;
+  ++bucket_;
+}
+
+void PositionSample::add(std::uint64_t first_vertex, std::span<const Vec3d> positions) {
+  for (; next_vertex_ < first_vertex + positions.size(); choose_next()) {
+    const Vec3d& position = positions[static_cast<std::size_t>(next_vertex_ - first_vertex)];
+    if (is_finite(position)) entries_.push_back({next_vertex_, position});
+  }
+}
+
+void PositionSample::conclude(double metres) {
+  find_hole();
+  find_coordinate_hole(metres);
+  find_bulk();
+  if (!hole_) return;
+  if (!bulk_) {
+    hole_.reset();
+    return;
+  }
+  const double size = std::hypot(bulk_->max.x - bulk_->min.x, bulk_->max.y - bulk_->min.y, bulk_->max.z - bulk_->min.z);
+  hole_->is_far = distance(*bulk_, hole_->place) > size;
+}
+
+void PositionSample::find_hole() {
+  const auto key = [](const Entry& entry) {
+    return std::tuple(entry.position.x, entry.position.y, entry.position.z, entry.vertex);
+  };
+  std::sort(entries_.begin(), entries_.end(), [&](const Entry& a, const Entry& b) { return key(a) < key(b); });
+  std::size_t most = 0;
+  std::size_t second = 0;
+  std::size_t most_begin = 0;
+  for (std::size_t begin = 0, end = 0; begin < entries_.size(); begin = end) {
+    while (end < entries_.size() && entries_[end].position == entries_[begin].position) ++end;
+    if (end - begin > most) {
+      second = most;
+      most = end - begin;
+      most_begin = begin;
+    } else {
+      second = std::max(second, end - begin);
+    }
+  }
+  if (most < kFewestInAHole || most < kMoreThanAnyOther * second || entries_.size() - most < kFewestElsewhere) return;
+  const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(most_begin);
+  const auto last = first + static_cast<std::ptrdiff_t>(most);
+  hole_ = {first->position, {}, false};
+  for (auto entry = first; entry != last; ++entry) hole_->vertices.push_back(entry->vertex);
+  entries_.erase(first, last);
+}
+
+void PositionSample::find_coordinate_hole(double metres) {
+  constexpr std::array kCustomary{-9999.0, -99999.0, -32768.0, -32767.0, -999.0, 9999.0, 32767.0, 99999.0, -1e30, 1e30};
+  for (std::size_t axis = 0; axis < kAxes.size() && !coordinate_hole_; ++axis) {
+    for (const double number : kCustomary) {
+      const double value = number * metres;
+      std::size_t count = 0;
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (const Entry& entry : entries_) {
+        const double at = entry.position.*kAxes[axis];
+        if (at == value) {
+          ++count;
+        } else {
+          low = std::min(low, at);
+          high = std::max(high, at);
+        }
+      }
+      if (count < kFewestInAHole || entries_.size() - count < kFewestElsewhere) continue;
+      const double gap = std::max(low - value, value - high);
+      if (!(gap > high - low)) continue;
+      Hole hole{{}, {false, false, false}};
+      hole.place.*kAxes[axis] = value;
+      hole.axes[axis] = true;
+      std::erase_if(entries_, [&hole](const Entry& entry) { return hole.has(entry.position); });
+      coordinate_hole_ = hole;
+      break;
+    }
+  }
+}
+
+void PositionSample::find_bulk() {
+  if (entries_.empty()) return;
+  Vec3d middle;
+  double half = 0;
+  std::vector<double> values(entries_.size());
+  for (const auto axis : kAxes) {
+    const auto coordinate = [axis](const Entry& entry) { return entry.position.*axis; };
+    std::transform(entries_.begin(), entries_.end(), values.begin(), coordinate);
+    middle.*axis = median(values);
+    for (double& value : values) value = std::abs(value - middle.*axis);
+    half = std::max(half, median(values));
+  }
+  if (half == 0) return;
+  Bulk bulk{middle, middle};
+  for (const Entry& entry : entries_) {
+    const bool is_near = std::all_of(kAxes.begin(), kAxes.end(), [&](const auto axis) {
+      return std::abs(entry.position.*axis - middle.*axis) <= kBulkReach * half;
+    });
+    if (!is_near) continue;
+    for (const auto axis : kAxes) {
+      bulk.min.*axis = std::min(bulk.min.*axis, entry.position.*axis);
+      bulk.max.*axis = std::max(bulk.max.*axis, entry.position.*axis);
+    }
+  }
+  bulk_ = bulk;
+}
+
+}  // namespace spectra::fusion

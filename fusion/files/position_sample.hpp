@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fusion/base/vertex_types.hpp"
+
+namespace spectra::fusion {
+
+/// Where nearly all of a scene is: not its strays, nor the place that stands for "no position".
+struct Bulk {
+  Vec3d min, max;
+
+  double extent() const;
+};
+
+/// What stands for "no position" in a file: a place, or one coordinate, such as the height of cells that nobody has measured.
+struct Hole {
+  Vec3d place;                                 ///< Metres.
+  std::array<bool, 3> axes{true, true, true};  ///< Which of its coordinates tell.
+
+  bool has(const Vec3d& p) const {
+    return (!axes[0] || p.x == place.x) && (!axes[1] || p.y == place.y) && (!axes[2] || p.z == place.z);
+  }
+};
+
+/// A place that stands for "no position", as files without nan write the holes of an organised cloud.
+struct HolePlace {
+  Vec3d place;
+  std::vector<std::uint64_t> vertices;  ///< Some of those that are there.
+  bool is_far = false;                  ///< Farther from the bulk than that is large.
+};
+
+/// Up to 16,384 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a
+/// grid alone). Tells what a few strays cannot disturb.
+class PositionSample {
+ public:
+  explicit PositionSample(std::uint64_t vertex_count);
+
+  /// The vertices that come next in the file; positions that are not finite are passed over.
+  void add(std::uint64_t first_vertex, std::span<const Vec3d> positions);
+
+  /// Looks for holes and bulk, in time and memory of the sample. `metres` in one unit of the file.
+  void conclude(double metres);
+  /// One place that has a dozen vertices of the sample and eight times as many as any other, when the others are a dozen too.
+  const std::optional<HolePlace>& hole() const { return hole_; }
+  /// One coordinate that is a customary number for "none" (-9999, -32768, ...) in a dozen vertices of the sample, farther from all others than
+  /// those are from each other.
+  const std::optional<Hole>& coordinate_hole() const { return coordinate_hole_; }
+  /// Around the medians of the coordinates, 32 times as far as half of the vertices are; nullopt when that is one place.
+  const std::optional<Bulk>& bulk() const { return bulk_; }
+
+ private:
+  struct Entry {
+    std::uint64_t vertex = 0;
+    Vec3d position;
+  };
+  void choose_next();
+  void find_coordinate_hole(double metres);
+  void find_hole();
+  void find_bulk();
+
+  std::uint64_t bucket_size_;
+  std::uint64_t bucket_ = 0;
+  std::uint64_t next_vertex_ = 0;
+  std::vector<Entry> entries_;
+  std::optional<HolePlace> hole_;
+  std::optional<Hole> coordinate_hole_;
+  std::optional<Bulk> bulk_;
+};
+
+}  // namespace spectra::fusion

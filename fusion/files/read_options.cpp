@@ -1,0 +1,70 @@
+#include "fusion/files/read_options.hpp"
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace spectra::fusion {
+
+namespace {
+
+constexpr double kCelsiusAtZeroKelvin = -273.15;
+
+CelsiusScale scale_of(TemperatureUnit unit) {
+  switch (unit) {
+    case TemperatureUnit::Celsius:
+      break;
+    case TemperatureUnit::Kelvin:
+      return {1, kCelsiusAtZeroKelvin};
+    case TemperatureUnit::Centikelvin:
+      return {0.01, kCelsiusAtZeroKelvin};
+    case TemperatureUnit::Fahrenheit:
+      return {5.0 / 9, -32 * 5.0 / 9};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<TemperatureUnit> temperature_unit(std::string_view name) {
+  constexpr std::array<std::pair<std::string_view, TemperatureUnit>, 4> kNames = {
+      {{"celsius", TemperatureUnit::Celsius},
+       {"kelvin", TemperatureUnit::Kelvin},
+       {"centikelvin", TemperatureUnit::Centikelvin},
+       {"fahrenheit", TemperatureUnit::Fahrenheit}}};
+  for (const auto& [known, unit] : kNames) {
+    if (known == name) return unit;
+  }
+  return std::nullopt;
+}
+
+std::optional<CelsiusScale> ReadOptions::celsius_scale() const {
+  if (temperature_unit) return scale_of(*temperature_unit);
+  if (!temperature_scale && !temperature_offset) return std::nullopt;
+  return CelsiusScale{temperature_scale.value_or(1), temperature_offset.value_or(0)};
+}
+
+Result<void> check_read_options(const ReadOptions& options) {
+  if (options.temperature_unit && (options.temperature_scale || options.temperature_offset)) {
+    return failure(ErrorCode::Inconsistent, "temperature-unit excludes temperature-scale and temperature-offset",
+                   "temperature_unit");
+  }
+  if (options.temperature_scale && (!std::isfinite(*options.temperature_scale) || *options.temperature_scale == 0)) {
+    return failure(ErrorCode::OutOfRange, "temperature-scale is a finite number other than 0", "temperature_scale");
+  }
+  if (options.temperature_offset && !std::isfinite(*options.temperature_offset)) {
+    return failure(ErrorCode::OutOfRange, "temperature-offset is a finite number", "temperature_offset");
+  }
+  for (const double value : options.no_data) {
+    if (std::isnan(value)) {
+      return failure(ErrorCode::OutOfRange, "no-data is a number; nan stands for no data anyway", "no_data");
+    }
+  }
+  if (!std::isfinite(options.scale()) || options.scale() <= 0) {
+    return failure(ErrorCode::OutOfRange, "scale is the metres in one unit of the file, a finite number above 0",
+                   "scale");
+  }
+  return success();
+}
+
+}  // namespace spectra::fusion

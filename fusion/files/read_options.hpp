@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fusion/base/error.hpp"
+#include "fusion/base/progress.hpp"
+#include "fusion/base/up_axis.hpp"
+#include "fusion/base/vertex_types.hpp"
+
+namespace spectra::fusion {
+
+/// What a temperature property counts in.
+enum class TemperatureUnit { Celsius, Kelvin, Centikelvin, Fahrenheit };
+
+/// By its name on the command line: celsius, kelvin, centikelvin, fahrenheit.
+std::optional<TemperatureUnit> temperature_unit(std::string_view name);
+
+/// From the numbers of a file to degrees Celsius: celsius = factor * value + offset.
+struct CelsiusScale {
+  double factor = 1;
+  double offset = 0;
+};
+
+/// What a person knows of a file that the file does not say itself. The default: everything is found out.
+struct ReadOptions {
+  /// The vertex (or face) property that holds the temperature, any scalar; empty: found by its name.
+  std::string temperature_property;
+  /// The unit, or instead of it a scale, an offset or both: celsius = scale * value + offset.
+  std::optional<TemperatureUnit> temperature_unit;
+  std::optional<double> temperature_scale;
+  std::optional<double> temperature_offset;
+  /// Values of the file, in its own unit, that stand for "nothing was measured". Infinite ones may be among them.
+  std::vector<double> no_data;
+  /// Metres in one unit of the file's positions; absent: nobody has said, and they are taken for metres.
+  std::optional<double> metres_per_unit;
+  /// What positions are to be relative to, in metres; absent: chosen as scene_origin.hpp says.
+  std::optional<Vec3d> origin;
+  /// Which way is up; absent: found out. Reading does not need it, survey() does.
+  std::optional<UpAxis> up;
+  /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.
+  Progress progress;
+
+  double scale() const { return metres_per_unit.value_or(1); }
+  /// How the temperature is scaled; nullopt: nobody said so, it is taken for degrees Celsius.
+  std::optional<CelsiusScale> celsius_scale() const;
+};
+
+/// OutOfRange or Inconsistent, naming the option, when the options cannot be meant.
+Result<void> check_read_options(const ReadOptions& options);
+
+}  // namespace spectra::fusion

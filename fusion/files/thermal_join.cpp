@@ -1,0 +1,476 @@
+#include "fusion/files/thermal_join.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "fusion/base/distance_text.hpp"
+#include "fusion/files/ply_values.hpp"
+#include "fusion/mesh/nearest_surface.hpp"
+#include "fusion/mesh/stray_points.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
+/// Places agree when they differ by less than this share of the scene's size.
+constexpr double kSamePlace = 1e-4;
+constexpr double kSpacings = 3;
+constexpr double kOffsets = 3;
+/// The least and the most of the scene's diagonal that a surface reaches.
+constexpr double kLeastReach = 0.005;
+constexpr double kMostReach = 0.02;
+/// Of an edge: how far the surface may be from the triangles that stand for it.
+constexpr double kCutOff = 0.5;
+constexpr double kLeastShare = 0.1;
+
+/// A box in the coordinates of the file.
+struct Box {
+  std::array<double, 3> low{}, high{};
+
+  double extent(std::size_t axis) const { return high[axis] - low[axis]; }
+  double diagonal() const { return std::hypot(extent(0), extent(1), extent(2)); }
+  /// To another box; 0 where they meet.
+  double distance(const Box& other) const {
+    std::array<double, 3> gap{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      gap[axis] = std::max({0.0, other.low[axis] - high[axis], low[axis] - other.high[axis]});
+    }
+    return std::hypot(gap[0], gap[1], gap[2]);
+  }
+};
+
+Box core_box(const MultispectralMesh& mesh) {
+  const Bounds core = stray_points(mesh.positions(), mesh.triangles()).core;
+  const auto absolute = [&mesh](const Vec3f& p) -> std::array<double, 3> {
+    return {mesh.origin.x + static_cast<double>(p.x), mesh.origin.y + static_cast<double>(p.y),
+            mesh.origin.z + static_cast<double>(p.z)};
+  };
+  return {absolute(core.min), absolute(core.max)};
+}
+
+/// How many times as large `b` is as `a` when that is so in all directions and the ratio of two units of length.
+std::optional<double> unit_ratio(const Box& a, const Box& b) {
+  if (!(a.diagonal() > 0) || !(b.diagonal() > 0)) return std::nullopt;
+  constexpr double kFlat = 0.02;
+  constexpr double kSame = 0.03;
+  // A million: millimetres beside metres, and the metres scaled as if they were the millimetres.
+  for (const double unit : {1e6, 1000.0, 100.0, 10.0, 1000 / 304.8, 1000 / 25.4, 25.4, 304.8}) {
+    for (const double ratio : {unit, 1 / unit}) {
+      std::size_t agreeing_count = 0;
+      bool agrees = std::abs(b.diagonal() / a.diagonal() / ratio - 1) < kSame;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (a.extent(axis) < kFlat * a.diagonal() && b.extent(axis) < kFlat * b.diagonal()) continue;
+        agrees = agrees && std::abs(b.extent(axis) / (a.extent(axis) * ratio) - 1) < kSame;
+        ++agreeing_count;
+      }
+      if (agrees && agreeing_count > 1) return ratio;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string range_text(const Box& box) {
+  std::string text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<char, 80> part{};
+    std::snprintf(part.data(), part.size(), "%s%c %.7g..%.7g", axis == 0 ? "" : ", ", static_cast<int>('x' + axis),
+                  box.low[axis], box.high[axis]);
+    text += part.data();
+  }
+  return text;
+}
+
+Error no_overlap(const LoadedScene& scene, const LoadedScene& thermal, const std::string& what) {
+  return {ErrorCode::Unsupported,
+          thermal.mesh.name + ": the thermal file does not lie on " + scene.mesh.name + ": " + what, thermal.mesh.name};
+}
+
+/// The thermal vertices relative to the scene's origin.
+std::vector<Vec3f> positions_in(const MultispectralMesh& scene, const MultispectralMesh& thermal) {
+  std::vector<Vec3f> positions(thermal.vertex_count());
+  const auto moved = [](double origin, double other_origin, float p) {
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(origin - other_origin + static_cast<double>(p), -kLargest, kLargest));
+  };
+  std::transform(thermal.positions().begin(), thermal.positions().end(), positions.begin(), [&](const Vec3f& p) {
+    return Vec3f{moved(thermal.origin.x, scene.origin.x, p.x), moved(thermal.origin.y, scene.origin.y, p.y),
+                 moved(thermal.origin.z, scene.origin.z, p.z)};
+  });
+  return positions;
+}
+
+/// The largest difference of a coordinate, vertex by vertex.
+double largest_difference(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+  double largest = 0;
+  for (std::size_t v = 0; v < a.size(); ++v) {
+    for (const auto& [p, q] : {std::pair{a[v].x, b[v].x}, std::pair{a[v].y, b[v].y}, std::pair{a[v].z, b[v].z}}) {
+      largest = std::max(largest, std::abs(static_cast<double>(p) - static_cast<double>(q)));
+    }
+  }
+  return largest;
+}
+
+/// What a float in the coordinates of the file is rounded by.
+double file_rounding(const Box& box) {
+  double farthest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    farthest = std::max({farthest, std::abs(box.low[axis]), std::abs(box.high[axis])});
+  }
+  return farthest * 0x1p-23;
+}
+
+/// -infinity where there is none.
+float largest_finite(std::span<const float> values) {
+  float largest = -std::numeric_limits<float>::infinity();
+  for (const float value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  }
+  return largest;
+}
+
+double squared_distance(const Vec3f& a, const Vec3f& b) {
+  const double x = static_cast<double>(a.x) - static_cast<double>(b.x);
+  const double y = static_cast<double>(a.y) - static_cast<double>(b.y);
+  const double z = static_cast<double>(a.z) - static_cast<double>(b.z);
+  return x * x + y * y + z * z;
+}
+
+/// Vertices of the scene that are not where the thermal ones of the same number are, but for what a float in the coordinates of the file is
+/// rounded by; those farthest apart first.
+std::vector<std::uint32_t> moved_vertices(const MultispectralMesh& scene, std::span<const Vec3f> thermal) {
+  const auto is_same = [](double origin, float a, float b) {
+    const double rounding = (std::abs(origin + static_cast<double>(a)) + std::abs(origin)) * 0x1p-23;
+    return std::abs(static_cast<double>(a) - static_cast<double>(b)) <= rounding;
+  };
+  const std::span<const Vec3f> places = scene.positions();
+  std::vector<std::uint32_t> moved;
+  for (std::uint32_t v = 0; v < places.size(); ++v) {
+    if (!is_same(scene.origin.x, places[v].x, thermal[v].x) || !is_same(scene.origin.y, places[v].y, thermal[v].y) ||
+        !is_same(scene.origin.z, places[v].z, thermal[v].z)) {
+      moved.push_back(v);
+    }
+  }
+  std::sort(moved.begin(), moved.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const double one = squared_distance(places[a], thermal[a]), other = squared_distance(places[b], thermal[b]);
+    return one != other ? one > other : a < b;
+  });
+  return moved;
+}
+
+/// Whether the vertices of both are in the same order, within `tolerance` of each other: where one has moved, no other is nearer. Looked at is a
+/// sample of those, the farthest among them.
+bool is_in_order(const MultispectralMesh& scene, std::span<const Vec3f> thermal, double tolerance) {
+  constexpr std::size_t kFarthest = 64, kOthers = 64;
+  const std::span<const Vec3f> places = scene.positions();
+  if (largest_difference(places, thermal) > tolerance) return false;
+  const std::vector<std::uint32_t> moved = moved_vertices(scene, thermal);
+  const std::size_t pace = std::max<std::size_t>(1, moved.size() / kOthers);
+  for (std::size_t i = 0; i < moved.size(); i += i < kFarthest ? 1 : pace) {
+    const Vec3f& place = places[moved[i]];
+    const double own = squared_distance(place, thermal[moved[i]]);
+    constexpr double kClearly = 0.98;
+    if (std::any_of(thermal.begin(), thermal.end(),
+                    [&](const Vec3f& p) { return squared_distance(place, p) < kClearly * own; })) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Vertices whose triangles do not close round them. Where the triangles run the same way round, the neighbours that come
+/// before and after a vertex are the same ones.
+std::vector<bool> border_vertices(const MultispectralMesh& mesh) {
+  std::vector<std::int64_t> balance(mesh.vertex_count());
+  for (const Triangle& t : mesh.triangles()) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      balance[t[corner]] +=
+          static_cast<std::int64_t>(t[(corner + 1) % 3]) - static_cast<std::int64_t>(t[(corner + 2) % 3]);
+    }
+  }
+  std::vector<bool> is_border(balance.size());
+  for (std::size_t v = 0; v < balance.size(); ++v) is_border[v] = balance[v] != 0;
+  return is_border;
+}
+
+/// Calls `work(begin, end)` for ranges that make up 0..count, in as many threads as there are processors.
+template <class Work>
+void for_ranges(std::size_t count, Work work) {
+  const std::size_t thread_count = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 1 + count / 4096);
+  std::vector<std::jthread> threads;
+  for (std::size_t i = 1; i < thread_count; ++i) {
+    threads.emplace_back([=] { work(count * i / thread_count, count * (i + 1) / thread_count); });
+  }
+  work(0, count / thread_count);
+}
+
+/// The thermal surface under a scene's vertices.
+class PlaceJoin {
+ public:
+  PlaceJoin(const MultispectralMesh& scene, const MultispectralMesh& thermal, const Progress& progress)
+      : progress_(progress),
+        scene_(scene),
+        thermal_(thermal),
+        positions_(positions_in(scene, thermal)),
+        is_border_(border_vertices(thermal)),
+        surface_(positions_, thermal.triangles()),
+        spacing_(surface_.median_spacing()) {}
+
+  const NearestSurface& surface() const { return surface_; }
+  std::span<const Vec3f> thermal_positions() const { return positions_; }
+
+  /// Looks from every vertex of the scene, not further than `most`.
+  void look(double most) {
+    places_.assign(scene_.vertex_count(), {});
+    std::atomic<std::size_t> done_count = 0;
+    for_ranges(scene_.vertex_count(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) {
+        if (v % kReportedAt == 0) {
+          const std::size_t done = done_count += kReportedAt;
+          report(progress_, kJoiningPhase,
+                 kBuildingShare + (1 - kBuildingShare) * std::min(1.0, static_cast<double>(done) /
+                                                                           static_cast<double>(scene_.vertex_count())));
+        }
+        const Vec3f& place = scene_.positions()[v];
+        const auto hit = surface_.find(place, most);
+        if (!hit) continue;
+        places_[v] = {static_cast<float>(hit->distance), static_cast<float>(beyond_border(place, *hit)),
+                      temperature(*hit)};
+      }
+    });
+  }
+
+  /// The distance up to which places are joined.
+  double reach(double diagonal) {
+    const bool has_surface = !thermal_.is_point_cloud();
+    // Triangles cut off what is round by a share of their size.
+    const double coarser = std::max(spacing_, median_edge(scene_.positions(), scene_.triangles()));
+    const double cut = std::min(kCutOff * coarser, kMostReach * diagonal);
+    const double near =
+        std::max(cut, has_surface ? std::min(kSpacings * spacing_, kLeastReach * diagonal) : kSpacings * spacing_);
+    const double most = std::max(near, kMostReach * diagonal);
+    look(most);
+    std::vector<float> found = found_distances(most);
+    return std::clamp(kOffsets * quantile(found, 0.5), near, most);
+  }
+
+  /// How far the vertices that are within `reach` are.
+  std::vector<float> found_distances(double reach) const {
+    std::vector<float> found;
+    for (const Place& place : places_) {
+      if (is_within(place, reach)) found.push_back(place.distance);
+    }
+    return found;
+  }
+
+  static double quantile(std::vector<float>& values, double share) {
+    if (values.empty()) return 0;
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return static_cast<double>(*at);
+  }
+
+  void write(double reach, std::span<float> temperatures) const {
+    for (std::size_t v = 0; v < temperatures.size(); ++v) {
+      temperatures[v] = is_within(places_[v], reach) ? places_[v].temperature_celsius : kMissing;
+    }
+  }
+
+ private:
+  /// What is nearest to a vertex of the scene.
+  struct Place {
+    float distance = std::numeric_limits<float>::infinity();
+    float beyond_border = 0;
+    float temperature_celsius = kMissing;
+  };
+
+  /// Beyond the border the surface reaches as far as neighbours are apart, or as it may be displaced.
+  bool is_within(const Place& place, double reach) const {
+    return static_cast<double>(place.distance) <= reach &&
+           static_cast<double>(place.beyond_border) <= std::max(spacing_, reach / kOffsets);
+  }
+
+  /// How far off its edge a place is that is not over the surface; else 0.
+  double beyond_border(const Vec3f& place, const NearestSurface::Hit& hit) const {
+    if (hit.corners[0] == hit.corners[1]) return 0;
+    bool is_inside = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (hit.weights[i] == 0) {
+        is_inside = false;
+      } else if (!is_border_[hit.corners[i]]) {
+        return 0;
+      }
+    }
+    if (is_inside) return 0;
+    const auto vector = [](const Vec3f& from, const Vec3f& to) -> std::array<double, 3> {
+      return {static_cast<double>(to.x) - static_cast<double>(from.x),
+              static_cast<double>(to.y) - static_cast<double>(from.y),
+              static_cast<double>(to.z) - static_cast<double>(from.z)};
+    };
+    const Vec3f& a = positions_[hit.corners[0]];
+    const auto u = vector(a, positions_[hit.corners[1]]);
+    const auto v = vector(a, positions_[hit.corners[2]]);
+    const auto w = vector(a, place);
+    const std::array<double, 3> normal = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                                          u[0] * v[1] - u[1] * v[0]};
+    const double length = std::hypot(normal[0], normal[1], normal[2]);
+    const double height = length > 0 ? (w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2]) / length : 0;
+    return std::sqrt(std::max(0.0, hit.distance * hit.distance - height * height));
+  }
+
+  /// Between the corners where all have one; else that of the corner that counts most.
+  float temperature(const NearestSurface::Hit& hit) const {
+    const std::span<const float> celsius = thermal_.temperature_celsius();
+    double sum = 0;
+    bool is_finite = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (hit.weights[i] == 0) continue;
+      const float t = celsius[hit.corners[i]];
+      is_finite = is_finite && std::isfinite(t);
+      sum += hit.weights[i] * static_cast<double>(t);
+    }
+    if (is_finite) return static_cast<float>(sum);
+    const auto heaviest = std::max_element(hit.weights.begin(), hit.weights.end()) - hit.weights.begin();
+    return celsius[hit.corners[static_cast<std::size_t>(heaviest)]];
+  }
+
+  static constexpr std::size_t kReportedAt = 4096;
+  /// Of the time, until places can be looked for.
+  static constexpr double kBuildingShare = 0.1;
+
+  const Progress& progress_;
+  const MultispectralMesh& scene_;
+  const MultispectralMesh& thermal_;
+  std::vector<Vec3f> positions_;
+  std::vector<bool> is_border_;
+  NearestSurface surface_;
+  double spacing_;
+  std::vector<Place> places_;  ///< Per vertex of the scene.
+};
+
+/// The share of the thermal vertices that lie within `reach` of the scene, over a sample.
+double share_on_scene(const MultispectralMesh& scene, std::span<const Vec3f> thermal_positions, double reach) {
+  constexpr std::size_t kSampleCount = 1000;
+  const NearestSurface surface(scene.positions(), scene.triangles());
+  const std::size_t step = std::max<std::size_t>(1, thermal_positions.size() / kSampleCount);
+  std::size_t sample_count = 0;
+  std::size_t near_count = 0;
+  for (std::size_t v = 0; v < thermal_positions.size(); v += step) {
+    ++sample_count;
+    near_count += surface.find(thermal_positions[v], reach) ? 1U : 0U;
+  }
+  return static_cast<double>(near_count) / static_cast<double>(sample_count);
+}
+
+std::string percent_text(std::uint64_t part, std::uint64_t whole) {
+  const double percent = 100 * static_cast<double>(part) / static_cast<double>(whole);
+  if (part < whole && percent > 99.9) return "over 99.9 %";
+  return number_text(std::round(percent * 10) / 10) + " %";
+}
+
+Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, const Box& scene_box,
+                           const Box& thermal_box, LoadedScene& scene, const Progress& progress) {
+  MultispectralMesh& mesh = scene.mesh;
+  PlaceJoin join(mesh, thermal.mesh, progress);
+  double reach = join_distance_m;
+  if (reach > 0) {
+    join.look(reach);
+  } else {
+    reach = join.reach(scene_box.diagonal());
+  }
+  std::vector<float> found = join.found_distances(reach);
+  const std::uint64_t count = mesh.vertex_count();
+  const std::uint64_t joined_count = found.size();
+  const double share = static_cast<double>(joined_count) / static_cast<double>(count);
+  if (joined_count == 0 || (share < kLeastShare && join_distance_m == 0 &&
+                            share_on_scene(mesh, join.thermal_positions(), reach) < kLeastShare)) {
+    return BOOST_OUTCOME_V2_NAMESPACE::failure(
+        no_overlap(scene, thermal,
+                   "only " + std::to_string(joined_count) + " of " + std::to_string(count) +
+                       " vertices have a thermal place within " + distance_text(reach) + " (the scene spans " +
+                       range_text(scene_box) + ", the thermal file " + range_text(thermal_box) +
+                       "); bring both into one frame, and see --scale if their units differ"));
+  }
+  join.write(reach, mesh.temperature_celsius());
+  const double median_m = PlaceJoin::quantile(found, 0.5);
+  const double farthest_m = PlaceJoin::quantile(found, 1);
+  scene.notes.push_back({"thermal_joined_nearest", joined_count,
+                         std::to_string(joined_count) + " of " + std::to_string(count) + " vertices (" +
+                             percent_text(joined_count, count) + ") have the temperature of the nearest place of " +
+                             thermal.mesh.name + " within " + distance_text(reach) + " (half of them within " +
+                             distance_text(median_m) + ", the farthest at " + distance_text(farthest_m) + ")"});
+  const float hottest = largest_finite(thermal.mesh.temperature_celsius());
+  const float kept = largest_finite(mesh.temperature_celsius());
+  constexpr float kNoticed = 1;
+  if (hottest - kept > kNoticed) {
+    scene.notes.push_back({"thermal_extremes_lost", 1,
+                           "The hottest reading of " + thermal.mesh.name + ", " +
+                               number_text(static_cast<double>(hottest)) +
+                               " degC, has no vertex of the scene at it: the scene's hottest has " +
+                               number_text(static_cast<double>(kept)) + " degC; give the finer file as the scene",
+                           true});
+  }
+  if (joined_count < count) {
+    scene.notes.push_back({"thermal_not_reached", count - joined_count,
+                           std::to_string(count - joined_count) + " vertices have no thermal place within " +
+                               distance_text(reach) + ": their temperature is missing"});
+  }
+  return success();
+}
+
+}  // namespace
+
+Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal) {
+  const Box scene_box = core_box(scene.mesh);
+  const Box thermal_box = core_box(thermal.mesh);
+  if (const auto ratio = unit_ratio(scene_box, thermal_box)) {
+    const bool is_thermal_larger = *ratio > 1;
+    const double factor = is_thermal_larger ? *ratio : 1 / *ratio;
+    const std::string larger = is_thermal_larger ? thermal.mesh.name : scene.mesh.name;
+    const std::string factor_text = number_text(std::round(factor * 100) / 100);
+    return BOOST_OUTCOME_V2_NAMESPACE::failure(
+        no_overlap(scene, thermal,
+                   larger + " is " + factor_text + " times as large, as if in another unit; --scale " +
+                       number_text(std::round(1e6 / factor) / 1e6) + " reads that file in the unit of the other"));
+  }
+  const double gap = scene_box.distance(thermal_box);
+  if (gap > kMostReach * std::max(scene_box.diagonal(), thermal_box.diagonal())) {
+    return BOOST_OUTCOME_V2_NAMESPACE::failure(no_overlap(
+        scene, thermal,
+        "they are " + distance_text(gap) + " apart (the scene spans " + range_text(scene_box) + ", the thermal file " +
+            range_text(thermal_box) + "); bring both into one frame, and see --scale if their units differ"));
+  }
+  return success();
+}
+
+Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
+                          const Progress& progress) {
+  MultispectralMesh& mesh = scene.mesh;
+  const Box scene_box = core_box(mesh);
+  const Box thermal_box = core_box(thermal.mesh);
+  if (thermal.mesh.vertex_count() == mesh.vertex_count()) {
+    const double tolerance = std::max(kSamePlace * scene_box.diagonal(), file_rounding(scene_box));
+    if (is_in_order(mesh, positions_in(mesh, thermal.mesh), tolerance)) {
+      const std::span<const float> celsius = thermal.mesh.temperature_celsius();
+      std::copy(celsius.begin(), celsius.end(), mesh.temperature_celsius().begin());
+      scene.notes.push_back({"thermal_joined_in_order", mesh.vertex_count(),
+                             "Temperatures of " + thermal.mesh.name + " taken in order: its " +
+                                 std::to_string(mesh.vertex_count()) + " vertices are where those of " + mesh.name +
+                                 " are, within " + distance_text(tolerance)});
+      return success();
+    }
+  }
+  return join_by_place(thermal, join_distance_m, scene_box, thermal_box, scene, progress);
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,106 @@
+#include "fusion/files/vertex_colour.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "fusion/files/ply_values.hpp"
+
+namespace spectra::fusion {
+
+namespace {
+
+/// The first spherical harmonic, which is constant.
+constexpr double kSplatFactor = 0.28209479177387814;
+/// Floats up to here are shares of white, some of them a little too bright.
+constexpr double kMostShare = 2;
+constexpr double kMostByte = 255.5;
+constexpr double kMost16Bit = 65535.5;
+constexpr double kSixteenToEight = 1.0 / 257;
+/// In levels of 255.
+constexpr double kHair = 8;
+
+std::uint32_t packed_bits(double value) {
+  constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
+  if (value == std::floor(value) && value >= 0 && value <= kMost) return static_cast<std::uint32_t>(value);
+  constexpr double kLeast = std::numeric_limits<std::int32_t>::min();
+  if (value == std::floor(value) && value < 0 && value >= kLeast) {
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
+  }
+  return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+}
+
+}  // namespace
+
+void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<Rgb8> colours,
+                               std::uint64_t& outside_count) const {
+  if (is_packed) {
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      const std::uint32_t bits = packed_bits(values[0][i]);
+      colours[i] = {static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
+                    static_cast<std::uint8_t>(bits)};
+    }
+    return;
+  }
+  constexpr std::array<std::uint8_t Rgb8::*, 3> kMembers = {&Rgb8::r, &Rgb8::g, &Rgb8::b};
+  if (is_bytes) {
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      for (std::size_t i = 0; i < colours.size(); ++i) {
+        colours[i].*kMembers[channel] = static_cast<std::uint8_t>(values[channel][i]);
+      }
+    }
+    return;
+  }
+  constexpr std::uint8_t kMidGrey = 128;
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    bool is_outside = false;
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const double level = factor * values[channel][i] + offset;
+      is_outside = is_outside || !(level >= -kHair && level <= 255 + kHair);
+      colours[i].*kMembers[channel] =
+          std::isnan(level) ? kMidGrey : static_cast<std::uint8_t>(std::floor(std::clamp(level, 0.0, 255.0) + 0.5));
+    }
+    outside_count += is_outside ? 1U : 0U;
+  }
+}
+
+Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest) {
+  ColourConversion conversion;
+  if (coding == ColourCoding::Packed) {
+    conversion.is_packed = true;
+  } else if (coding == ColourCoding::Splat) {
+    conversion.factor = 255 * kSplatFactor;
+    conversion.offset = 255 * 0.5;
+  } else if (is_floating(type) && largest <= kMostShare) {
+    conversion.factor = 255;
+  } else if (largest <= kMostByte) {
+    conversion.factor = 1;
+  } else if (largest < kMost16Bit && type != PlyScalar::UInt8 && type != PlyScalar::Int8) {
+    conversion.factor = kSixteenToEight;
+  } else {
+    return failure(ErrorCode::BadValue, "the colours go up to " + number_text(largest) +
+                                            (type == PlyScalar::UInt8 ? "; those of type uchar end at 255"
+                                                                      : "; 255 or 65535 is the most that is read"));
+  }
+  return conversion;
+}
+
+std::string conversion_text(ColourCoding coding, PlyScalar type, double largest) {
+  const std::string name(to_string(type));
+  switch (coding) {
+    case ColourCoding::Packed:
+      return "Colours unpacked from one number of type " + name + " a vertex (0xRRGGBB)";
+    case ColourCoding::Splat:
+      return "Colours made of the splats' f_dc_0 to f_dc_2 (0.5 + 0.2821 f_dc)";
+    case ColourCoding::Channels:
+      break;
+  }
+  if (type == PlyScalar::UInt8) return {};
+  const std::string range = "Colours of type " + name + " with values up to " + number_text(largest) + " ";
+  if (is_floating(type) && largest <= kMostShare) return range + "taken as shares of 1, times 255";
+  if (largest <= kMostByte) return range + "taken as 0 to 255";
+  return range + "taken as 16 bits, divided by 257";
+}
+
+}  // namespace spectra::fusion

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "fusion/files/read_options.hpp"
+
+namespace spectra::fusion {
+
+/// What was found among the temperatures of a file.
+struct TemperatureFacts {
+  std::uint64_t missing_count = 0;      ///< Without a temperature, for whatever reason (also the next two).
+  std::uint64_t impossible_count = 0;   ///< At or below absolute zero.
+  std::uint64_t no_data_count = 0;      ///< One of the values that the options name.
+  std::uint64_t no_data_seen = 0;       ///< Which of them were found: bit i of value i, of the first 64.
+  std::uint64_t over_range_count = 0;   ///< +inf, or beyond the largest float.
+  std::uint64_t under_range_count = 0;  ///< -inf.
+
+  // Of the finite ones, which may be in another unit than degC.
+  std::uint64_t finite_count = 0;
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -std::numeric_limits<float>::infinity();
+  std::uint64_t zero_count = 0;  ///< Exactly 0, which often stands for nothing.
+  std::uint64_t full_count = 0;  ///< Exactly 65535, all bits of a sensor's count, which often stands for nothing.
+  std::uint64_t kelvin_like_count = 0;        ///< 200 to 400.
+  std::uint64_t tenth_kelvin_like_count = 0;  ///< 2000 to 4000.
+  std::uint64_t centikelvin_like_count = 0;   ///< 20000 to 40000.
+  std::uint64_t too_hot_count = 0;            ///< Above 3000.
+  std::uint64_t too_cold_count = 0;           ///< Below -100.
+};
+
+/// Turns the numbers of a file into temperatures in degC: NaN where nothing was measured, +inf and -inf where the sensor
+/// was beyond its range, anything else a float above absolute zero.
+class TemperatureConversion {
+ public:
+  explicit TemperatureConversion(const ReadOptions& options);
+
+  /// `values` and `celsius` have the same length. The facts of all calls add up.
+  void convert(std::span<const double> values, std::span<float> celsius, TemperatureFacts& facts) const;
+
+ private:
+  float converted(double value, TemperatureFacts& facts) const;
+  /// The bit of no_data_seen; 0 when the value is data.
+  std::uint64_t no_data_bit(double value) const;
+
+  CelsiusScale scale_;
+  std::vector<double> no_data_;
+};
+
+}  // namespace spectra::fusion

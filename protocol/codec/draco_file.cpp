@@ -1,0 +1,255 @@
+#include "protocol/codec/draco_file.hpp"
+
+#include <draco/compression/expert_encode.h>
+#include <draco/mesh/mesh.h>
+#include <draco/metadata/geometry_metadata.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "protocol/codec/draco_attributes.hpp"
+
+namespace spectra::protocol {
+namespace {
+
+auto internal(std::string message) {
+  return refusal(RpcErrorCode::InternalError, "Draco file: " + std::move(message));
+}
+
+/// Values on the lattice origin + k * step, k up to `largest`.
+template <class Value>
+struct Quantised {
+  std::vector<Value> values;
+  Value origin{};
+  std::uint32_t largest = 0;
+  float step = 0;
+};
+
+double nearest_multiple(float value, float step) {
+  return std::floor(static_cast<double>(value) / static_cast<double>(step) + 0.5);
+}
+
+/// Nothing when the lattice would have 2^24 steps or more along an axis: floats do not hold them.
+std::optional<Quantised<std::array<float, 3>>> quantised_positions(std::span<const std::array<float, 3>> positions_m,
+                                                                   float step_m) {
+  constexpr double kMostSteps = (1 << 24) - 1;
+  Quantised<std::array<float, 3>> lattice;
+  lattice.step = step_m;
+  lattice.values.reserve(positions_m.size());
+  lattice.origin.fill(std::numeric_limits<float>::max());
+  for (const auto& position : positions_m) {
+    auto& value = lattice.values.emplace_back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      value[axis] = static_cast<float>(nearest_multiple(position[axis], step_m) * static_cast<double>(step_m));
+      lattice.origin[axis] = std::min(lattice.origin[axis], value[axis]);
+    }
+  }
+  for (const auto& value : lattice.values) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double steps =
+          (static_cast<double>(value[axis]) - static_cast<double>(lattice.origin[axis])) / static_cast<double>(step_m);
+      if (!(steps >= 0 && steps <= kMostSteps)) return std::nullopt;
+      lattice.largest = std::max(lattice.largest, static_cast<std::uint32_t>(steps));
+    }
+  }
+  return lattice;
+}
+
+/// Neither missing nor out of range; beyond this even the steps would not be.
+bool is_in_range(float celsius) {
+  return std::abs(celsius) <= 1e30F;
+}
+
+/// Also tells in `file` what became of the temperatures.
+Quantised<float> quantised_temperatures(std::span<const float> temperature_celsius, DracoFile& file) {
+  float lowest = std::numeric_limits<float>::max();
+  float highest = std::numeric_limits<float>::lowest();
+  bool is_any_missing = false;
+  for (const float celsius : temperature_celsius) {
+    if (is_in_range(celsius)) {
+      lowest = std::min(lowest, celsius);
+      highest = std::max(highest, celsius);
+    } else if (std::isnan(celsius)) {
+      is_any_missing = true;
+    } else {
+      ++(celsius > 0 ? file.over_range_count : file.under_range_count);
+    }
+  }
+  if (lowest > highest) lowest = highest = 0;
+
+  // Values of at most 22 bits and a sign: a decoder's float arithmetic gives them back exactly.
+  constexpr double kMostSteps = 1 << 22;
+  Quantised<float> lattice;
+  lattice.step = kDracoTemperatureStepCelsius;
+  const double reach =
+      std::max({std::abs(static_cast<double>(lowest)), std::abs(static_cast<double>(highest)), 1000.0});
+  while (reach / static_cast<double>(lattice.step) > kMostSteps - 1) lattice.step *= 2;
+  const auto on_lattice = [step = lattice.step](float celsius) {
+    return static_cast<float>(nearest_multiple(celsius, step) * static_cast<double>(step));
+  };
+  file.temperature_step_celsius = lattice.step;
+  file.over_range_celsius = on_lattice(highest) + lattice.step;
+  file.under_range_celsius = on_lattice(lowest) - lattice.step;
+  const float missing = on_lattice(kDracoMissingCelsius);
+  lattice.values.reserve(temperature_celsius.size());
+  lattice.origin = is_any_missing ? missing : file.over_range_celsius;
+  float largest = std::numeric_limits<float>::lowest();
+  for (const float celsius : temperature_celsius) {
+    float value = missing;
+    if (is_in_range(celsius)) {
+      value = on_lattice(celsius);
+    } else if (!std::isnan(celsius)) {
+      value = celsius > 0 ? file.over_range_celsius : file.under_range_celsius;
+    }
+    lattice.values.push_back(value);
+    lattice.origin = std::min(lattice.origin, value);
+    largest = std::max(largest, value);
+  }
+  lattice.largest = static_cast<std::uint32_t>((static_cast<double>(largest) - static_cast<double>(lattice.origin)) /
+                                               static_cast<double>(lattice.step));
+  return lattice;
+}
+
+void add_metadata(draco::Mesh& mesh, const DracoFileInput& input, const DracoFile& file, int temperature_attribute) {
+  auto whole = std::make_unique<draco::GeometryMetadata>();
+  whole->AddEntryDoubleArray("origin_m", {input.origin_m.begin(), input.origin_m.end()});
+  if (input.position_step_m > 0) whole->AddEntryDouble("position_step_m", static_cast<double>(input.position_step_m));
+  mesh.AddMetadata(std::move(whole));
+  if (temperature_attribute < 0) return;
+  auto temperature = std::make_unique<draco::AttributeMetadata>();
+  temperature->AddEntryString("name", "temperature");
+  temperature->AddEntryString("unit", "degC");
+  if (file.temperature_step_celsius > 0) {
+    temperature->AddEntryDouble("step", static_cast<double>(file.temperature_step_celsius));
+    temperature->AddEntryDouble("missing", static_cast<double>(kDracoMissingCelsius));
+    if (file.over_range_count > 0) temperature->AddEntryDouble("over_range", double{file.over_range_celsius});
+    if (file.under_range_count > 0) temperature->AddEntryDouble("under_range", double{file.under_range_celsius});
+  }
+  mesh.AddAttributeMetadata(temperature_attribute, std::move(temperature));
+}
+
+void count_left_out(const DracoFileInput& input, DracoFile& file) {
+  std::vector<bool> is_used(input.positions_m.size());
+  for (const auto& [a, b, c] : input.triangles) {
+    if (a == b || b == c || c == a) {
+      ++file.left_out_triangle_count;
+    } else {
+      is_used[a] = is_used[b] = is_used[c] = true;
+    }
+  }
+  file.left_out_vertex_count = static_cast<std::uint64_t>(std::count(is_used.begin(), is_used.end(), false));
+}
+
+Result<void> check(const DracoFileInput& input, DracoKeeping keeping, int speed) {
+  const std::size_t vertex_count = input.positions_m.size();
+  if (vertex_count == 0) return internal("a file without vertices");
+  if (vertex_count > std::numeric_limits<std::int32_t>::max()) return internal("too many vertices for one stream");
+  if (input.colours.size() != vertex_count) return internal("not one colour per vertex");
+  if (!input.temperature_celsius.empty() && input.temperature_celsius.size() != vertex_count)
+    return internal("not one temperature per vertex");
+  if (keeping != DracoKeeping::Everything && !(input.position_step_m > 0))
+    return internal("the position step is not a positive length");
+  if (speed < 0 || speed > 10) return internal("speed " + std::to_string(speed) + " is not within 0..10");
+  for (const TileTriangle& triangle : input.triangles)
+    for (const std::uint32_t vertex : triangle)
+      if (vertex >= vertex_count) return internal("a triangle names a vertex that the mesh does not have");
+  return success();
+}
+
+/// An edge that very many triangles share, as no surface has one: Draco's edgebreaker takes time by the square of their number.
+bool has_crowded_edge(std::size_t vertex_count, std::span<const TileTriangle> triangles) {
+  constexpr std::uint32_t kMost = 256;
+  std::vector<std::uint32_t> valence(vertex_count);
+  for (const TileTriangle& triangle : triangles) {
+    for (const std::uint32_t vertex : triangle) ++valence[vertex];
+  }
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+  for (const TileTriangle& triangle : triangles) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const auto [a, b] = std::minmax(triangle[corner], triangle[(corner + 1) % 3]);
+      if (a != b && valence[a] > kMost && valence[b] > kMost) edges.emplace_back(a, b);
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (std::size_t i = kMost; i < edges.size(); ++i) {
+    if (edges[i] == edges[i - kMost]) return true;
+  }
+  return false;
+}
+
+int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
+  if (is_point_cloud)
+    return keeping == DracoKeeping::Shape ? draco::POINT_CLOUD_KD_TREE_ENCODING
+                                          : draco::POINT_CLOUD_SEQUENTIAL_ENCODING;
+  return keeping == DracoKeeping::Shape ? draco::MESH_EDGEBREAKER_ENCODING : draco::MESH_SEQUENTIAL_ENCODING;
+}
+
+}  // namespace
+
+Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed) {
+  BOOST_OUTCOME_TRYV(check(input, keeping, speed));
+  if (keeping == DracoKeeping::Shape && has_crowded_edge(input.positions_m.size(), input.triangles))
+    keeping = DracoKeeping::Order;
+  DracoFile file;
+  draco::Mesh mesh;
+  mesh.set_num_points(static_cast<std::uint32_t>(input.positions_m.size()));
+  draco::EncoderOptions options = draco::EncoderOptions::CreateDefaultOptions();
+  options.SetSpeed(speed, speed);
+  const bool is_exact = keeping == DracoKeeping::Everything;
+  const auto add_positions = [&](std::span<const std::array<float, 3>> values) {
+    return add_attribute<std::array<float, 3>>(mesh, draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, false,
+                                               values);
+  };
+  const auto add_temperatures = [&](std::span<const float> values) {
+    return add_attribute<float>(mesh, draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 1, false, values);
+  };
+  if (is_exact) {
+    add_positions(input.positions_m);
+  } else {
+    const auto lattice = quantised_positions(input.positions_m, input.position_step_m);
+    if (!lattice) return internal("the scene is too large for its position step");
+    options.SetAttributeOptions(add_positions(lattice->values),
+                                quantisation_options(lattice->origin, lattice->largest, lattice->step));
+  }
+  add_attribute<ColourBytes>(mesh, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, input.colours);
+  int temperature_attribute = -1;
+  if (!input.temperature_celsius.empty() && is_exact) {
+    temperature_attribute = add_temperatures(input.temperature_celsius);
+  } else if (!input.temperature_celsius.empty()) {
+    const auto lattice = quantised_temperatures(input.temperature_celsius, file);
+    temperature_attribute = add_temperatures(lattice.values);
+    options.SetAttributeOptions(temperature_attribute,
+                                quantisation_options({&lattice.origin, 1}, lattice.largest, lattice.step));
+  }
+  mesh.SetNumFaces(input.triangles.size());
+  for (std::uint32_t i = 0; i < input.triangles.size(); ++i) {
+    const TileTriangle& t = input.triangles[i];
+    mesh.SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
+  }
+  add_metadata(mesh, input, file, temperature_attribute);
+
+  const bool is_point_cloud = input.triangles.empty();
+  draco::ExpertEncoder encoder =
+      is_point_cloud ? draco::ExpertEncoder(static_cast<const draco::PointCloud&>(mesh)) : draco::ExpertEncoder(mesh);
+  encoder.Reset(options);
+  encoder.SetEncodingMethod(encoding_method(is_point_cloud, keeping));
+  encoder.SetTrackEncodedProperties(true);
+  draco::EncoderBuffer buffer;
+  if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
+    return internal("not encoded: " + status.error_msg_string());
+  if (!is_point_cloud && keeping == DracoKeeping::Shape) {
+    count_left_out(input, file);
+    if (encoder.num_encoded_faces() + file.left_out_triangle_count != input.triangles.size())
+      return internal("triangles were lost");
+    file.split_vertex_count = encoder.num_encoded_points() + file.left_out_vertex_count - input.positions_m.size();
+  }
+  file.bytes = bytes_of(buffer);
+  return file;
+}
+
+}  // namespace spectra::protocol

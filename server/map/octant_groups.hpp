@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "server/map/cell_content.hpp"
+
+namespace spectra::server {
+
+using OctantContents = std::array<CellContent, 8>;
+
+/// Octants that become one child.
+struct OctantGroup {
+  unsigned octants = 0;  ///< Bit mask.
+  CellContent count;
+  unsigned heaviest = 0;  ///< Names the child.
+};
+
+/// Joins octants that are not empty until none is small beside the leaf size: neighbours that fit into one leaf, and what has less than a
+/// quarter of one with the nearest other. `has_triangles`: none may be without any. What is in them alone decides.
+std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64_t leaf_vertex_count,
+                                       bool has_triangles);
+
+}  // namespace spectra::server

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/jobs/worker_pool.hpp"
+#include "server/map/scene_snapshot.hpp"
+
+namespace spectra::server {
+
+/// How finely the positions of a scene are rounded where: a power of two in metres for every place and axis, so that all
+/// lattices are parts of one. A position alone decides its step: whatever tiles and levels hold a vertex, it is rounded to
+/// the same point.
+///
+/// The step is about a quarter of the scene's median edge, and is halved where what is there would lose its form:
+/// - four fifths of a few dozen neighbouring vertices stay apart,
+/// - what they span along an axis is at least four steps (what is thinner than a 4,096th of its breadth, or than eight times
+///   what floats tell apart there, counts as flat),
+/// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps.
+/// Neighbours get the finer of their steps. Where a ball of neighbours would still have a side off by more than a tenth, the few
+/// vertices that its box stands on are rounded finer by themselves. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
+/// Vertices of no triangle in a scene with triangles are not drawn and have no say.
+class PositionSteps {
+ public:
+  /// Of the full mesh; the same for any number of threads. `largest_step_m`: that of the map it becomes part of, a power of two.
+  /// Must not be called from a job of the pool.
+  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool,
+                std::optional<float> largest_step_m = std::nullopt);
+
+  /// The coarsest step that any vertex may have; a power of two.
+  float largest_step_m() const { return largest_step_m_; }
+
+  /// Fills in the step_halvings of a tile whose vertices are vertices of the scene. Thread-safe for different tiles.
+  void apply(Tile& tile) const;
+
+ private:
+  /// A few neighbouring vertices.
+  struct Cell {
+    Bounds bounds;
+    std::uint32_t begin = 0, end = 0;  ///< In points_.
+    StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood. Of all its vertices.
+    bool is_dense = false;             ///< Its vertices would fall together at the usual step.
+  };
+  struct Point {
+    fusion::Vec3f position;
+    std::uint32_t source = 0;
+  };
+  /// Halves what is left of it: below `split` on `axis` is `below`, the rest `below + 1`; without an axis it is a cell.
+  struct Node {
+    std::uint8_t axis = kNoAxis;
+    float split = 0;
+    std::uint32_t below = 0;
+  };
+  struct Branch;
+  struct Neighbourhood;
+  /// One look at all balls, at the halvings of the round before.
+  struct SidesRound {
+    bool is_first = true;
+    std::vector<std::uint8_t> is_changed;  ///< Per point: its halvings are not those of the round before that.
+    std::vector<float> radius;         ///< Per point: of the smallest ball around it (squared); since the first round.
+    std::vector<StepHalvings> wanted;  ///< Per point: of the next round.
+  };
+  static constexpr std::uint8_t kNoAxis = 3;
+
+  void gather(std::span<const std::shared_ptr<Tile>> leaves);
+  void cut(WorkerPool& pool);
+  void ask_cells(WorkerPool& pool);
+  void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
+  void ask_neighbours(WorkerPool& pool);
+  /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
+  void keep_sides(WorkerPool& pool);
+  void keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round);
+  void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
+                     std::vector<StepHalvings>& wanted);
+  /// So that the ball ends at `least` to `most` beyond where it does.
+  void keep_end(const Neighbourhood& around, std::span<const std::uint32_t> ball, std::size_t axis, float end,
+                int direction, float least, float most, std::vector<StepHalvings>& wanted);
+  /// No step is finer than a tile of half the scene can have: neighbours would differ on their border.
+  void limit_to_one_tile();
+  StepHalvings halvings_at(const fusion::Vec3f& position) const;
+  /// Calls `visit(cell)` for the cells that reach into a box.
+  template <class Visit>
+  void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
+
+  float largest_step_m_ = 0;
+  std::uint8_t most_halvings_ = 0;  ///< That any vertex may have.
+  std::vector<Point> points_;
+  std::vector<Node> nodes_;
+  std::vector<Cell> cells_;
+  std::vector<StepHalvings> halvings_;                               ///< Of each of points_.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident_;  ///< Vertices in the same place.
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,655 @@
+#include "server/session/viewer_session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "fusion/colour/palette.hpp"
+#include "fusion/registry.hpp"
+#include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "server/jobs/priority.hpp"
+#include "server/net/steady_seconds.hpp"
+#include "server/session/conversions.hpp"
+#include "server/session/version.hpp"
+
+namespace spectra::server {
+using nlohmann::json;
+using protocol::refusal;
+using protocol::RpcErrorCode;
+
+namespace {
+
+/// Answers that one viewer may have computing at once, and changes it may have waiting.
+constexpr std::size_t kMaxComputing = 16;
+constexpr std::size_t kMaxWaiting = 512;
+/// Of an answer as text, at most: anything but bins, and a bin with its edge and its count.
+constexpr std::size_t kSmallAnswerBytes = 4096;
+constexpr std::size_t kBinBytes = 48;
+/// The statuses that are notes on the scene: this and the note's id.
+const std::string kNotePrefix = "scene.";
+
+/// What settings are prepared with.
+fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
+  return scene ? *scene->reference_temperature() : fusion::SceneTemperature{};
+}
+
+double unix_seconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+/// The error side of an answer.
+auto refused(protocol::RpcError error) {
+  return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(error));
+}
+
+auto no_scene() {
+  return refusal(RpcErrorCode::NoScene, "there is no scene yet");
+}
+
+std::optional<double> if_positive(double value) {
+  return value > 0 ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+/// One round on the pool: what goes in, and what comes out.
+struct ViewerSession::Preparation {
+  std::shared_ptr<const SceneSnapshot> scene;
+  bool is_new_scene = false;
+  bool has_new_temperatures = false;  ///< The new scene asks for another plan.
+  bool is_first_view = false;         ///< The viewer has changed nothing yet.
+  fusion::FusionSettings settings;
+  std::vector<FusionRequest> requests;
+
+  std::optional<fusion::FusionPlan> plan;  ///< Of the newest settings that hold.
+  /// One a request: the settings in force after it, or why it changed nothing.
+  std::vector<protocol::Result<protocol::FusionState>> outcomes;
+  std::optional<std::string> reset_reason;  ///< The settings did not fit the new scene.
+
+  void run() {
+    const auto temperature = temperature_of(scene);
+    if (has_new_temperatures) {
+      if (is_first_view) settings = fusion::first_view_settings(temperature.summary);
+      auto prepared = fusion::FusionPlan::prepare(settings, temperature);
+      if (!prepared) {
+        reset_reason = prepared.error().message;
+        settings = fusion::first_view_settings(temperature.summary);
+        prepared = fusion::FusionPlan::prepare(settings, temperature);
+      }
+      if (prepared) plan = std::move(prepared).value();
+    }
+    for (const auto& request : requests) outcomes.push_back(apply(request, temperature));
+  }
+
+  protocol::Result<protocol::FusionState> apply(const FusionRequest& request,
+                                                const fusion::SceneTemperature& temperature) {
+    if (!request.change) return refused(request.change.error());
+    auto changed = fusion::with_change(settings, request.change.value());
+    if (!changed) return refused(to_rpc_error(changed.error()));
+    auto prepared = fusion::FusionPlan::prepare(changed.value(), temperature);
+    if (!prepared) return refused(to_rpc_error(prepared.error()));
+    settings = std::move(changed).value();
+    plan = std::move(prepared).value();
+    is_first_view = false;
+    return to_message(*plan, temperature.summary);
+  }
+};
+
+ViewerSession::ViewerSession(const std::shared_ptr<ViewerPeer>& peer, ServedScene& served, const NetLimits& limits)
+    : peer_(*peer),
+      weak_peer_(peer),
+      served_(served),
+      limits_(limits),
+      requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s) {}
+
+void ViewerSession::opened() {
+  served_.viewer_count += 1;
+  const auto weak_self = weak_from_this();
+  const auto post = [weak_peer = weak_peer_, weak_self](auto job) {
+    if (const auto peer = weak_peer.lock()) {
+      peer->post([weak_self, job = std::move(job)] {
+        if (const auto self = weak_self.lock()) job(*self);
+      });
+    }
+  };
+  scene_subscription_ = served_.scenes.subscribe([post](const std::shared_ptr<const SceneSnapshot>& scene) {
+    post([scene](ViewerSession& self) { self.take_scene(scene); });
+  });
+  progress_subscription_ = served_.progress.subscribe([post](const std::optional<std::string>& message) {
+    post([message](ViewerSession& self) { self.set_status("scene_loading", protocol::StatusLevel::Info, message); });
+  });
+
+  scene_ = served_.scenes.current();
+  // The scene has the histogram of percentiles already, so this takes microseconds.
+  const auto temperature = temperature_of(scene_);
+  plan_ = fusion::FusionPlan::prepare(fusion::first_view_settings(temperature.summary), temperature).value();
+  if (scene_) begin_stream();
+
+  protocol::Hello hello;
+  hello.server = {"Spectra", std::string(kVersion)};
+  hello.session_id = served_.session_ids.next();
+  hello.role = may(peer_.role(), Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
+  hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
+                        "cache_bytes", "marks", "age",      "baseline"};
+  if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
+  hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
+                  limits_.requests_per_s};
+  if (scene_) hello.scene = to_message(*scene_);
+  hello.fusion = to_message(*plan_, temperature_of(scene_).summary);
+  hello.quality = to_message(quality());
+  peer_.send(served_.catalogue.hello_text(std::move(hello), peer_.hello_form()));
+  if (stream_) set_plan(*plan_);
+  tell_notes();
+  if (const auto message = served_.progress.message()) {
+    set_status("scene_loading", protocol::StatusLevel::Info, message);
+  }
+}
+
+void ViewerSession::closed() {
+  if (stream_) stream_->close();
+  scene_subscription_ = {};
+  progress_subscription_.reset();
+  served_.viewer_count -= 1;
+}
+
+void ViewerSession::text_received(std::string_view text) {
+  protocol::JsonLimits json_limits;
+  json_limits.max_size_bytes = limits_.message_size_bytes;
+  const auto message = protocol::incoming_message(text, json_limits);
+  if (const auto* bad = std::get_if<protocol::RefusedMessage>(&message)) {
+    peer_.send(protocol::error_text(bad->id, bad->error));
+    return;
+  }
+  handle(std::get<protocol::IncomingMessage>(message));
+}
+
+void ViewerSession::binary_received() {
+  peer_.send(protocol::error_text(
+      std::nullopt, {RpcErrorCode::InvalidRequest, "binary messages are not accepted from a viewer", "", "JSON text"}));
+}
+
+template <auto function>
+void ViewerSession::answered(const Id& id, const json& params) {
+  answer(id, (this->*function)(params));
+}
+
+std::span<const ViewerSession::Request> ViewerSession::requests() {
+  using Self = ViewerSession;
+  static constexpr Request kRequests[] = {
+      {"stream.ack", Right::Watch, Cost::Free, &Self::answered<&Self::acknowledge>},
+      {"camera.set", Right::Watch, Cost::Free, &Self::answered<&Self::set_camera>},
+      {"fusion.set", Right::Watch, Cost::Request, &Self::fusion_set},
+      {"fusion.get", Right::Watch, Cost::Request, &Self::answered<&Self::fusion_get>},
+      {"quality.set", Right::Watch, Cost::Request, &Self::answered<&Self::set_quality>},
+      {"scene.get", Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
+      {"scene.subscribe", Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
+      {"scene.unsubscribe", Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
+      {"scene.histogram", Right::Watch, Cost::Request, &Self::histogram},
+      {"scene.probe", Right::Watch, Cost::Request, &Self::probe},
+      {"fusion.facts", Right::Watch, Cost::Request, &Self::facts},
+      {"scene.extremes", Right::Watch, Cost::Request, &Self::extremes},
+      {"scene.baseline", Right::Watch, Cost::Request, &Self::baseline},
+  };
+  return kRequests;
+}
+
+void ViewerSession::handle(const protocol::IncomingMessage& message) {
+  const auto known = requests();
+  const auto request = std::find_if(
+      known.begin(), known.end(), [&message](const Request& candidate) { return candidate.method == message.method; });
+  const bool is_known = request != known.end();
+  if ((!is_known || request->cost != Cost::Free) && !requests_.take(steady_seconds())) {
+    const auto allowed = static_cast<long>(limits_.requests_per_s);
+    return answer(message.id,
+                  refusal(RpcErrorCode::Busy, "too many requests", "", std::to_string(allowed) + " a second"));
+  }
+  if (!is_known) {
+    return answer(message.id, refusal(RpcErrorCode::MethodNotFound,
+                                      "there is no method \"" + message.method.substr(0, 64) + "\"", "method"));
+  }
+  if (!may(peer_.role(), request->right)) {
+    return answer(message.id, refusal(RpcErrorCode::Forbidden,
+                                      "that is not for the role " + std::string(to_string(peer_.role())), "method"));
+  }
+  (this->*request->handle)(message.id, message.params);
+}
+
+void ViewerSession::answer(const Id& id, const Answer& answer) {
+  if (!answer) {
+    peer_.send(protocol::error_text(id, answer.error()));
+  } else if (id) {
+    peer_.send(protocol::result_text(*id, answer.value()));
+  }
+}
+
+void ViewerSession::notify(std::string_view method, const json& params) {
+  peer_.send(protocol::notification_text(method, params));
+}
+
+ViewerSession::Answer ViewerSession::scene_get(const json& /*params*/) {
+  if (!scene_) return no_scene();
+  return protocol::to_json(to_message(*scene_));
+}
+
+ViewerSession::Answer ViewerSession::subscribe(const json& params) {
+  BOOST_OUTCOME_TRY(const auto request, protocol::from_json<protocol::SubscribeRequest>(params));
+  const auto has_channel = [&request](protocol::Channel channel) {
+    return std::find(request.channels.begin(), request.channels.end(), channel) != request.channels.end();
+  };
+  const bool wants_raw = has_channel(protocol::Channel::Temperature) || has_channel(protocol::Channel::Visible);
+  if (wants_raw && !gives_raw_layers()) {
+    return refusal(RpcErrorCode::Forbidden,
+                   limits_.gives_raw_layers
+                       ? "a viewer is given fused colours only; raw layers take an operator's token"
+                       : "this server gives fused colours only (serve --fused-only)",
+                   "channels", "fused");
+  }
+  if (request.resume && is_subscribed_) {
+    return refusal(RpcErrorCode::InvalidParams, "resume must come before the first frame, not while frames flow",
+                   "resume", "the first scene.subscribe, or the first after scene.unsubscribe");
+  }
+  protocol::SubscribeReply reply;
+  if (request.resume) reply.resumed_tiles = resume(*request.resume);
+  is_subscribed_ = true;
+  subscription_ = {.in_flight_bytes = request.in_flight_bytes.value_or(0),
+                   .cache_bytes = request.cache_bytes.value_or(0),
+                   .colour_transform = request.colour_transform.value_or(protocol::ColourTransform::None),
+                   .fused = has_channel(protocol::Channel::Fused),
+                   .temperature = has_channel(protocol::Channel::Temperature),
+                   .visible = has_channel(protocol::Channel::Visible),
+                   .temperature_step_celsius = request.temperature_step_celsius.value_or(0)};
+  if (stream_) stream_->subscribe(subscription_);
+  peer_.wake();
+  return protocol::to_json(reply);
+}
+
+bool ViewerSession::gives_raw_layers() const {
+  return limits_.gives_raw_layers && may(peer_.role(), Right::Operate);
+}
+
+std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
+  if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return 0;
+  std::vector<ResumedTile> tiles;
+  tiles.reserve(request.tiles.size());
+  for (const auto& [level, x, y, z, revision] : request.tiles) {
+    tiles.push_back({{static_cast<std::uint8_t>(level), x, y, z}, revision});
+  }
+  for (const std::uint32_t place : request.raw.value_or(std::vector<std::uint32_t>())) {
+    tiles[place].has_raw_layers = gives_raw_layers();
+  }
+  return stream_->resume(tiles);
+}
+
+ViewerSession::Answer ViewerSession::unsubscribe(const json& /*params*/) {
+  is_subscribed_ = false;
+  if (stream_) stream_->unsubscribe();
+  return json::object();
+}
+
+ViewerSession::Answer ViewerSession::fusion_get(const json& /*params*/) {
+  return protocol::to_json(fusion_reply());
+}
+
+ViewerSession::Answer ViewerSession::set_quality(const json& params) {
+  BOOST_OUTCOME_TRY(const auto change, protocol::from_json<protocol::QualityChange>(params));
+  BOOST_OUTCOME_TRY(const auto changed, with_change(quality(), change));
+  quality_ = changed;
+  if (stream_) stream_->set_quality(changed);
+  peer_.wake();
+  return protocol::to_json(protocol::QualityReply{to_message(quality())});
+}
+
+ViewerSession::Answer ViewerSession::set_camera(const json& params) {
+  BOOST_OUTCOME_TRY(const auto message, protocol::from_json<protocol::CameraSet>(params));
+  camera_ = from_message(message);
+  if (stream_) stream_->set_camera(*camera_);
+  peer_.wake();
+  return json::object();
+}
+
+ViewerSession::Answer ViewerSession::acknowledge(const json& params) {
+  BOOST_OUTCOME_TRY(const auto ack, protocol::from_json<protocol::StreamAck>(params));
+  if (stream_) stream_->acknowledge(ack.sequence, steady_seconds());
+  peer_.wake();
+  return json::object();
+}
+
+void ViewerSession::fusion_set(const Id& id, const json& params) {
+  if (waiting_.size() >= kMaxWaiting) {
+    return answer(
+        id, refusal(RpcErrorCode::Busy, "too many changes are waiting", "", std::to_string(kMaxWaiting) + " at once"));
+  }
+  auto message = protocol::from_json<protocol::FusionChange>(params);
+  if (message) {
+    waiting_.push_back({id, from_message(message.value())});
+  } else {
+    waiting_.push_back({id, refused(message.error())});
+  }
+  start_preparation();
+}
+
+void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute) {
+  if (computing_count_ >= kMaxComputing) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many answers are being computed", "",
+                              std::to_string(kMaxComputing) + " at once"));
+  }
+  // Half of the lane stays free for what nobody asked for.
+  if (computing_bytes_ + peer_.queued_bytes() + size_bytes > limits_.control_queue_bytes / 2) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many answers wait to be sent", "",
+                              std::to_string(limits_.control_queue_bytes / 2) + " bytes at once"));
+  }
+  computing_count_ += 1;
+  computing_bytes_ += size_bytes;
+  served_.pool.post(
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, size_bytes, compute = std::move(compute)] {
+        Answer computed = refusal(RpcErrorCode::InternalError, "the answer could not be computed");
+        try {
+          computed = compute();
+        } catch (const std::exception& error) {
+          spdlog::error("an answer failed: {}", error.what());
+        }
+        const auto peer = weak_peer.lock();
+        if (!peer) return;
+        peer->post([weak_self, id, size_bytes, computed = std::move(computed)] {
+          const auto self = weak_self.lock();
+          if (!self) return;
+          self->computing_count_ -= 1;
+          self->computing_bytes_ -= size_bytes;
+          self->answer(id, computed);
+        });
+      },
+      kAnswerPriority);
+}
+
+void ViewerSession::histogram(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::HistogramRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  const auto bins = request.value().bins;
+  answer_from_pool(
+      id, kSmallAnswerBytes + std::size_t{bins} * kBinBytes, [scene = scene_, plan = *plan_, bins]() -> Answer {
+        const auto& temperature = scene->temperature();
+        const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
+        const bool highlights = fusion::find_method(plan.settings().method)->highlights;
+        const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
+        return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
+      });
+}
+
+void ViewerSession::facts(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::FactsRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  // With what plans are prepared, which follows a live map in steps.
+  const std::size_t size_bytes =
+      kSmallAnswerBytes + (request.value().bins.value_or(0) + fusion::Hues::kSectors) * kBinBytes;
+  answer_from_pool(id, size_bytes,
+                   [temperature = scene_->reference_temperature(), request = request.value()]() -> Answer {
+                     protocol::FactsReply reply = facts_message(temperature->summary);
+                     if (request.bins && temperature->summary.has_temperature())
+                       reply.counts = temperature->histogram(*request.bins).counts;
+                     if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
+                     if (request.hues.value_or(false)) {
+                       const auto chroma = temperature->hues().chroma;
+                       reply.hues.emplace(chroma.begin(), chroma.end());
+                     }
+                     return protocol::to_json(reply);
+                   });
+}
+
+void ViewerSession::probe(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::ProbeRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  const auto& p = request.value().position;
+  const fusion::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, plan = *plan_, position]() -> Answer {
+    const auto found = scene->probe(position);
+    if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
+    const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
+    fusion::Rgb8 fused;
+    const float baseline = found->baseline_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
+    std::uint8_t freshness = fusion::AgeSteps::kFresh;
+    if (const auto& age = plan.settings().age; age.mode == fusion::AgeMode::Fade && found->observed_at) {
+      freshness = fusion::AgeSteps(age.half_life_s).freshness(unix_seconds() - *found->observed_at);
+    }
+    plan.fuse({{&celsius, 1}, {&found->visible, 1}, {&baseline, 1}, {&freshness, 1}}, {&fused, 1});
+    return protocol::to_json(to_message(*found, fused));
+  });
+}
+
+void ViewerSession::baseline(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::BaselineRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  if (request.value().action == protocol::BaselineAction::Get) {
+    return answer(id, protocol::to_json(protocol::BaselineReply{scene_->baseline_marked_at(), scene_->revision()}));
+  }
+  if (!may(peer_.role(), Right::Operate)) {
+    return answer(
+        id, refusal(RpcErrorCode::Forbidden,
+                    "to mark the baseline is not for the role " + std::string(to_string(peer_.role())), "action"));
+  }
+  if (!served_.mark_baseline) return answer(id, refusal(RpcErrorCode::Busy, "the map is not open yet"));
+  served_.mark_baseline([weak_peer = weak_peer_, weak_self = weak_from_this(), id](const auto& outcome) {
+    const auto peer = weak_peer.lock();
+    if (!peer) return;
+    peer->post([weak_self, id, outcome] {
+      const auto self = weak_self.lock();
+      if (!self) return;
+      if (const auto* marked = std::get_if<BaselineMarked>(&outcome)) {
+        self->answer(id, protocol::to_json(protocol::BaselineReply{marked->marked_at, marked->revision}));
+      } else {
+        const auto& why = std::get<BlockRefusal>(outcome);
+        const auto code = why.status == 503   ? RpcErrorCode::Busy
+                          : why.status == 409 ? RpcErrorCode::InvalidRequest
+                                              : RpcErrorCode::InternalError;
+        self->answer(id, refusal(code, why.reason, why.field, why.limits));
+      }
+    });
+  });
+}
+
+void ViewerSession::extremes(const Id& id, const json& params) {
+  const auto request = protocol::from_json<protocol::ExtremesRequest>(params);
+  if (!request) return answer(id, refused(request.error()));
+  if (!scene_) return answer(id, no_scene());
+  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, request = request.value()]() -> Answer {
+    return protocol::to_json(extremes_message(*scene, request));
+  });
+}
+
+void ViewerSession::take_scene(const std::shared_ptr<const SceneSnapshot>& scene) {
+  const auto& newest = coming_scene_ ? coming_scene_ : scene_;
+  if (newest && scene->revision() <= newest->revision()) return;
+  coming_scene_ = scene;
+  start_preparation();
+}
+
+void ViewerSession::start_preparation() {
+  if (is_preparing_ || (waiting_.empty() && !coming_scene_)) return;
+  is_preparing_ = true;
+  const auto preparation = std::make_shared<Preparation>();
+  preparation->is_new_scene = coming_scene_ != nullptr;
+  preparation->scene = coming_scene_ ? std::exchange(coming_scene_, nullptr) : scene_;
+  preparation->has_new_temperatures =
+      preparation->is_new_scene &&
+      (!scene_ || scene_->reference_temperature() != preparation->scene->reference_temperature());
+  preparation->is_first_view = is_first_view_;
+  preparation->settings = plan_->settings();
+  preparation->requests = std::exchange(waiting_, {});
+  served_.pool.post(
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), preparation] {
+        try {
+          preparation->run();
+        } catch (const std::exception& error) {
+          spdlog::error("settings could not be prepared: {}", error.what());
+          preparation->plan.reset();
+          preparation->outcomes.assign(preparation->requests.size(),
+                                       refusal(RpcErrorCode::InternalError, "the settings could not be prepared"));
+        }
+        const auto peer = weak_peer.lock();
+        if (!peer) return;
+        peer->post([weak_self, preparation] {
+          if (const auto self = weak_self.lock()) self->finish_preparation(preparation);
+        });
+      },
+      kAnswerPriority);
+}
+
+void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
+  is_preparing_ = false;
+  is_first_view_ = preparation->is_first_view;
+  const bool is_taken = preparation->is_new_scene && (preparation->plan || !preparation->has_new_temperatures);
+  if (is_taken) {
+    scene_ = preparation->scene;
+    if (preparation->plan) plan_ = preparation->plan;
+    begin_stream();
+    tell_method_limits();
+    notify("scene.changed", protocol::to_json(protocol::SceneChanged{to_message(*scene_)}));
+    tell_notes();
+  }
+  if (preparation->plan) set_plan(*preparation->plan);
+  if (is_taken && preparation->has_new_temperatures) {
+    notify("fusion.changed", protocol::to_json(fusion_reply()));
+    set_status("settings_reset", protocol::StatusLevel::Warning,
+               preparation->reset_reason
+                   ? std::optional("The settings did not fit the new scene and are at their defaults: " +
+                                   *preparation->reset_reason)
+                   : std::nullopt);
+  }
+  const std::uint32_t generation = fusion_reply().generation;
+  for (std::size_t i = 0; i < preparation->requests.size(); ++i) {
+    const auto& outcome = preparation->outcomes[i];
+    const Id& id = preparation->requests[i].id;
+    if (outcome) {
+      answer(id, protocol::to_json(protocol::FusionReply{generation, outcome.value()}));
+    } else {
+      answer(id, refused(outcome.error()));
+    }
+  }
+  start_preparation();
+}
+
+void ViewerSession::begin_stream() {
+  if (stream_) {
+    stream_->set_time(unix_seconds());
+    stream_->set_scene(scene_);
+    return;
+  }
+  stream_ = ViewerStream::create(scene_, served_.cache, served_.pool, [weak_peer = weak_peer_] {
+    if (const auto peer = weak_peer.lock()) peer->wake();
+  });
+  if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
+  if (camera_) stream_->set_camera(*camera_);
+  if (is_subscribed_) stream_->subscribe(subscription_);
+}
+
+void ViewerSession::tell_notes() {
+  std::set<std::string> held;
+  for (const fusion::Note& note : scene_ ? scene_->notes() : std::span<const fusion::Note>()) {
+    const std::string id = kNotePrefix + note.id;
+    set_status(id, note.needs_attention ? protocol::StatusLevel::Warning : protocol::StatusLevel::Info, note.message);
+    held.insert(id);
+  }
+  std::vector<std::string> outdated;
+  for (const auto& [id, message] : statuses_) {
+    if (id.starts_with(kNotePrefix) && !held.contains(id)) outdated.push_back(id);
+  }
+  for (const auto& id : outdated) set_status(id, protocol::StatusLevel::Info, std::nullopt);
+}
+
+void ViewerSession::set_plan(fusion::FusionPlan plan) {
+  plan_ = plan;
+  if (stream_) {
+    stream_->set_time(unix_seconds());
+    stream_->set_plan(std::move(plan));
+  }
+  peer_.wake();
+  tell_method_limits();
+}
+
+void ViewerSession::tell_method_limits() {
+  const auto& settings = plan_->settings();
+  const fusion::Method* method = fusion::find_method(settings.method);
+  const bool lacks_temperature =
+      scene_ && method->needs_temperature && !scene_->temperature().summary.has_temperature();
+  set_status("no_temperature", protocol::StatusLevel::Warning,
+             lacks_temperature
+                 ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
+                 : std::nullopt);
+  const bool lacks_baseline = scene_ && method->compares_with_baseline && !scene_->baseline_mark();
+  set_status("no_baseline", protocol::StatusLevel::Warning,
+             lacks_baseline ? std::optional("This scene has no baseline: " + method->label +
+                                            " shows the visible colours. Put blocks into it, or mark a baseline: then "
+                                            "what changes afterwards is shown.")
+                            : std::nullopt);
+  set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
+             palette_warning(*method, fusion::find_palette(settings.palette)));
+  set_status("palette_not_diverging", protocol::StatusLevel::Warning,
+             direction_warning(*method, fusion::find_palette(settings.palette)));
+}
+
+protocol::FusionReply ViewerSession::fusion_reply() const {
+  return {stream_ ? stream_->generation() : 0, to_message(*plan_, temperature_of(scene_).summary)};
+}
+
+StreamQuality ViewerSession::quality() const {
+  return stream_ ? stream_->quality() : quality_;
+}
+
+std::optional<OutgoingFrame> ViewerSession::next_frame() {
+  if (!stream_) return std::nullopt;
+  auto frame = stream_->next_frame(steady_seconds());
+  if (!frame) {
+    if (const auto complete = stream_->take_complete()) {
+      notify("stream.complete", protocol::to_json(to_message(*complete)));
+    }
+  }
+  return frame;
+}
+
+void ViewerSession::ticked() {
+  if (!is_subscribed_ || !stream_) return;
+  stream_->set_time(unix_seconds());
+  const StreamStats stats = stream_->stats();
+  protocol::StreamStats message;
+  message.round_trip_ms = if_positive(stats.round_trip_ms);
+  if (!message.round_trip_ms) message.round_trip_ms = if_positive(peer_.round_trip_ms());
+  message.throughput_bytes_per_s = if_positive(stats.throughput_bytes_per_s);
+  message.queued_bytes = stats.queued_bytes + peer_.queued_bytes();
+  message.skipped_frames = stats.skipped_frames;
+  message.viewers = served_.viewer_count;
+  message.accuracy.position_mm = if_positive(stats.position_mm);
+  message.accuracy.colour_levels = stats.colour_levels;
+  message.accuracy.temperature_celsius = stats.temperature_celsius;
+  if (message.accuracy.position_mm) message.accuracy.pixel_error = stats.pixel_error;
+  notify("stream.stats", protocol::to_json(message));
+  set_status("tiles_failed", protocol::StatusLevel::Error,
+             stats.failed_tiles > 0 ? std::optional(std::to_string(stats.failed_tiles) +
+                                                    " tiles of the scene could not be encoded and are not shown.")
+                                    : std::nullopt);
+}
+
+void ViewerSession::set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message) {
+  const auto told = statuses_.find(id);
+  if (!message) {
+    if (told == statuses_.end()) return;
+    statuses_.erase(told);
+  } else {
+    if (told != statuses_.end() && told->second == *message) return;
+    statuses_.insert_or_assign(id, *message);
+  }
+  notify("status", protocol::to_json(protocol::Status{id, level, std::move(message)}));
+}
+
+}  // namespace spectra::server

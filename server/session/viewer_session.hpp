@@ -1,0 +1,131 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fusion/fusion_plan.hpp"
+#include "fusion/settings.hpp"
+#include "protocol/incoming_message.hpp"
+#include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/stream_messages.hpp"
+#include "server/access/token_bucket.hpp"
+#include "server/net/net_options.hpp"
+#include "server/net/viewer_link.hpp"
+#include "server/session/served_scene.hpp"
+
+namespace spectra::server {
+
+/// What one viewer says and is told: the messages of docs/protocol.md over its own settings, camera and stream. Runs on
+/// its session's strand; what computes is posted to the worker pool and comes back through ViewerPeer::post().
+class ViewerSession final : public ViewerClient, public std::enable_shared_from_this<ViewerSession> {
+ public:
+  /// The peer owns the session and outlives every call to it.
+  ViewerSession(const std::shared_ptr<ViewerPeer>& peer, ServedScene& served, const NetLimits& limits);
+
+  void opened() override;
+  void text_received(std::string_view text) override;
+  void binary_received() override;
+  std::optional<OutgoingFrame> next_frame() override;
+  void ticked() override;
+  void closed() override;
+
+ private:
+  using Id = std::optional<protocol::RpcId>;
+  using Answer = protocol::Result<nlohmann::json>;
+
+  struct FusionRequest {
+    Id id;
+    protocol::Result<fusion::FusionChange> change;
+  };
+  struct Preparation;
+
+  /// What a request counts against.
+  enum class Cost {
+    Free,     ///< Nothing: it only steers what is sent anyway, and comes with every picture.
+    Request,  ///< The requests a second of NetLimits.
+  };
+  /// One of the methods that a viewer may call.
+  struct Request {
+    std::string_view method;
+    Right right;
+    Cost cost;
+    void (ViewerSession::*handle)(const Id& id, const nlohmann::json& params);
+  };
+  static std::span<const Request> requests();
+  /// The handler that answers with what a function returns.
+  template <auto function>
+  void answered(const Id& id, const nlohmann::json& params);
+
+  void handle(const protocol::IncomingMessage& message);
+  void answer(const Id& id, const Answer& answer);
+  void notify(std::string_view method, const nlohmann::json& params);
+
+  Answer scene_get(const nlohmann::json& params);
+  Answer subscribe(const nlohmann::json& params);
+  /// Returns the number of tiles that need not be sent again.
+  std::uint32_t resume(const protocol::ResumeRequest& request);
+  Answer unsubscribe(const nlohmann::json& params);
+  Answer fusion_get(const nlohmann::json& params);
+  Answer set_quality(const nlohmann::json& params);
+  Answer set_camera(const nlohmann::json& params);
+  Answer acknowledge(const nlohmann::json& params);
+  void fusion_set(const Id& id, const nlohmann::json& params);
+  void histogram(const Id& id, const nlohmann::json& params);
+  void facts(const Id& id, const nlohmann::json& params);
+  void probe(const Id& id, const nlohmann::json& params);
+  void extremes(const Id& id, const nlohmann::json& params);
+  void baseline(const Id& id, const nlohmann::json& params);
+
+  /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
+  void answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute);
+
+  void take_scene(const std::shared_ptr<const SceneSnapshot>& scene);
+  /// Prepares the waiting changes, or the settings for a scene that has come, on the pool; one at a time.
+  void start_preparation();
+  void finish_preparation(const std::shared_ptr<Preparation>& preparation);
+  void begin_stream();
+  /// Says what was noticed while the scene was read, and takes back what was said of the one before.
+  void tell_notes();
+  /// What the method of now cannot show in the scene of now, and what palette does not suit it.
+  void tell_method_limits();
+  void set_plan(fusion::FusionPlan plan);
+  protocol::FusionReply fusion_reply() const;
+  StreamQuality quality() const;
+  /// This viewer may have raw layers.
+  bool gives_raw_layers() const;
+
+  /// Sends a status when it differs from what the viewer was told last.
+  void set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message);
+
+  ViewerPeer& peer_;
+  const std::weak_ptr<ViewerPeer> weak_peer_;
+  ServedScene& served_;
+  const NetLimits limits_;
+  TokenBucket requests_;
+
+  SceneStore::Subscription scene_subscription_;
+  std::shared_ptr<const LoadingProgress::Listener> progress_subscription_;
+  std::shared_ptr<const SceneSnapshot> scene_;
+  std::shared_ptr<const SceneSnapshot> coming_scene_;
+  std::shared_ptr<ViewerStream> stream_;
+  std::optional<fusion::FusionPlan> plan_;
+  std::vector<FusionRequest> waiting_;
+  bool is_preparing_ = false;
+  bool is_first_view_ = true;  ///< The viewer has changed nothing yet: a new scene brings its own first view.
+  std::size_t computing_count_ = 0;
+  std::size_t computing_bytes_ = 0;  ///< Of those answers, at most.
+
+  bool is_subscribed_ = false;
+  Subscription subscription_;
+  std::optional<Camera> camera_;
+  StreamQuality quality_;
+  std::map<std::string, std::string> statuses_;
+};
+
+}  // namespace spectra::server

@@ -1,0 +1,154 @@
+#include "server/sources/map_feed.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include "server/mapping/map_ply.hpp"
+#include "server/mapping/simulated_drive.hpp"
+#include "server/sources/block_options.hpp"
+
+namespace spectra::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kPublishEvery{500};
+constexpr std::chrono::milliseconds kWait{10};
+
+}  // namespace
+
+FrameStream stream_of(mapping::FrameFolder folder) {
+  const auto owner = std::make_shared<const mapping::FrameFolder>(std::move(folder));
+  FrameStream stream;
+  stream.owner = owner;
+  stream.calibration = &owner->calibration();
+  stream.trajectory = &owner->trajectory();
+  stream.frame_count = owner->rows().size();
+  stream.load = [owner](std::size_t index, mapping::FaultLog& faults) { return owner->load(index, faults); };
+  stream.stamp_s = [owner](std::size_t index) { return owner->rows()[index].time_s; };
+  return stream;
+}
+
+FrameStream demo_drive_stream() {
+  mapping::DriveOptions options;
+  options.vertex_count = 160'000;
+  options.depth_hz = 5;
+  options.thermal_hz = 6.25;
+  options.finer_than = 2;
+  const auto owner = std::make_shared<const mapping::SimulatedDrive>(options);
+  FrameStream stream;
+  stream.owner = owner;
+  stream.calibration = &owner->calibration();
+  stream.trajectory = &owner->trajectory();
+  stream.frame_count = owner->frame_count();
+  stream.load = [owner](std::size_t index, mapping::FaultLog&) { return owner->frame(index); };
+  stream.stamp_s = [owner](std::size_t index) { return owner->stamp_s(index); };
+  stream.is_paced = true;
+  stream.up = "y";
+  return stream;
+}
+
+std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& frames, const Eigen::Vector3d& eye) {
+  const double now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  std::vector<std::pair<std::string, std::string>> query{
+      {"observed_at", fmt::format("{:.3f}", now)},
+      {"sensor", fmt::format("{:.3f},{:.3f},{:.3f}", eye.x(), eye.y(), eye.z())},
+      {"scale", "1"}};
+  if (!frames.up.empty()) query.emplace_back("up", frames.up);
+  return query;
+}
+
+void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, WorkerPool& pool,
+              mapping::FaultLog& faults) {
+  mapping::UnitPublisher publisher;
+  const auto begin = Clock::now();
+  auto last = begin;
+  Eigen::Vector3d eye = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < frames.frame_count; ++i) {
+    const auto due = begin + std::chrono::duration<double>(frames.stamp_s(i) - frames.stamp_s(0));
+    do {
+      if (run.is_over()) return;
+      if (frames.is_paced && Clock::now() < due) std::this_thread::sleep_for(kWait);
+    } while (frames.is_paced && Clock::now() < due);
+    mapper.fuse(frames.load(i, faults), *frames.trajectory, faults);
+    const mapping::PoseAnswer pose = frames.trajectory->at(frames.stamp_s(i));
+    if (pose.state == mapping::PoseState::Known) eye = pose.pose.translation();
+    run.progress(static_cast<double>(i + 1) / static_cast<double>(frames.frame_count));
+    if (Clock::now() - last < kPublishEvery && i + 1 < frames.frame_count) continue;
+    last = Clock::now();
+    if (!run.hand_over(mapper.changed_units(publisher, eye, pool), eye)) return;
+  }
+}
+
+MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, std::function<bool()> may_begin)
+    : frames_(std::move(frames)), voxel_m_(voxel_m), map_(map), thread_([this, may_begin = std::move(may_begin)] {
+        try {
+          work(may_begin);
+        } catch (const std::exception& error) {
+          spdlog::error("mapping ended: {}", error.what());
+        }
+      }) {}
+
+MapFeed::~MapFeed() {
+  state_->is_over = true;
+  thread_.join();
+}
+
+void MapFeed::work(const std::function<bool()>& may_begin) {
+  while (!may_begin()) {
+    if (state_->is_over) return;
+    std::this_thread::sleep_for(kWait);
+  }
+  WorkerPool pool(1);
+  mapping::MapperSettings settings;
+  settings.voxel_m = voxel_m_;
+  mapping::Mapper mapper(*frames_.calibration, settings, pool);
+  mapping::FaultLog faults;
+  FeedRun run;
+  run.voxel_m = voxel_m_;
+  run.is_over = [this] { return state_->is_over.load(); };
+  run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const Eigen::Vector3d& eye) {
+    return hand_over(std::move(units), eye);
+  };
+  run_feed(frames_, run, mapper, pool, faults);
+  for (const mapping::FrameFault& fault : faults.all()) {
+    if (fault.count > 0) spdlog::warn("{} ({} times)", fault.what, fault.count);
+  }
+  spdlog::info("mapping is done: {} depth and {} thermal frames, {} blocks of voxels", mapper.figures().depth_frames,
+               mapper.figures().thermal_frames, mapper.map().block_count());
+}
+
+bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::Vector3d& eye) {
+  for (mapping::PublishedUnit& unit : units) {
+    // A map that is behind is waited for: what is told then is newer.
+    while (state_->under_way >= kUnderWay) {
+      if (state_->is_over) return false;
+      std::this_thread::sleep_for(kWait);
+    }
+    ++state_->under_way;
+    const auto done = [state = state_, id = unit.id](const auto& outcome) {
+      --state->under_way;
+      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+      if (refusal != nullptr && !state->is_over) spdlog::warn("{} is refused: {}", id, refusal->reason);
+    };
+    if (unit.mesh.triangles.empty()) {
+      map_.remove(unit.id, done, MapKeeper::WhenFull::Take);
+      continue;
+    }
+    auto block = incoming_block(unit.id, unit_query(frames_, eye));
+    if (!block) {
+      --state_->under_way;
+      spdlog::error("{}: {}", unit.id, block.error().message);
+      return false;
+    }
+    block.value().ply = std::make_shared<const std::string>(mapping::block_ply(unit.mesh));
+    map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
+  }
+  return !state_->is_over;
+}
+
+}  // namespace spectra::server

@@ -1,0 +1,87 @@
+#include "fusion/files/ply_header.hpp"
+
+#include <gtest/gtest.h>
+
+namespace spectra::fusion {
+namespace {
+
+TEST(PlyHeader, ReadsElementsAndProperties) {
+  const auto header = parse_ply_header(
+      "ply\nformat binary_big_endian 1.0\ncomment element vertex 9\nobj_info made by hand\n\n"
+      "element vertex 3\nproperty  float\tx\nproperty list uint8 uint16 tags\nelement face 18446744073709551615\n"
+      "end_header\nbody");
+  ASSERT_TRUE(header);
+  EXPECT_EQ(header.value().format, PlyFormat::BinaryBigEndian);
+  ASSERT_EQ(header.value().elements.size(), 2U);
+  const PlyElement& vertex = header.value().elements[0];
+  EXPECT_EQ(vertex.count, 3U);
+  ASSERT_EQ(vertex.properties.size(), 2U);
+  EXPECT_EQ(vertex.properties[0].name, "x");
+  EXPECT_EQ(vertex.properties[0].type, PlyScalar::Float32);
+  EXPECT_TRUE(vertex.properties[1].is_list);
+  EXPECT_EQ(vertex.properties[1].count_type, PlyScalar::UInt8);
+  EXPECT_EQ(vertex.properties[1].type, PlyScalar::UInt16);
+  EXPECT_EQ(header.value().find("face")->count, 18446744073709551615U);
+  EXPECT_EQ(header.value().find("edge"), nullptr);
+}
+
+TEST(PlyHeader, BodyBeginsAfterTheLastLineEnd) {
+  for (const std::string line_end : {"\n", "\r\n"}) {
+    const std::string head =
+        "ply" + line_end + "format ascii 1.0" + line_end + "element vertex 1" + line_end + "end_header" + line_end;
+    const auto header = parse_ply_header(head + "\n1 2 3");
+    ASSERT_TRUE(header);
+    EXPECT_EQ(header.value().size_bytes, head.size());
+  }
+}
+
+struct BadHeaderCase {
+  const char* text;
+  ErrorCode code;
+  const char* says;
+};
+
+TEST(PlyHeader, SaysWhatIsWrong) {
+  const BadHeaderCase cases[] = {
+      {"", ErrorCode::BadHeader, "empty"},
+      {"solid thing\n", ErrorCode::BadHeader, "not a PLY file"},
+      {"plyx\n", ErrorCode::BadHeader, "not a PLY file"},
+      {"ply\nformat ascii 1.0\n", ErrorCode::BadHeader, "before end_header"},
+      {"ply\nend_header\n", ErrorCode::BadHeader, "no format"},
+      {"ply\nformat ascii 2.0\nend_header\n", ErrorCode::Unsupported, "'2.0'"},
+      {"ply\nformat utf8 1.0\nend_header\n", ErrorCode::Unsupported, "'utf8'"},
+      {"ply\nformat ascii\nend_header\n", ErrorCode::BadHeader, "line 2"},
+      {"ply\nformat ascii 1.0\nformat ascii 1.0\n", ErrorCode::BadHeader, "second format"},
+      {"ply\nformat ascii 1.0\nvertex 3\n", ErrorCode::BadHeader, "'vertex'"},
+      {"ply\nformat ascii 1.0\nproperty float x\n", ErrorCode::BadHeader, "before any element"},
+      {"ply\nformat ascii 1.0\nelement vertex\n", ErrorCode::BadHeader, "name and a count"},
+      {"ply\nformat ascii 1.0\nelement vertex -1\n", ErrorCode::BadHeader, "'-1'"},
+      {"ply\nformat ascii 1.0\nelement vertex 3x\n", ErrorCode::BadHeader, "'3x'"},
+      {"ply\nformat ascii 1.0\nelement vertex 18446744073709551616\n", ErrorCode::BadHeader, "2^64"},
+      {"ply\nformat ascii 1.0\nelement a 1\nelement a 1\n", ErrorCode::BadHeader, "second element 'a'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty int i\nproperty float i\n", ErrorCode::BadHeader,
+       "second property 'i'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty half h\n", ErrorCode::BadHeader, "'half'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty float\n", ErrorCode::BadHeader, "property line"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty list uchar int\n", ErrorCode::BadHeader, "property line"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty list float int l\n", ErrorCode::BadHeader, "'float'"},
+      {"ply\nformat ascii 1.0\n\x1b[31m\n", ErrorCode::BadHeader, "'?[31m'"},
+  };
+  for (const BadHeaderCase& bad : cases) {
+    const auto header = parse_ply_header(bad.text);
+    ASSERT_FALSE(header) << bad.text;
+    EXPECT_EQ(header.error().code, bad.code) << bad.text;
+    EXPECT_NE(header.error().message.find(bad.says), std::string::npos) << header.error().message;
+  }
+}
+
+TEST(PlyHeader, IsBoundedInSize) {
+  std::string text = "ply\nformat ascii 1.0\n";
+  while (text.size() < kMaxPlyHeaderBytes + 1000) text += "comment " + std::string(1000, 'c') + "\n";
+  const auto header = parse_ply_header(text + "element vertex 1\nend_header\n");
+  ASSERT_FALSE(header);
+  EXPECT_NE(header.error().message.find("within the first"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace spectra::fusion

@@ -1,0 +1,219 @@
+#include "server/map/living_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/unit/map/generated_scene.hpp"
+
+namespace spectra::server {
+namespace {
+
+using fusion::MultispectralMesh;
+
+constexpr LivingMap::Options kOptions{.leaf_vertex_count = 1000, .first_level = 6};
+
+BlockPut put(const std::string& id, MultispectralMesh mesh, std::vector<fusion::Note> notes = {}) {
+  fusion::LoadedScene scene;
+  scene.mesh = std::move(mesh);
+  scene.mesh.name = id + ".ply";
+  scene.notes = std::move(notes);
+  return {.id = id, .scene = std::move(scene), .observed_at = {}};
+}
+
+/// A terrain that lies `x` metres along.
+MultispectralMesh terrain(std::uint32_t seed, float x, float warmer = 0) {
+  MultispectralMesh mesh = testing::terrain({.columns = 40, .rows = 40, .seed = seed});
+  for (fusion::Vec3f& p : mesh.positions()) p.x += x;
+  for (float& t : mesh.temperature_celsius()) t += warmer;
+  return mesh;
+}
+
+class LivingMapTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<const SceneSnapshot> apply(std::vector<BlockPut> blocks, std::vector<std::string> removed = {}) {
+    return map_.apply({.put = std::move(blocks), .removed = std::move(removed)}, ++revision_, pool_);
+  }
+  std::shared_ptr<const SceneSnapshot> apply(BlockPut block) {
+    std::vector<BlockPut> blocks;
+    blocks.push_back(std::move(block));
+    return apply(std::move(blocks));
+  }
+
+  /// With all coarse tiles; there are some to be made.
+  std::shared_ptr<const SceneSnapshot> completed() {
+    std::shared_ptr<const SceneSnapshot> scene;
+    while (auto work = map_.next_coarse()) {
+      work->run();
+      scene = map_.take_coarse(*work, ++revision_);
+    }
+    return scene;
+  }
+
+  WorkerPool pool_{2};
+  LivingMap map_{kOptions};
+  std::uint32_t revision_ = 0;
+};
+
+TEST_F(LivingMapTest, BeginsEmptyAndMayBecomeEmptyAgain) {
+  EXPECT_TRUE(apply(std::vector<BlockPut>{})->tiles().empty());
+  EXPECT_GT(apply(std::vector<BlockPut>{})->suggested_position_step_m(), 0);
+  EXPECT_FALSE(apply(put("a", terrain(1, 0)))->tiles().empty());
+  const auto empty = apply(std::vector<BlockPut>{}, {"a", "nobody"});
+  EXPECT_TRUE(empty->tiles().empty());
+  EXPECT_EQ(empty->vertex_count(), 0U);
+  EXPECT_FALSE(empty->temperature().summary.has_temperature());
+}
+
+TEST_F(LivingMapTest, SharesTilesThatAreTheSameWithTheVersionBefore) {
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    blocks.push_back(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
+  }
+  const auto before = apply(std::move(blocks));
+  const auto after = apply(put("b0", terrain(77, 0)));
+  std::size_t same = 0;
+  for (const auto& tile : after->tiles()) {
+    same += static_cast<std::size_t>(std::ranges::count(before->tiles(), tile));
+  }
+  EXPECT_GT(same, after->tiles().size() / 2);
+  EXPECT_LT(same, after->tiles().size());
+}
+
+TEST_F(LivingMapTest, CoarseTilesFollowAfterTheLeaves) {
+  LivingMap other(kOptions);
+  std::vector<BlockPut> only;
+  only.push_back(put("whole", terrain(1, 0)));
+  other.apply({.put = std::move(only), .removed = {}}, 1, pool_);
+  EXPECT_FALSE(other.is_behind()) << "what is built at once is complete";
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    blocks.push_back(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
+  }
+  apply(std::move(blocks));
+  const auto before = completed();
+  const auto at_once = apply(put("b0", terrain(0, 0, 0.5F)));
+  EXPECT_TRUE(map_.is_behind());
+  std::size_t changed_leaves = 0;
+  for (const auto& tile : at_once->tiles()) {
+    const bool is_same = std::ranges::count(before->tiles(), tile) > 0;
+    EXPECT_TRUE(is_same || tile->child_mask == 0) << "a coarse tile takes time";
+    if (!is_same) ++changed_leaves;
+  }
+  EXPECT_GT(changed_leaves, 0U);
+
+  // What changes while a tile is being made is shown in the next round.
+  auto work = map_.next_coarse();
+  ASSERT_TRUE(work);
+  EXPECT_GT(work->from()->id.level, before->tiles().front()->id.level) << "fine before coarse";
+  apply(put("b0", terrain(0, 0, 1)));
+  work->run();
+  map_.take_coarse(*work, ++revision_);
+  EXPECT_TRUE(map_.is_behind());
+  const auto complete = completed();
+  EXPECT_FALSE(map_.is_behind());
+  for (const auto& tile : complete->tiles()) {
+    EXPECT_EQ(tile->child_mask == 0, tile->geometric_error_m == 0);
+  }
+  EXPECT_NE(complete->tiles()[0], before->tiles()[0]);
+}
+
+TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
+  const MultispectralMesh one = terrain(1, 0), other = terrain(2, 39);
+  std::vector<BlockPut> blocks;
+  blocks.push_back(put("z", terrain(1, 0)));
+  blocks.push_back(put("a", terrain(2, 39)));
+  const auto scene = apply(std::move(blocks));
+  const auto back = scene->block_mesh("z");
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(std::ranges::equal(back->positions(), one.positions()));
+  EXPECT_TRUE(std::ranges::equal(back->visible(), one.visible()));
+  EXPECT_EQ(back->triangles(), one.triangles());
+  EXPECT_EQ(back->name, "z.ply");
+  EXPECT_FALSE(scene->block_mesh("y"));
+  // In the whole mesh blocks stand in the order of their names, and every vertex of a leaf says where.
+  const MultispectralMesh whole = scene->whole_mesh();
+  EXPECT_EQ(whole.positions()[0], other.positions()[0]);
+  EXPECT_EQ(whole.positions()[other.vertex_count()], one.positions()[0]);
+  for (const auto& tile : scene->tiles()) {
+    for (std::size_t v = 0; tile->child_mask == 0 && v < tile->positions.size(); ++v) {
+      ASSERT_EQ(whole.positions()[scene->vertex_index(*tile, v)], tile->positions[v]);
+    }
+  }
+}
+
+TEST_F(LivingMapTest, IsNamedByTheBlockThatCameFirst) {
+  MultispectralMesh mesh = terrain(1, 0);
+  mesh.up = fusion::UpAxis::MinusY;
+  apply(put("m", std::move(mesh)));
+  const auto scene = apply(put("a", terrain(2, 39)));
+  EXPECT_EQ(scene->name(), "m.ply");
+  EXPECT_EQ(scene->up(), fusion::UpAxis::MinusY);
+}
+
+TEST_F(LivingMapTest, SaysANoteOfAKindOnceHoweverManyBlocksHaveIt) {
+  const fusion::Note holes{"holes", 3, "3 vertices have no position", false};
+  const fusion::Note urgent{"unit_told", 1, "this is in feet", true};
+  EXPECT_EQ(apply(put("a", terrain(1, 0), {holes}))->notes()[0].message, holes.message);
+  apply(put("b", terrain(2, 39), {holes, urgent}));
+  const auto scene = apply(put("c", terrain(3, 78), {holes}));
+  ASSERT_EQ(scene->notes().size(), 2U);
+  EXPECT_EQ(scene->notes()[0].count, 9U);
+  EXPECT_EQ(scene->notes()[0].message, "block c: 3 vertices have no position (and 2 more blocks)");
+  EXPECT_TRUE(scene->notes()[1].needs_attention);
+}
+
+TEST_F(LivingMapTest, AutomaticValuesFollowWhenTheyHaveMovedFarEnough) {
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    blocks.push_back(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
+  }
+  const auto first = apply(std::move(blocks));
+  EXPECT_EQ(first->reference_temperature()->summary.mean, first->temperature().summary.mean);
+  const auto like_before = apply(put("b3", terrain(3, 39 * 3, 0.01F)));
+  EXPECT_EQ(like_before->reference_temperature(), first->reference_temperature());
+  EXPECT_NE(like_before->temperature().summary.mean, first->temperature().summary.mean) << "what is told is exact";
+  const auto hotter = apply(put("b3", terrain(3, 39 * 3, 20)));
+  EXPECT_NE(hotter->reference_temperature(), first->reference_temperature());
+  EXPECT_EQ(hotter->reference_temperature()->summary.maximum, hotter->temperature().summary.maximum);
+  // What is put again as it was moves nothing, until all of it was.
+  auto last = hotter;
+  const auto put_again = [&](std::uint32_t i) {
+    last = apply(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i), i == 3 ? 20.0F : 0.0F)));
+  };
+  for (std::uint32_t i = 0; i < 5; ++i) put_again(i);
+  EXPECT_EQ(last->reference_temperature(), hotter->reference_temperature());
+  for (std::uint32_t i = 0; i < 10; ++i) put_again(i);
+  EXPECT_NE(last->reference_temperature(), hotter->reference_temperature());
+  // Where most lie moves while mean and extremes hardly do.
+  const auto before = last;
+  const auto squeezed = [](std::uint32_t i) {
+    MultispectralMesh mesh = terrain(i, 39.0F * static_cast<float>(i));
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+      mesh.temperature_celsius()[v] = v % 2 == 0 ? 18.0F : 22.0F;
+    }
+    return mesh;
+  };
+  for (std::uint32_t i = 0; i < 3; ++i) last = apply(put("b" + std::to_string(i), squeezed(i)));
+  EXPECT_NE(last->reference_temperature(), before->reference_temperature());
+}
+
+TEST_F(LivingMapTest, RefusesWhatCannotBeOneMap) {
+  apply(put("mesh", terrain(1, 0)));
+  const auto code = [&](const BlockShape& shape, const std::vector<std::string>& removed = {}) {
+    const auto refused = map_.refusal_of({&shape, 1}, removed);
+    return refused ? static_cast<int>(refused->code) : 0;
+  };
+  EXPECT_EQ(code({"more", 10, true}), 0);
+  EXPECT_EQ(code({"points", 10, false}), static_cast<int>(fusion::ErrorCode::Unsupported));
+  EXPECT_EQ(code({"points", 10, false}, {"mesh"}), 0);
+  EXPECT_EQ(code({"mesh", 10, false}), 0) << "it takes the place of the only other one";
+  EXPECT_EQ(code({"nothing", 0, true}), static_cast<int>(fusion::ErrorCode::Unsupported));
+  EXPECT_EQ(code({"large", 0xffffffff, true}), static_cast<int>(fusion::ErrorCode::TooLarge));
+}
+
+}  // namespace
+}  // namespace spectra::server

@@ -1,0 +1,174 @@
+#include "server/sources/map_keeper.hpp"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <future>
+#include <thread>
+
+#include "server/sources/block_options.hpp"
+
+namespace spectra::server {
+namespace {
+
+/// A flat sheet of side x side vertices as a PLY file with double coordinates, the part of a lattice that begins at `column`.
+std::string square(std::size_t side, std::size_t column = 0, double x0 = 0, double y0 = 0, double spacing = 1) {
+  std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(side * side) +
+                    "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                    std::to_string(2 * (side - 1) * (side - 1)) +
+                    "\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto put = [&ply](const auto& value) {
+    char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    ply.append(bytes, sizeof value);
+  };
+  for (std::size_t i = 0; i < side * side; ++i) {
+    const auto row = static_cast<double>(i / side);
+    put(x0 + spacing * static_cast<double>(column + i % side) + 0.137 * row);
+    put(y0 + spacing * row);
+    put(0.0);
+  }
+  for (std::size_t row = 0; row + 1 < side; ++row) {
+    for (std::size_t step = 0; step + 1 < side; ++step) {
+      const auto corner = static_cast<std::int32_t>(row * side + step);
+      const auto next = static_cast<std::int32_t>(side);
+      for (const auto& triangle :
+           {std::array{corner, corner + 1, corner + next}, std::array{corner + 1, corner + next + 1, corner + next}}) {
+        put(std::uint8_t{3});
+        for (const std::int32_t vertex : triangle) put(vertex);
+      }
+    }
+  }
+  return ply;
+}
+
+class MapKeeperTest : public testing::Test {
+ protected:
+  MapKeeperTest() { EXPECT_FALSE(map_.restore()); }
+  ~MapKeeperTest() override {
+    map_.end();
+    pool_.stop();
+  }
+
+  void put(const std::string& id, std::string ply) {
+    IncomingBlock block = incoming_block(id, std::string()).value();
+    block.ply = std::make_shared<const std::string>(std::move(ply));
+    ++asked_;
+    map_.put(std::move(block), [this, id](const std::variant<MapKeeper::Taken, BlockRefusal>& outcome) {
+      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+      tell(refusal != nullptr ? id + " refused: " + refusal->code
+                              : id + " has " + std::to_string(std::get<MapKeeper::Taken>(outcome).entry.vertex_count));
+    });
+  }
+
+  void remove(const std::string& id) {
+    ++asked_;
+    map_.remove(id, [this, id](const std::variant<store::Revision, BlockRefusal>& outcome) {
+      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+      tell(refusal != nullptr ? id + " refused: " + refusal->code : id + " is gone");
+    });
+  }
+
+  std::vector<std::string> answers() {
+    std::unique_lock lock(mutex_);
+    answered_.wait(lock, [this] { return answers_.size() == asked_; });
+    return answers_;
+  }
+
+  std::vector<fusion::Vec3f> positions_of(const std::string& id) {
+    const auto mesh = scenes_.current()->block_mesh(id);
+    return {mesh->positions().begin(), mesh->positions().end()};
+  }
+
+  SceneStore scenes_;
+  WorkerPool pool_{2};
+  MapKeeper map_{scenes_, pool_, nullptr};
+
+ private:
+  void tell(std::string answer) {
+    const std::lock_guard lock(mutex_);
+    answers_.push_back(std::move(answer));
+    answered_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable answered_;
+  std::vector<std::string> answers_;
+  std::size_t asked_ = 0;
+};
+
+TEST_F(MapKeeperTest, ChangesOfABlockTakeEffectInTheirOrderHoweverLongTheyAreRead) {
+  put("first", square(3, 1000));
+  ASSERT_EQ(answers().size(), 1U);
+  put("a", square(300));
+  remove("a");
+  put("a", square(10));
+  put("a", "no PLY at all");
+  put("a", square(20));
+  remove("a");
+  remove("a");
+  put("a", square(5));
+  EXPECT_EQ(answers().size(), 9U);
+  std::vector<std::string> in_order = answers();
+  // Refusals of what cannot be read come when it has been read.
+  const auto unreadable = std::find(in_order.begin(), in_order.end(), "a refused: unreadable_block");
+  ASSERT_NE(unreadable, in_order.end());
+  in_order.erase(unreadable);
+  EXPECT_EQ(in_order, (std::vector<std::string>{"first has 9", "a has 90000", "a is gone", "a has 100", "a has 400",
+                                                "a is gone", "a refused: not_found", "a has 25"}));
+  EXPECT_EQ(scenes_.current()->vertex_count(), 9U + 25U);
+}
+
+TEST_F(MapKeeperTest, ALongReadKeepsNoOtherBlockWaiting) {
+  put("first", square(3, 1000));
+  ASSERT_EQ(answers().size(), 1U);
+  put("large", square(300));
+  put("small", square(3, 2000));
+  EXPECT_EQ(answers()[1], "small has 9");
+}
+
+TEST_F(MapKeeperTest, WhatBlocksShareIsTheSameWhenAllComeAtOnceIntoAnEmptyMap) {
+  // Coordinates whose last bits a float does not have, and blocks that would choose different origins for themselves.
+  put("not a PLY", "x");
+  for (std::size_t i = 0; i < 12; ++i) put("b" + std::to_string(i), square(9, 8 * i, 500'000.1, 4'000'000.3, 1.1));
+  ASSERT_EQ(answers().size(), 13U);
+  for (std::size_t i = 0; i + 1 < 12; ++i) {
+    const auto left = positions_of("b" + std::to_string(i)), right = positions_of("b" + std::to_string(i + 1));
+    ASSERT_EQ(left.size(), 81U);
+    for (std::size_t row = 0; row < 9; ++row) EXPECT_EQ(left[9 * row + 8], right[9 * row]) << i;
+  }
+}
+
+// Killed before the constants of its map were stored: the first block decides them again, and the others come to a map that is there.
+TEST(MapKeeper, MakesTheCoarseTilesOfWhatItRestores) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "spectra-map-keeper";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  auto store = store::BlockStore::open((folder / "map.sqlite").string(), {}).value();
+  for (const std::string id : {"a", "b", "c"}) {
+    const auto ply = std::make_shared<const std::string>(square(120, id == "a" ? 0 : id == "b" ? 119 : 238));
+    std::promise<bool> is_stored;
+    store->put({{id, std::nullopt, std::nullopt, "", 120 * 120, 2 * 119 * 119, {}}, ply, nullptr},
+               [&](const store::StoreResult<store::Revision>& outcome) { is_stored.set_value(outcome.has_value()); });
+    ASSERT_TRUE(is_stored.get_future().get());
+  }
+  SceneStore scenes;
+  WorkerPool pool(2);
+  MapKeeper map(scenes, pool, std::move(store));
+  ASSERT_EQ(map.restore(), std::nullopt);
+  // Tiles of the first block meet those of the second now, and are made again.
+  const auto restored = scenes.current();
+  for (int i = 0; i < 1000 && scenes.current() == restored; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_NE(scenes.current(), restored);
+  map.end();
+  pool.stop();
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace spectra::server
