@@ -22,7 +22,7 @@ std::pair<double, double> active_range(const RangeSetting& range, const SceneTem
 }
 
 /// A colour that no method makes of a highlight over kUnmarked.
-constexpr Rgb8 kUnmarked = {0, 200, 100};
+constexpr base::Rgb8 kUnmarked = {0, 200, 100};
 
 const PaletteTable& telling_palette() {
   static const PaletteTable table = [] {
@@ -35,19 +35,19 @@ const PaletteTable& telling_palette() {
 
 }  // namespace
 
-Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const SceneTemperature& scene) {
+base::Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const SceneTemperature& scene) {
   const Palette* palette = find_palette(settings.palette);
   if (!palette) {
-    return failure(ErrorCode::UnknownPalette, "palette '" + settings.palette + "' is unknown", "palette");
+    return base::failure(base::ErrorCode::UnknownPalette, "palette '" + settings.palette + "' is unknown", "palette");
   }
   return prepare(settings, scene, palette->table);
 }
 
-Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const SceneTemperature& scene,
-                                       const PaletteTable& palette) {
+base::Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const SceneTemperature& scene,
+                                             const PaletteTable& palette) {
   const Method* method = find_method(settings.method);
   if (!method) {
-    return failure(ErrorCode::UnknownMethod, "method '" + settings.method + "' is unknown", "method");
+    return base::failure(base::ErrorCode::UnknownMethod, "method '" + settings.method + "' is unknown", "method");
   }
   FusionPlan plan;
   std::tie(plan.range_minimum_, plan.range_maximum_) = active_range(settings.range, scene);
@@ -72,7 +72,7 @@ Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, const Sce
   return plan;
 }
 
-void FusionPlan::fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept {
+void FusionPlan::fuse(const base::VertexValues& vertices, std::span<base::Rgb8> fused) const noexcept {
   kernel_->fuse(vertices, fused);
 }
 
@@ -83,12 +83,12 @@ void FusionPlan::mark(std::span<const float> temperature_celsius, std::span<cons
     return;
   }
   constexpr std::size_t kBlock = 1024;
-  std::array<Rgb8, kBlock> colours;
+  std::array<base::Rgb8, kBlock> colours;
   for (std::size_t begin = 0; begin < temperature_celsius.size(); begin += kBlock) {
     const std::size_t size = std::min(kBlock, temperature_celsius.size() - begin);
-    const std::span<Rgb8> block = std::span(colours).first(size);
+    const std::span<base::Rgb8> block = std::span(colours).first(size);
     std::fill(block.begin(), block.end(), kUnmarked);
-    VertexValues vertices{temperature_celsius.subspan(begin, size), block};
+    base::VertexValues vertices{temperature_celsius.subspan(begin, size), block};
     if (!baseline_celsius.empty()) vertices.baseline_celsius = baseline_celsius.subspan(begin, size);
     marking_kernel_->fuse(vertices, block);
     for (std::size_t i = 0; i < size; ++i) marked[begin + i] = block[i] == kUnmarked ? 0 : 1;

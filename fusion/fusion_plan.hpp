@@ -35,21 +35,21 @@ class FusionPlan {
  public:
   /// Resolves automatic values against the scene and builds the kernel. Computes a histogram only when the method
   /// needs one. Fails with Inconsistent when values that became known contradict each other (low > high).
-  static Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene);
+  static base::Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene);
 
   /// The same with a palette table of the caller's instead of the one the settings name.
-  static Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene,
-                                    const PaletteTable& palette);
+  static base::Result<FusionPlan> prepare(const FusionSettings& settings, const SceneTemperature& scene,
+                                          const PaletteTable& palette);
 
   /// Fused colours of vertices; all spans that are there have the same length. Total: no input makes undefined
   /// behaviour. The answer for a vertex depends on that vertex alone, so any split and any thread count give the same
   /// bytes. Freshness is applied as it stands, whatever the settings say of age: only the caller knows the time.
-  void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept;
+  void fuse(const base::VertexValues& vertices, std::span<base::Rgb8> fused) const noexcept;
 
   /// The same of vertices without a baseline, all fresh.
-  void fuse(std::span<const float> temperature_celsius, std::span<const Rgb8> visible,
-            std::span<Rgb8> fused) const noexcept {
-    fuse(VertexValues{temperature_celsius, visible}, fused);
+  void fuse(std::span<const float> temperature_celsius, std::span<const base::Rgb8> visible,
+            std::span<base::Rgb8> fused) const noexcept {
+    fuse(base::VertexValues{temperature_celsius, visible}, fused);
   }
 
   /// Writes 1 where the method highlights a temperature so that it can be seen at all, else 0: of one visible colour that no

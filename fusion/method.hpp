@@ -21,7 +21,7 @@ class Kernel {
 
   /// Writes one fused colour per vertex, faded by its freshness; the spans that are there have the same length. Total:
   /// any bit pattern is allowed as a temperature.
-  virtual void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept = 0;
+  virtual void fuse(const base::VertexValues& vertices, std::span<base::Rgb8> fused) const noexcept = 0;
 };
 
 /// What a method may know when it is made ready for a scene.
@@ -68,7 +68,7 @@ struct Method {
   bool hotter_is_lighter = false;
 
   /// Whether values that are each allowed also go together; automatic ones are left out of the question.
-  std::function<Result<void>(const ParameterValues&)> check;
+  std::function<base::Result<void>(const ParameterValues&)> check;
   /// The automatic values replaced by numbers, which follow the scene and never the active range.
   std::function<ParameterValues(const ParameterValues&, const SceneTemperature&)> resolve;
   /// Builds the kernel; the values are resolved and checked.

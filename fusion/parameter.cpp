@@ -70,8 +70,8 @@ std::string expectation(const Parameter& parameter) {
   return number_expectation(parameter) + (allows_automatic(parameter) ? ", or null for automatic" : "");
 }
 
-auto refused(ErrorCode code, const Parameter& parameter, const std::string& given) {
-  return failure(code, parameter.name + " must be " + expectation(parameter) + ", not " + given, parameter.name);
+auto refused(base::ErrorCode code, const Parameter& parameter, const std::string& given) {
+  return base::failure(code, parameter.name + " must be " + expectation(parameter) + ", not " + given, parameter.name);
 }
 
 /// The value as a number if it is one.
@@ -103,7 +103,7 @@ std::string_view to_string(ParameterKind kind) {
   return "";
 }
 
-Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value) {
+base::Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value) {
   if (std::holds_alternative<Automatic>(value) && allows_automatic(parameter)) return value;
   const std::optional<double> number = number_in(value);
   switch (parameter.kind) {
@@ -115,14 +115,14 @@ Result<ParameterValue> validated(const Parameter& parameter, const ParameterValu
         if (std::find(parameter.options.begin(), parameter.options.end(), *option) != parameter.options.end()) {
           return value;
         }
-        return refused(ErrorCode::OutOfRange, parameter, shown(value));
+        return refused(base::ErrorCode::OutOfRange, parameter, shown(value));
       }
       break;
     case ParameterKind::Temperature:
     case ParameterKind::Number:
       if (number) {
         if (!std::isfinite(*number) || !within_bounds(parameter, *number)) {
-          return refused(ErrorCode::OutOfRange, parameter, shown(value));
+          return refused(base::ErrorCode::OutOfRange, parameter, shown(value));
         }
         // Adding zero turns -0 into 0, so that equal settings are equal in every bit.
         return ParameterValue{*number + 0.0};
@@ -130,17 +130,17 @@ Result<ParameterValue> validated(const Parameter& parameter, const ParameterValu
       break;
     case ParameterKind::Integer:
       if (number) {
-        if (!std::isfinite(*number)) return refused(ErrorCode::OutOfRange, parameter, shown(value));
-        if (*number != std::floor(*number)) return refused(ErrorCode::WrongType, parameter, shown(value));
+        if (!std::isfinite(*number)) return refused(base::ErrorCode::OutOfRange, parameter, shown(value));
+        if (*number != std::floor(*number)) return refused(base::ErrorCode::WrongType, parameter, shown(value));
         // Above 2^53 a double no longer tells whole numbers apart; no parameter goes there.
         if (!within_bounds(parameter, *number) || std::abs(*number) > 9007199254740992.0) {
-          return refused(ErrorCode::OutOfRange, parameter, shown(value));
+          return refused(base::ErrorCode::OutOfRange, parameter, shown(value));
         }
         return ParameterValue{static_cast<std::int64_t>(*number)};
       }
       break;
   }
-  return refused(ErrorCode::WrongType, parameter, shown(value));
+  return refused(base::ErrorCode::WrongType, parameter, shown(value));
 }
 
 }  // namespace spectra::fusion

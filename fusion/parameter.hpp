@@ -49,9 +49,9 @@ struct Parameter {
 
 /// Checks type and bounds of one value against its schema; integers are accepted where a number is asked for,
 /// and whole numbers where an integer is. The error names the parameter and its limits.
-Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value);
+base::Result<ParameterValue> validated(const Parameter& parameter, const ParameterValue& value);
 
 /// Reads the text after `name=` of a command line or query: "null" or "auto" for Automatic.
-Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text);
+base::Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text);
 
 }  // namespace spectra::fusion

@@ -126,11 +126,11 @@ class ParameterSchema {
 template <class Params>
 Method make_method(Method description, const ParameterSchema<Params>& schema,
                    PreparedMethod (*prepare)(const Params&, const MethodContext&),
-                   Result<void> (*check)(const Params&) = nullptr) {
+                   base::Result<void> (*check)(const Params&) = nullptr) {
   description.parameters = schema.entries();
-  description.check = [schema, check](const ParameterValues& values) -> Result<void> {
+  description.check = [schema, check](const ParameterValues& values) -> base::Result<void> {
     if (check) return check(schema.read(values));
-    return success();
+    return base::success();
   };
   description.resolve = [schema](const ParameterValues& values, const SceneTemperature& scene) {
     return schema.resolve(values, scene);

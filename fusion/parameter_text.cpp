@@ -4,7 +4,7 @@
 
 namespace spectra::fusion {
 
-Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text) {
+base::Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_view text) {
   const ParameterValue as_text{std::string(text)};
   const bool automatic = parameter.automatic || parameter.kind == ParameterKind::Temperature;
   if (automatic && (text == "null" || text == "auto")) return ParameterValue{Automatic{}};
@@ -28,8 +28,8 @@ Result<ParameterValue> parse_parameter(const Parameter& parameter, std::string_v
     return validated(parameter, ParameterValue{number});
   }
   // Where a number is asked for, text is refused with the words of the schema.
-  Error error = validated(parameter, as_text).error();
-  if (status == std::errc::result_out_of_range) error.code = ErrorCode::OutOfRange;
+  base::Error error = validated(parameter, as_text).error();
+  if (status == std::errc::result_out_of_range) error.code = base::ErrorCode::OutOfRange;
   return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(error));
 }
 

@@ -44,29 +44,32 @@ std::string known_palettes() {
 
 /// The range with what its mode does not use at its default. Adding zero turns -0 into 0, so that equal settings are equal
 /// in every bit.
-Result<RangeSetting> validated(const RangeSetting& range) {
+base::Result<RangeSetting> validated(const RangeSetting& range) {
   switch (range.mode) {
     case RangeMode::Auto:
       break;
     case RangeMode::Manual:
       if (!std::isfinite(range.minimum_celsius) || !std::isfinite(range.maximum_celsius)) {
-        return failure(ErrorCode::OutOfRange, "range must have a finite minimum and maximum in degC", "range");
+        return base::failure(base::ErrorCode::OutOfRange, "range must have a finite minimum and maximum in degC",
+                             "range");
       }
       if (range.minimum_celsius > range.maximum_celsius) {
-        return failure(ErrorCode::Inconsistent, "range must have its minimum at or below its maximum", "range");
+        return base::failure(base::ErrorCode::Inconsistent, "range must have its minimum at or below its maximum",
+                             "range");
       }
       return RangeSetting::manual(range.minimum_celsius + 0.0, range.maximum_celsius + 0.0);
     case RangeMode::Percentile:
       for (const auto& [percent, field] :
            {std::pair(range.low_percent, "low"), std::pair(range.high_percent, "high")}) {
         if (percent >= 0 && percent <= 100) continue;
-        return failure(ErrorCode::OutOfRange,
-                       std::string("range.") + field + " is a percentage and must be of at least 0 and of at most 100",
-                       std::string("range.") + field);
+        return base::failure(
+            base::ErrorCode::OutOfRange,
+            std::string("range.") + field + " is a percentage and must be of at least 0 and of at most 100",
+            std::string("range.") + field);
       }
       if (range.low_percent >= range.high_percent) {
-        return failure(ErrorCode::Inconsistent,
-                       "range.low must be below range.high; both are percentages from 0 to 100", "range.low");
+        return base::failure(base::ErrorCode::Inconsistent,
+                             "range.low must be below range.high; both are percentages from 0 to 100", "range.low");
       }
       return RangeSetting::percentile(range.low_percent + 0.0, range.high_percent + 0.0);
   }
@@ -112,27 +115,28 @@ FusionSettings first_view_settings(const TemperatureSummary& scene) {
   return settings;
 }
 
-Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change) {
+base::Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change) {
   FusionSettings changed = settings;
   if (change.method && *change.method != settings.method) {
     const Method* method = find_method(*change.method);
     if (!method) {
-      return failure(ErrorCode::UnknownMethod,
-                     "method '" + *change.method + "' is unknown; known are" + known_methods(), "method");
+      return base::failure(base::ErrorCode::UnknownMethod,
+                           "method '" + *change.method + "' is unknown; known are" + known_methods(), "method");
     }
     changed.method = method->id;
     changed.params = defaults_of(*method);
   }
   const Method* method = find_method(changed.method);
   if (!method) {
-    return failure(ErrorCode::UnknownMethod, "method '" + changed.method + "' is unknown; known are" + known_methods(),
-                   "method");
+    return base::failure(base::ErrorCode::UnknownMethod,
+                         "method '" + changed.method + "' is unknown; known are" + known_methods(), "method");
   }
   for (const auto& [name, value] : change.params) {
     const Parameter* parameter = find_parameter(*method, name);
     if (!parameter) {
-      return failure(ErrorCode::UnknownParameter,
-                     "method " + method->id + " has no parameter '" + name + "'; " + known_parameters(*method), name);
+      return base::failure(base::ErrorCode::UnknownParameter,
+                           "method " + method->id + " has no parameter '" + name + "'; " + known_parameters(*method),
+                           name);
     }
     BOOST_OUTCOME_TRY(changed.params[name], validated(*parameter, value));
   }
@@ -141,8 +145,8 @@ Result<FusionSettings> with_change(const FusionSettings& settings, const FusionC
   if (change.palette) {
     const Palette* palette = find_palette(*change.palette);
     if (!palette) {
-      return failure(ErrorCode::UnknownPalette,
-                     "palette '" + *change.palette + "' is unknown; known are" + known_palettes(), "palette");
+      return base::failure(base::ErrorCode::UnknownPalette,
+                           "palette '" + *change.palette + "' is unknown; known are" + known_palettes(), "palette");
     }
     changed.palette = palette->id;
   }
@@ -154,11 +158,11 @@ Result<FusionSettings> with_change(const FusionSettings& settings, const FusionC
   if (change.age.half_life_s) {
     // Written so that not-a-number is refused.
     if (!(*change.age.half_life_s >= kShortestHalfLifeSeconds && *change.age.half_life_s <= kLongestHalfLifeSeconds)) {
-      return failure(ErrorCode::OutOfRange,
-                     "age.half_life_s is a time in seconds and must be of at least " +
-                         seconds_text(kShortestHalfLifeSeconds) + " and of at most " +
-                         seconds_text(kLongestHalfLifeSeconds),
-                     "age.half_life_s");
+      return base::failure(base::ErrorCode::OutOfRange,
+                           "age.half_life_s is a time in seconds and must be of at least " +
+                               seconds_text(kShortestHalfLifeSeconds) + " and of at most " +
+                               seconds_text(kLongestHalfLifeSeconds),
+                           "age.half_life_s");
     }
     changed.age.half_life_s = *change.age.half_life_s;
   }

@@ -40,7 +40,7 @@ struct RangeSetting {
 };
 
 /// How vertices without temperature are shown: nullopt = their visible colour, else this fixed colour.
-using MissingDisplay = std::optional<Rgb8>;
+using MissingDisplay = std::optional<base::Rgb8>;
 
 /// Everything that decides a fused colour beside the vertex itself. Always complete and valid: made by
 /// default_settings() and changed by with_change() only. Two equal settings give equal pictures.
@@ -79,7 +79,7 @@ FusionSettings default_settings();
 FusionSettings first_view_settings(const TemperatureSummary& scene);
 
 /// The settings after a change, or an Error that names the field; the given settings are untouched.
-Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change);
+base::Result<FusionSettings> with_change(const FusionSettings& settings, const FusionChange& change);
 
 /// A text that is equal exactly for equal settings: the key of caches.
 std::string cache_key(const FusionSettings& settings);

@@ -2,7 +2,7 @@
 
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// Smallest and largest coordinates of something, metres relative to the scene's origin.
 struct Bounds {
@@ -10,4 +10,4 @@ struct Bounds {
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

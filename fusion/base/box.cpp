@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace spectra::server {
-
-using fusion::Vec3f;
+namespace spectra::base {
 
 Bounds empty_bounds() {
   constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -35,4 +33,4 @@ std::uint64_t morton_code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return spread(x) | spread(y) << 1 | spread(z) << 2;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::base

@@ -6,18 +6,16 @@
 #include "fusion/base/bounds.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::server {
-
-using fusion::Bounds;
+namespace spectra::base {
 
 /// Of nothing: min above max.
 Bounds empty_bounds();
-void include(Bounds& bounds, const fusion::Vec3f& p);
+void include(Bounds& bounds, const Vec3f& p);
 
 /// Smallest box of some positions; of none: min above max.
-Bounds bounds_of(std::span<const fusion::Vec3f> positions);
+Bounds bounds_of(std::span<const Vec3f> positions);
 
 /// Interleaves the lowest 21 bits of three coordinates, x lowest.
 std::uint64_t morton_code(std::uint32_t x, std::uint32_t y, std::uint32_t z);
 
-}  // namespace spectra::server
+}  // namespace spectra::base

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 std::string distance_text(double metres) {
   const bool is_far = metres >= 1000;
@@ -21,4 +21,4 @@ std::string distance_text(double metres) {
   return std::string(text.data()) + (is_far ? " km" : " m");
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -2,9 +2,9 @@
 
 #include <string>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// A distance in metres for people: three digits, and kilometres from 1000 m on (with an exponent from a million of them on).
 std::string distance_text(double metres);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// What went wrong. The numbers are a contract (exit messages, logs, scripts): never reused, never renumbered.
 enum class ErrorCode : int {
@@ -49,4 +49,4 @@ inline auto success() {
   return BOOST_OUTCOME_V2_NAMESPACE::success();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -3,7 +3,7 @@
 #include <functional>
 #include <string_view>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// Is told how far a long job is: `share` (0 .. 1) of `phase` is done; a phase that begins ends the one before. Called often
 /// and from any thread, several at a time too, so it has to return at once. An empty one is not called.
@@ -25,4 +25,4 @@ inline void report(const Progress& progress, std::string_view phase, double shar
   if (progress) progress(phase, share);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 namespace {
 
@@ -28,4 +28,4 @@ Vec3f direction_of(UpAxis up) {
   return {index % 3 == 0 ? length : 0, index % 3 == 1 ? length : 0, index % 3 == 2 ? length : 0};
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -6,7 +6,7 @@
 
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// The direction that is up in a scene's coordinates.
 enum class UpAxis : std::uint8_t { X, Y, Z, MinusX, MinusY, MinusZ };
@@ -18,4 +18,4 @@ std::string_view to_string(UpAxis up);
 /// As a vector of length 1.
 Vec3f direction_of(UpAxis up);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

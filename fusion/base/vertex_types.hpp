@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-namespace spectra::fusion {
+namespace spectra::base {
 
 /// A visible or fused colour: sRGB-encoded, 8 bits a channel, three bytes without padding.
 struct Rgb8 {
@@ -45,4 +45,4 @@ struct VertexValues {
 /// Three vertex indices, counter-clockwise as in the input.
 using Triangle = std::array<std::uint32_t, 3>;
 
-}  // namespace spectra::fusion
+}  // namespace spectra::base

@@ -44,7 +44,7 @@ Lab lab_of(const std::array<double, 3>& srgb) {
   return {116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)};
 }
 
-Lab lab_of(Rgb8 colour) {
+Lab lab_of(base::Rgb8 colour) {
   return lab_of(std::array<double, 3>{static_cast<double>(colour.r), static_cast<double>(colour.g),
                                       static_cast<double>(colour.b)});
 }

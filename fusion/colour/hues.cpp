@@ -25,8 +25,8 @@ std::size_t sector_of(int r, int g, int b, int largest, int chroma) {
 
 }  // namespace
 
-void add_to_hues(std::span<const Rgb8> colours, Hues& hues) {
-  for (const Rgb8 colour : colours) {
+void add_to_hues(std::span<const base::Rgb8> colours, Hues& hues) {
+  for (const base::Rgb8 colour : colours) {
     const int r = colour.r;
     const int g = colour.g;
     const int b = colour.b;

@@ -17,7 +17,7 @@ struct Hues {
 };
 
 /// Adds colours; the same for every order and every split.
-void add_to_hues(std::span<const Rgb8> colours, Hues& hues);
+void add_to_hues(std::span<const base::Rgb8> colours, Hues& hues);
 
 /// The hue in degrees that is seen best among these: the one with the least colour near it, weighed by the square of the
 /// cosine of the angle between. Red where nothing has colour; of equals the first from red on.

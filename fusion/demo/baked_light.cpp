@@ -5,7 +5,7 @@
 
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr std::size_t kShadowPixels = 512;
@@ -19,21 +19,21 @@ constexpr int kKeySources = 7;
 
 }  // namespace
 
-std::vector<Vec3f> vertex_normals(const SurfaceMesh& mesh) {
-  std::vector<Vec3f> normals(mesh.positions.size());
-  for (const Triangle& t : mesh.triangles) {
-    const Vec3f &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    const Vec3f e{b.x - a.x, b.y - a.y, b.z - a.z}, f{c.x - a.x, c.y - a.y, c.z - a.z};
-    const Vec3f n{e.y * f.z - e.z * f.y, e.z * f.x - e.x * f.z, e.x * f.y - e.y * f.x};
+std::vector<base::Vec3f> vertex_normals(const SurfaceMesh& mesh) {
+  std::vector<base::Vec3f> normals(mesh.positions.size());
+  for (const base::Triangle& t : mesh.triangles) {
+    const base::Vec3f &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    const base::Vec3f e{b.x - a.x, b.y - a.y, b.z - a.z}, f{c.x - a.x, c.y - a.y, c.z - a.z};
+    const base::Vec3f n{e.y * f.z - e.z * f.y, e.z * f.x - e.x * f.z, e.x * f.y - e.y * f.x};
     for (const std::uint32_t v : t) {
       normals[v].x += n.x;
       normals[v].y += n.y;
       normals[v].z += n.z;
     }
   }
-  for (Vec3f& n : normals) {
+  for (base::Vec3f& n : normals) {
     const float l = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
-    n = l > 0 ? Vec3f{n.x / l, n.y / l, n.z / l} : Vec3f{0, 1, 0};
+    n = l > 0 ? base::Vec3f{n.x / l, n.y / l, n.z / l} : base::Vec3f{0, 1, 0};
   }
   return normals;
 }
@@ -59,7 +59,7 @@ BakedLight::BakedLight(const SurfaceMesh& stand_in) {
   std::vector<ImagePoint> points(stand_in.positions.size());
   for (Source& source : sources_) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Vec3f& p = stand_in.positions[i];
+      const base::Vec3f& p = stand_in.positions[i];
       const Vec q = Vec{p.x, p.y, p.z} - kSceneCentre;
       points[i] = {static_cast<float>((dot(q, source.right) + kSceneRadius) * kPixelsPerMetre),
                    static_cast<float>((dot(q, source.up) + kSceneRadius) * kPixelsPerMetre),
@@ -100,4 +100,4 @@ Colour BakedLight::at(Vec position, Vec normal) const {
   return light;
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

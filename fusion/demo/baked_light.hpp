@@ -4,10 +4,10 @@
 
 #include "fusion/demo/depth_image.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// Unit normals of the vertices, from the triangles around each.
-std::vector<Vec3f> vertex_normals(const SurfaceMesh& mesh);
+std::vector<base::Vec3f> vertex_normals(const SurfaceMesh& mesh);
 
 /// Soft daylight with shadows, found once on a stand-in of the scene and then asked at any point of it.
 class BakedLight {
@@ -28,4 +28,4 @@ class BakedLight {
   std::vector<Source> sources_;
 };
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

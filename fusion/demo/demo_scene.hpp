@@ -7,7 +7,7 @@
 #include "fusion/base/progress.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
-namespace spectra::fusion {
+namespace spectra::demo {
 
 /// The sizes demo_scene() can make; a count outside them is brought to the nearer one.
 inline constexpr std::uint64_t kDemoSceneLeastVertices = 5'000;
@@ -27,23 +27,23 @@ struct DemoSceneOptions {
 /// z = -2.8, open at the front. A good first camera: from (-0.50, 2.00, 4.75) to (-0.05, 0.65, -0.60), up (0, 1, 0), a
 /// vertical angle of 45 to 50 degrees.
 /// `progress` is told of kModellingPhase.
-MultispectralMesh demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
+mesh::MultispectralMesh demo_scene(const DemoSceneOptions& options, const base::Progress& progress = {});
 
 /// The demo scene and which of its vertices are the bare skin of the person, for those who ask whether it is found.
 struct LabelledDemoScene {
-  MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   std::vector<std::uint8_t> is_skin;  ///< One a vertex: 1 or 0.
 };
-LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
+LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const base::Progress& progress = {});
 
 /// The surfaces of the demo scene as they are, for simulated sensors: all of them, whether a camera saw them or not, with their true
 /// temperatures and the colours that a camera sees.
-MultispectralMesh true_demo_scene(const DemoSceneOptions& options, const Progress& progress = {});
+mesh::MultispectralMesh true_demo_scene(const DemoSceneOptions& options, const base::Progress& progress = {});
 
 /// A place in the demo scene whose temperature is known, for tests and for trying out the tools.
 struct DemoLandmark {
   std::string_view name;  ///< For example "mug", "face", "exit_sign".
-  Vec3f position;         ///< On the surface, to about a centimetre; the same for every seed.
+  base::Vec3f position;   ///< On the surface, to about a centimetre; the same for every seed.
   float lowest_celsius;   ///< The nearest vertex of a scene of the default size lies between these.
   float highest_celsius;
 };
@@ -51,4 +51,4 @@ struct DemoLandmark {
 /// Everything in the scene that is hot, cold, alive or written on.
 std::vector<DemoLandmark> demo_landmarks();
 
-}  // namespace spectra::fusion
+}  // namespace spectra::demo

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
-DepthImage draw(const std::vector<ImagePoint>& points, const std::vector<Triangle>& triangles,
+DepthImage draw(const std::vector<ImagePoint>& points, const std::vector<base::Triangle>& triangles,
                 const std::vector<float>& values, std::size_t width, std::size_t height) {
   DepthImage image{width, height, std::vector<float>(width * height, 0.0F), {}};
   if (!values.empty()) image.value.assign(width * height, 0.0F);
   const float right = static_cast<float>(width), bottom = static_cast<float>(height);
-  for (const Triangle& t : triangles) {
+  for (const base::Triangle& t : triangles) {
     const ImagePoint &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
     if (a.nearness <= 0 || b.nearness <= 0 || c.nearness <= 0) continue;
     const float area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
@@ -37,4 +37,4 @@ DepthImage draw(const std::vector<ImagePoint>& points, const std::vector<Triangl
   return image;
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

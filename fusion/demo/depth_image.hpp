@@ -5,7 +5,7 @@
 
 #include "fusion/demo/tessellator.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// A vertex in an image: x and y in pixels (centres at .5) and a nearness that is linear across the image plane and
 /// larger for what is nearer. Nearness 0 or less is behind the camera and is not drawn.
@@ -21,7 +21,7 @@ struct DepthImage {
 };
 
 /// Draws triangles with a depth buffer. `values` is one number a vertex, or empty.
-DepthImage draw(const std::vector<ImagePoint>& points, const std::vector<Triangle>& triangles,
+DepthImage draw(const std::vector<ImagePoint>& points, const std::vector<base::Triangle>& triangles,
                 const std::vector<float>& values, std::size_t width, std::size_t height);
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

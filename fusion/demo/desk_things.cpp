@@ -5,7 +5,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 /// What a screen shows at (u, v) in 0..1, v up.
@@ -240,4 +240,4 @@ void add_desk_things(Tessellator& out, std::uint64_t seed) {
   add_solid_tube(out, {-1.33, 0.03, -1.5}, {-1.3, 0.02, -0.9}, {-0.2, 0.03, -0.7}, 0.008, 0.5, black, seed + 371);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

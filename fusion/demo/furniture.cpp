@@ -4,7 +4,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 void add_desk(Tessellator& out, const Frame& top, Vec half, std::uint64_t seed, double hot_x, double hot_z) {
@@ -104,4 +104,4 @@ void add_furniture(Tessellator& out, std::uint64_t seed) {
   add_folders(out, seed + 240);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

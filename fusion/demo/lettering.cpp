@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr double kAdvance = 5.9;  // of a cell 4 wide and 6 high
@@ -143,4 +143,4 @@ double Lettering::ink(double x, double y, double edge_m) const {
   return most;
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

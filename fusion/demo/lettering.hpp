@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// Lines of text on a flat sign, in a stroke font of its own (capitals, digits and . : - ! / >).
 class Lettering {
@@ -25,4 +25,4 @@ class Lettering {
   std::vector<Glyph> glyphs_;
 };
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

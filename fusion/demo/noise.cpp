@@ -1,6 +1,6 @@
 #include "fusion/demo/noise.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 double lattice_value(std::int64_t x, std::int64_t y, std::int64_t z, std::uint64_t seed) {
@@ -40,4 +40,4 @@ double fractal_noise(Vec p, int octaves, std::uint64_t seed) {
   return sum;
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -4,7 +4,7 @@
 
 #include "fusion/demo/vector.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// Scrambles 64 bits (the finaliser of SplitMix64): the root of all randomness of the demo scene.
 inline std::uint64_t scramble(std::uint64_t x) {
@@ -43,4 +43,4 @@ double smooth_noise(Vec p, std::uint64_t seed);
 /// Noise with detail: `octaves` of smooth_noise, each of half the size and half the strength; about -1..1.
 double fractal_noise(Vec p, int octaves, std::uint64_t seed);
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -2,7 +2,7 @@
 
 #include "fusion/demo/noise.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 double ambient_celsius(Vec p) {
   return 17.1 + 0.65 * p.y - 0.18 * p.z + 0.25 * smooth_noise(p * 0.7, 11);
@@ -96,4 +96,4 @@ void add_solid_tube(Tessellator& out, Vec a, Vec b, Vec c, double radius, double
   });
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -5,7 +5,7 @@
 #include "fusion/demo/lettering.hpp"
 #include "fusion/demo/tessellator.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// The room: x from -kHalfWidth to kHalfWidth, floor at y = 0, back wall at z = -kHalfDepth, open towards the viewer.
 inline constexpr double kHalfWidth = 3.8, kHalfDepth = 2.8, kRoomHeight = 2.9;
@@ -59,4 +59,4 @@ void add_solid_tube(Tessellator& out, Vec a, Vec b, Vec c, double radius, double
 /// A point of the curve a, b, c at t, and a frame across it (`out` along the curve).
 Frame curve_frame(Vec a, Vec b, Vec c, double t);
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -4,7 +4,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr Colour kDustySkin{168, 148, 132};
@@ -168,4 +168,4 @@ void add_person(Tessellator& out, std::uint64_t seed) {
               seed + 560);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -4,7 +4,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr double kPipeHeight = 0.22, kPipeRadius = 0.028, kRiserX = -1.16;
@@ -239,4 +239,4 @@ void add_room(Tessellator& out, std::uint64_t seed) {
   add_hanging(out, seed);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -5,7 +5,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr int kBlockTries = 3200;
@@ -136,4 +136,4 @@ void add_rubble(Tessellator& out, std::uint64_t seed) {
                 timber, seed + 414);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr double kNearestMetres = 0.15;
@@ -31,7 +31,7 @@ ScanView::ScanView(const ScanPose& pose, std::size_t width, std::size_t height, 
   image_.height = height;
   std::vector<ImagePoint> points(stand_in.positions.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3f& p = stand_in.positions[i];
+    const base::Vec3f& p = stand_in.positions[i];
     const ScanPoint q = project({p.x, p.y, p.z});
     if (q.depth < kNearestMetres) continue;
     points[i] = {static_cast<float>(q.x + 0.5), static_cast<float>(q.y + 0.5), static_cast<float>(1 / q.depth)};
@@ -75,4 +75,4 @@ bool ScanCoverage::has_seen(Vec position, Vec normal) const {
                      [&](const ScanView& view) { return view.sees(position, normal, -0.05, found, slope); });
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -4,7 +4,7 @@
 
 #include "fusion/demo/depth_image.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// Where the robot stopped to look.
 struct ScanPose {
@@ -49,4 +49,4 @@ class ScanCoverage {
   std::vector<ScanView> views_;
 };
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

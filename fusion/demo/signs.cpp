@@ -4,7 +4,7 @@
 #include "fusion/demo/noise.hpp"
 #include "fusion/demo/office.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 /// What is printed at a point of a sign, metres from its middle.
@@ -139,4 +139,4 @@ void add_signs(Tessellator& out, std::uint64_t seed) {
   add_solid_box(out, carton, {0.25, 0.19, 0.19}, 0.008, 0.75, cardboard, seed + 106, false);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

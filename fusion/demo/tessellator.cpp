@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 std::uint8_t byte_of(double level) {
@@ -170,4 +170,4 @@ void Tessellator::box(Vec half, double bevel, double relative, bool has_bottom, 
   if (has_bottom) lid(0);
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -7,7 +7,7 @@
 #include "fusion/base/vertex_types.hpp"
 #include "fusion/demo/vector.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// What a part of the scene is at one point of its surface.
 struct SurfacePoint {
@@ -21,12 +21,12 @@ struct SurfacePoint {
 
 /// The surfaces of the scene before light and camera: flat arrays over all vertices.
 struct SurfaceMesh {
-  std::vector<Vec3f> positions;
-  std::vector<Rgb8> colours;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Rgb8> colours;
   std::vector<float> celsius;
   std::vector<std::uint8_t> dust, glow;  ///< Of 255.
   std::vector<std::uint8_t> is_skin;     ///< 1 where the person is bare.
-  std::vector<Triangle> triangles;
+  std::vector<base::Triangle> triangles;
 };
 
 /// Cuts parametric surfaces into triangles at a given distance between vertices; or, without a mesh, only counts what
@@ -64,4 +64,4 @@ class Tessellator {
   std::uint64_t vertex_count_ = 0;
 };
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -7,7 +7,7 @@
 
 #include "fusion/demo/noise.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr std::size_t kWidth = 384, kHeight = 288;
@@ -103,4 +103,4 @@ float ThermalSensor::celsius_at(Vec position, Vec normal) const {
   return weights > 0 ? static_cast<float>(sum / weights) : std::numeric_limits<float>::quiet_NaN();
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

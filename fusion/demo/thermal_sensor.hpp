@@ -5,7 +5,7 @@
 
 #include "fusion/demo/scan_view.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// The thermal cameras of the demo scene: a few views of 384 x 288 pixels with the faults of a real sensor (point
 /// spread, noise of 50 mK, quantisation, a drift from view to view), taken of a stand-in of the scene.
@@ -24,4 +24,4 @@ class ThermalSensor {
   std::vector<View> views_;
 };
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

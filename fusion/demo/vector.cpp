@@ -1,6 +1,6 @@
 #include "fusion/demo/vector.hpp"
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -40,4 +40,4 @@ Frame facing(Vec origin, Vec out, Vec up) {
   return {origin, x, cross(z, x), z};
 }
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

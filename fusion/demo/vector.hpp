@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 
 /// A point or direction in metres: x to the right, y up, z towards the viewer.
 struct Vec {
@@ -85,4 +85,4 @@ struct Frame {
 /// A frame whose `out` is along `out` and whose `up` is as near to `up` as that allows.
 Frame facing(Vec origin, Vec out, Vec up = {0, 1, 0});
 
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

@@ -11,22 +11,22 @@
 #include <system_error>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
-Result<BlockFile> BlockFile::open(const std::filesystem::path& path) {
+base::Result<BlockFile> BlockFile::open(const std::filesystem::path& path) {
   // O_NONBLOCK: opening a named pipe must not wait for a writer that never comes.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     const int error = errno;
     const bool is_missing = error == ENOENT || error == ENOTDIR;
-    return failure(is_missing ? ErrorCode::FileNotFound : ErrorCode::FileUnreadable,
-                   is_missing ? "no such file" : "cannot be opened: " + std::generic_category().message(error));
+    return base::failure(is_missing ? base::ErrorCode::FileNotFound : base::ErrorCode::FileUnreadable,
+                         is_missing ? "no such file" : "cannot be opened: " + std::generic_category().message(error));
   }
   struct stat facts {};
   if (::fstat(descriptor, &facts) != 0 || !S_ISREG(facts.st_mode)) {
     ::close(descriptor);
-    return failure(ErrorCode::FileUnreadable,
-                   S_ISDIR(facts.st_mode) ? "is a folder, not a file" : "is not a regular file");
+    return base::failure(base::ErrorCode::FileUnreadable,
+                         S_ISDIR(facts.st_mode) ? "is a folder, not a file" : "is not a regular file");
   }
   ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_SEQUENTIAL);
   const auto size_bytes = static_cast<std::uint64_t>(facts.st_size);
@@ -110,4 +110,4 @@ void BlockFile::seek(std::uint64_t position) {
   end_ = 0;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

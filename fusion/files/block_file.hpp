@@ -12,7 +12,7 @@
 #include "fusion/base/error.hpp"
 #include "fusion/files/gzip_file.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Reads a regular file from front to back through one buffer of fixed size. A file that shrinks meanwhile only ends
 /// early (a mapped one would end the process). A gzip file is read as what it unpacks to.
@@ -23,7 +23,7 @@ class BlockFile {
 
   /// FileNotFound, or FileUnreadable (also for what is not a regular file: its size would not bound anything), or the errors
   /// of GzipFile::open().
-  static Result<BlockFile> open(const std::filesystem::path& path);
+  static base::Result<BlockFile> open(const std::filesystem::path& path);
   ~BlockFile();
   BlockFile(BlockFile&& other) noexcept;
   BlockFile& operator=(BlockFile&& other) noexcept;
@@ -69,4 +69,4 @@ class BlockFile {
   std::function<void(double)> watcher_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -1,6 +1,6 @@
 #include "fusion/files/comment_words.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -41,4 +41,4 @@ std::vector<std::string> comment_words(std::string_view line) {
   return words;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

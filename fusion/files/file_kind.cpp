@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -50,4 +50,4 @@ std::string_view file_kind(std::string_view first_bytes) {
   return {};
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::files {
 namespace {
 
 /// Appends to the model's one buffer; what is added begins at a multiple of four bytes.
@@ -52,7 +52,7 @@ class BufferWriter {
 
 /// Turned so that what was `up` is +Y. Only exchanges and negates coordinates.
 template <class Vector>
-Vector turned_upright(const Vector& v, const fusion::Vec3f& up) {
+Vector turned_upright(const Vector& v, const base::Vec3f& up) {
   using Scalar = decltype(v.x);
   if (up.x != 0) return {-static_cast<Scalar>(up.x) * v.y, static_cast<Scalar>(up.x) * v.x, v.z};
   const auto sign = static_cast<Scalar>(up.y != 0 ? up.y : up.z);
@@ -77,7 +77,7 @@ float stored_celsius(float celsius) {
   return std::clamp(celsius, -kLargest, kLargest);
 }
 
-void set_position_bounds(tinygltf::Accessor& accessor, std::span<const fusion::Vec3f> positions) {
+void set_position_bounds(tinygltf::Accessor& accessor, std::span<const base::Vec3f> positions) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   std::array<float, 3> low{kInfinity, kInfinity, kInfinity};
   std::array<float, 3> high{-kInfinity, -kInfinity, -kInfinity};
@@ -94,21 +94,21 @@ void set_position_bounds(tinygltf::Accessor& accessor, std::span<const fusion::V
 
 }  // namespace
 
-fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                     fusion::Vec3f up) {
+base::Result<std::string> glb_file(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                                   base::Vec3f up) {
   const std::size_t vertex_count = mesh.vertex_count();
   const std::size_t size_bytes =
       vertex_count * (12 + 8 + (mesh.has_temperature ? 4U : 0U)) + mesh.triangle_count() * 12;
   if (size_bytes > std::numeric_limits<std::uint32_t>::max() - 65'536U) {
-    return fusion::failure(fusion::ErrorCode::TooLarge,
-                           "the scene needs " + std::to_string(size_bytes) + " bytes and a GLB holds at most 4 GiB");
+    return base::failure(base::ErrorCode::TooLarge,
+                         "the scene needs " + std::to_string(size_bytes) + " bytes and a GLB holds at most 4 GiB");
   }
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "Spectra";
   tinygltf::Node node;
   node.name = mesh.name;
-  const fusion::Vec3d origin = turned_upright(mesh.origin, up);
+  const base::Vec3d origin = turned_upright(mesh.origin, up);
   node.translation = {origin.x, origin.y, origin.z};
 
   if (vertex_count > 0) {
@@ -117,10 +117,10 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
     tinygltf::Primitive primitive;
     primitive.mode = mesh.is_point_cloud() ? TINYGLTF_MODE_POINTS : TINYGLTF_MODE_TRIANGLES;
 
-    std::vector<fusion::Vec3f> positions(vertex_count);
+    std::vector<base::Vec3f> positions(vertex_count);
     std::transform(mesh.positions().begin(), mesh.positions().end(), positions.begin(),
-                   [up](const fusion::Vec3f& p) { return turned_upright(p, up); });
-    const std::size_t position_bytes = positions.size() * sizeof(fusion::Vec3f);
+                   [up](const base::Vec3f& p) { return turned_upright(p, up); });
+    const std::size_t position_bytes = positions.size() * sizeof(base::Vec3f);
     std::memcpy(writer.add_view(position_bytes, TINYGLTF_TARGET_ARRAY_BUFFER), positions.data(), position_bytes);
     const int position = writer.add_accessor(TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3, vertex_count);
     set_position_bounds(model.accessors[static_cast<std::size_t>(position)], positions);
@@ -155,7 +155,7 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
 
     if (!mesh.is_point_cloud()) {
       const auto& triangles = mesh.triangles();
-      const std::size_t bytes = triangles.size() * sizeof(fusion::Triangle);
+      const std::size_t bytes = triangles.size() * sizeof(base::Triangle);
       std::memcpy(writer.add_view(bytes, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER), triangles.data(), bytes);
       primitive.indices =
           writer.add_accessor(TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR, triangles.size() * 3);
@@ -182,9 +182,9 @@ fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std:
 
   std::ostringstream out;
   if (!tinygltf::TinyGLTF().WriteGltfSceneToStream(&model, out, false, true)) {
-    return fusion::failure(fusion::ErrorCode::FileUnwritable, "the glTF writer refused the scene");
+    return base::failure(base::ErrorCode::FileUnwritable, "the glTF writer refused the scene");
   }
   return std::move(out).str();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::files

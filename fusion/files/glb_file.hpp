@@ -7,7 +7,7 @@
 #include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
-namespace spectra::server {
+namespace spectra::files {
 
 /// Stands for a missing temperature in a GLB: colder than anything can be.
 inline constexpr float kGlbMissingCelsius = -1000;
@@ -17,7 +17,7 @@ inline constexpr float kGlbMissingCelsius = -1000;
 /// glTF wants it, exactly, by exchanging coordinates. COLOR_0 is linear, as glTF wants it: normalised unsigned shorts,
 /// opaque, each the nearest to the sRGB channel's linear value, so that a viewer shows the colour that went in. TooLarge
 /// when a buffer would pass the 4 GiB of the format.
-fusion::Result<std::string> glb_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                     fusion::Vec3f up);
+base::Result<std::string> glb_file(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                                   base::Vec3f up);
 
-}  // namespace spectra::server
+}  // namespace spectra::files

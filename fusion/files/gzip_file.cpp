@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 struct GzipFile::Handle {
   explicit Handle(gzFile opened) : file(opened) {}
@@ -28,11 +28,11 @@ bool GzipFile::is_gzip(std::span<const unsigned char> first_bytes) {
   return first_bytes.size() >= 2 && first_bytes[0] == 0x1f && first_bytes[1] == 0x8b;
 }
 
-Result<GzipFile> GzipFile::open(int descriptor, std::uint64_t packed_bytes) {
+base::Result<GzipFile> GzipFile::open(int descriptor, std::uint64_t packed_bytes) {
   const gzFile opened = ::gzdopen(descriptor, "rb");
   if (opened == nullptr) {
     ::close(descriptor);
-    return failure(ErrorCode::FileUnreadable, "cannot be unpacked: out of memory");
+    return base::failure(base::ErrorCode::FileUnreadable, "cannot be unpacked: out of memory");
   }
   constexpr unsigned kPackedBufferBytes = 128 * 1024;
   ::gzbuffer(opened, kPackedBufferBytes);
@@ -45,19 +45,19 @@ Result<GzipFile> GzipFile::open(int descriptor, std::uint64_t packed_bytes) {
     int status = Z_OK;
     ::gzerror(opened, &status);
     if (status == Z_BUF_ERROR) {
-      return failure(ErrorCode::Truncated,
-                     "the gzip data end early, after " + std::to_string(file.unpacked_bytes_) + " unpacked bytes");
+      return base::failure(base::ErrorCode::Truncated, "the gzip data end early, after " +
+                                                           std::to_string(file.unpacked_bytes_) + " unpacked bytes");
     }
     if (count < 0 || status != Z_OK) {
-      return failure(ErrorCode::BadValue,
-                     "the gzip data are damaged after " + std::to_string(file.unpacked_bytes_) + " unpacked bytes");
+      return base::failure(base::ErrorCode::BadValue, "the gzip data are damaged after " +
+                                                          std::to_string(file.unpacked_bytes_) + " unpacked bytes");
     }
     if (count == 0) break;
     file.unpacked_bytes_ += static_cast<std::uint64_t>(count);
     if (file.unpacked_bytes_ > limit) {
-      return failure(ErrorCode::TooLarge, "the gzip data unpack to more than " + std::to_string(kMaxRatio) +
-                                              " times their " + std::to_string(packed_bytes) +
-                                              " bytes; unpack the file first if you trust it (gunzip)");
+      return base::failure(base::ErrorCode::TooLarge, "the gzip data unpack to more than " + std::to_string(kMaxRatio) +
+                                                          " times their " + std::to_string(packed_bytes) +
+                                                          " bytes; unpack the file first if you trust it (gunzip)");
     }
   }
   return file;
@@ -70,4 +70,4 @@ std::ptrdiff_t GzipFile::read(std::uint64_t position, std::span<unsigned char> b
   return ::gzread(handle_->file, bytes.data(), static_cast<unsigned>(std::min(bytes.size(), kMaxBytes)));
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -7,7 +7,7 @@
 
 #include "fusion/base/error.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// A gzip file, unpacked as it is read; nothing of it is ever held whole. Reading backwards unpacks again from the beginning.
 class GzipFile {
@@ -22,7 +22,7 @@ class GzipFile {
 
   /// Takes the open file of that size, and unpacks it once to its end to know how much is in it: Truncated, BadValue
   /// (damaged) or TooLarge.
-  static Result<GzipFile> open(int descriptor, std::uint64_t packed_bytes);
+  static base::Result<GzipFile> open(int descriptor, std::uint64_t packed_bytes);
   ~GzipFile();
   GzipFile(GzipFile&&) noexcept;
   GzipFile& operator=(GzipFile&&) noexcept;
@@ -40,4 +40,4 @@ class GzipFile {
   std::uint64_t unpacked_bytes_ = 0;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -48,7 +48,7 @@ int sync_descriptor(int descriptor) {
 
 }  // namespace
 
-Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
+base::Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
   OutputFile file;
   file.path_ = path;
   struct stat facts {};
@@ -104,21 +104,21 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   return *this;
 }
 
-Result<void> OutputFile::write(std::span<const std::byte> bytes) {
+base::Result<void> OutputFile::write(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return error("cannot be written", errno);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
-  return success();
+  return base::success();
 }
 
-Result<void> OutputFile::commit() {
+base::Result<void> OutputFile::commit() {
   return commit_all({this, 1});
 }
 
-Result<void> OutputFile::commit_all(std::span<OutputFile> files) {
+base::Result<void> OutputFile::commit_all(std::span<OutputFile> files) {
   for (OutputFile& file : files) {
     BOOST_OUTCOME_TRYV(file.write_out());
   }
@@ -131,7 +131,7 @@ Result<void> OutputFile::commit_all(std::span<OutputFile> files) {
   for (const OutputFile& file : files) {
     BOOST_OUTCOME_TRYV(file.sync_folder());
   }
-  return success();
+  return base::success();
 }
 
 void OutputFile::abandon_all() {
@@ -140,22 +140,22 @@ void OutputFile::abandon_all() {
   for (const auto& name : unfinished.names) ::unlink(name.c_str());
 }
 
-Result<void> OutputFile::write_out() {
+base::Result<void> OutputFile::write_out() {
   if (!temporary_.empty() && sync_descriptor(descriptor_) != 0) return error("cannot be written", errno);
   if (::close(std::exchange(descriptor_, -1)) != 0) return error("cannot be written", errno);
-  return success();
+  return base::success();
 }
 
-Result<void> OutputFile::put_in_place() {
-  if (temporary_.empty()) return success();
+base::Result<void> OutputFile::put_in_place() {
+  if (temporary_.empty()) return base::success();
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) return error("cannot be put in place", errno);
   unfinished_files().names.erase(temporary_);
   temporary_.clear();
-  return success();
+  return base::success();
 }
 
-Result<void> OutputFile::sync_folder() const {
-  if (target_.empty()) return success();
+base::Result<void> OutputFile::sync_folder() const {
+  if (target_.empty()) return base::success();
   const int folder = ::open(target_.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return error("is in place, but its folder cannot be synced", errno);
   const int result = sync_descriptor(folder);
@@ -165,12 +165,12 @@ Result<void> OutputFile::sync_folder() const {
   if (result != 0 && error_number != EINVAL) {
     return error("is in place, but its folder cannot be synced", error_number);
   }
-  return success();
+  return base::success();
 }
 
-Error OutputFile::error(const std::string& what, int error_number) const {
-  return {ErrorCode::FileUnwritable, path_.string() + " " + what + ": " + std::generic_category().message(error_number),
-          path_.string()};
+base::Error OutputFile::error(const std::string& what, int error_number) const {
+  return {base::ErrorCode::FileUnwritable,
+          path_.string() + " " + what + ": " + std::generic_category().message(error_number), path_.string()};
 }
 
 void OutputFile::discard() {
@@ -183,4 +183,4 @@ void OutputFile::discard() {
   temporary_.clear();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -9,7 +9,7 @@
 #include "fusion/files/ply_values.hpp"
 #include "fusion/files/scene_origin.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -22,15 +22,15 @@ bool is_face_element(const PlyElement& element) {
 }
 
 struct Box {
-  Vec3d min, max;
+  base::Vec3d min, max;
 
-  void add(const Vec3d& p) {
+  void add(const base::Vec3d& p) {
     min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
     max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
   }
 };
 
-bool is_position(const Vec3d& p) {
+bool is_position(const base::Vec3d& p) {
   return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
          std::abs(p.z) <= kLargestCoordinate;
 }
@@ -45,7 +45,7 @@ PlyBodyReader::PlyBodyReader(BlockFile& file, const PlyHeader& header, const Ply
       handlers_(handlers),
       sample_(header.find("vertex")->count) {}
 
-Result<PlyBodyFacts> PlyBodyReader::read() {
+base::Result<PlyBodyFacts> PlyBodyReader::read() {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   facts_.min = {kInfinity, kInfinity, kInfinity};
   facts_.max = {-kInfinity, -kInfinity, -kInfinity};
@@ -79,7 +79,7 @@ Result<PlyBodyFacts> PlyBodyReader::read() {
   return facts_;
 }
 
-Result<void> PlyBodyReader::read_part(Part part, PlyFaceReader& faces, PlyCursor& cursor) {
+base::Result<void> PlyBodyReader::read_part(Part part, PlyFaceReader& faces, PlyCursor& cursor) {
   const PlySchema& schema = interpretation_.schema;
   const PlyElement* const vertices = header_.find("vertex");
   const PlyElement* const polygons = header_.find("face");
@@ -96,10 +96,10 @@ Result<void> PlyBodyReader::read_part(Part part, PlyFaceReader& faces, PlyCursor
       BOOST_OUTCOME_TRY(cursor.skip_element(element));
     }
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElement& element) {
+base::Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElement& element) {
   PlyVertexReader reader(cursor, element, interpretation_.schema);
   for (;;) {
     BOOST_OUTCOME_TRY(const PlyRawVertices raw, reader.next());
@@ -107,12 +107,12 @@ Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElement& e
     BOOST_OUTCOME_TRY(hand_on(raw, element));
   }
   if (facts_.left_out_vertex_count == element.count) {
-    return failure(ErrorCode::BadValue, "no vertex has a position (a finite one, within 1e30 m)");
+    return base::failure(base::ErrorCode::BadValue, "no vertex has a position (a finite one, within 1e30 m)");
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& element) {
+base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& element) {
   judge_positions(raw.positions, raw.first_vertex);
   const std::size_t count = raw.positions.size();
   const PlySchema& schema = interpretation_.schema;
@@ -137,7 +137,7 @@ Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& elemen
         static_cast<std::uint64_t>(std::count_if(block.temperature_celsius.begin(), block.temperature_celsius.end(),
                                                  [](float celsius) { return std::isnan(celsius); }));
   }
-  if (!handlers_.vertices) return success();
+  if (!handlers_.vertices) return base::success();
   auto result = handlers_.vertices(block);
   handler_has_failed_ = !result;
   return result;
@@ -155,16 +155,16 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),
                                    [&](std::uint64_t vertex) { return faces.is_referenced(vertex); });
   // Elsewhere in the scene it is what was measured again and again.
-  if (hole->is_far || (!is_used && hole->place == Vec3d{}))
+  if (hole->is_far || (!is_used && hole->place == base::Vec3d{}))
     facts_.hole = Hole{hole->place};
   else if (is_used)
     facts_.crowded_place = hole->place;
 }
 
 /// Brings the positions to metres, and finds those that are none.
-void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t first_vertex) {
+void PlyBodyReader::judge_positions(std::span<base::Vec3d> positions, std::uint64_t first_vertex) {
   if (const double metres = interpretation_.metres_per_unit; metres != 1) {
-    for (Vec3d& p : positions) p = {p.x * metres, p.y * metres, p.z * metres};
+    for (base::Vec3d& p : positions) p = {p.x * metres, p.y * metres, p.z * metres};
   }
   left_out_.clear();
   sample_.add(first_vertex, positions);
@@ -172,9 +172,9 @@ void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t fi
   bool all_good = true;
   const std::optional<Hole>& hole = interpretation_.hole;
   if (hole) {
-    for (const Vec3d& p : positions) all_good = all_good && !hole->has(p);
+    for (const base::Vec3d& p : positions) all_good = all_good && !hole->has(p);
   }
-  for (const Vec3d& p : positions) {
+  for (const base::Vec3d& p : positions) {
     all_good = all_good && is_position(p);
     box.add(p);
   }
@@ -197,7 +197,7 @@ void PlyBodyReader::judge_positions(std::span<Vec3d> positions, std::uint64_t fi
   facts_.max = box.max;
 }
 
-Result<void> PlyBodyReader::convert_colours(const PlyRawVertices& raw, const PlyElement& element) {
+base::Result<void> PlyBodyReader::convert_colours(const PlyRawVertices& raw, const PlyElement& element) {
   const ColourConversion& conversion = interpretation_.colours;
   if (header_.format == PlyFormat::Ascii && interpretation_.schema.colour_coding == ColourCoding::Channels) {
     // In a text file a number may be larger than its type.
@@ -208,15 +208,16 @@ Result<void> PlyBodyReader::convert_colours(const PlyRawVertices& raw, const Ply
       const auto bad =
           std::find_if(values.begin(), values.end(), [](double value) { return value < 0 || value > 255; });
       if (bad == values.end()) continue;
-      return failure(ErrorCode::BadValue,
-                     "vertex " + std::to_string(raw.first_vertex + static_cast<std::uint64_t>(bad - values.begin())) +
-                         " has the colour value " + number_text(*bad) + " in '" + printable(property.name) +
-                         "', which must be a whole number from 0 to 255 for the type uchar");
+      return base::failure(base::ErrorCode::BadValue,
+                           "vertex " +
+                               std::to_string(raw.first_vertex + static_cast<std::uint64_t>(bad - values.begin())) +
+                               " has the colour value " + number_text(*bad) + " in '" + printable(property.name) +
+                               "', which must be a whole number from 0 to 255 for the type uchar");
     }
   }
   colours_.resize(raw.positions.size());
   conversion.convert({raw.colours[0], raw.colours[1], raw.colours[2]}, colours_, facts_.clamped_colour_count);
-  return success();
+  return base::success();
 }
 
 void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
@@ -235,4 +236,4 @@ void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
   facts_.temperature.no_data_seen |= ignored.no_data_seen;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

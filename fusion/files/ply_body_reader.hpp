@@ -8,7 +8,7 @@
 #include "fusion/files/ply_stream.hpp"
 #include "fusion/files/ply_vertex_reader.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// One reading of the body of a PLY file: the vertices first, then the faces, wherever they stand in it. Used once.
 class PlyBodyReader {
@@ -16,18 +16,18 @@ class PlyBodyReader {
   /// All of it outlives the reader.
   PlyBodyReader(BlockFile& file, const PlyHeader& header, const PlyInterpretation& interpretation,
                 const PlyHandlers& handlers);
-  Result<PlyBodyFacts> read();
+  base::Result<PlyBodyFacts> read();
   /// The error of read() came from a handler: it is not about this file.
   bool handler_has_failed() const { return handler_has_failed_; }
 
  private:
   /// Of the two passes that a file with its faces first needs.
   enum class Part { Everything, Vertices, Faces };
-  Result<void> read_part(Part part, PlyFaceReader& faces, PlyCursor& cursor);
-  Result<void> read_vertices(PlyCursor& cursor, const PlyElement& element);
-  Result<void> hand_on(PlyRawVertices raw, const PlyElement& element);
-  void judge_positions(std::span<Vec3d> positions, std::uint64_t first_vertex);
-  Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
+  base::Result<void> read_part(Part part, PlyFaceReader& faces, PlyCursor& cursor);
+  base::Result<void> read_vertices(PlyCursor& cursor, const PlyElement& element);
+  base::Result<void> hand_on(PlyRawVertices raw, const PlyElement& element);
+  void judge_positions(std::span<base::Vec3d> positions, std::uint64_t first_vertex);
+  base::Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
   void conclude_positions(const PlyFaceReader& faces);
   void convert_temperatures(const PlyRawVertices& raw);
 
@@ -40,9 +40,9 @@ class PlyBodyReader {
 
   VertexBits is_left_out_;               ///< Empty until the first one.
   std::vector<std::uint32_t> left_out_;  ///< Of the block.
-  std::vector<Rgb8> colours_;
+  std::vector<base::Rgb8> colours_;
   std::vector<float> temperatures_;
   bool handler_has_failed_ = false;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

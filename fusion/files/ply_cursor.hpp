@@ -8,7 +8,7 @@
 #include "fusion/files/block_file.hpp"
 #include "fusion/files/ply_header.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// The place in the body of a PLY file where reading stands: gives single values, checks them against the bytes that are
 /// there, and knows what to call the place in a message. The one that reads an element says so and counts its entries.
@@ -31,31 +31,31 @@ class PlyCursor {
   std::uint64_t entry = 0;
 
   /// Passes over all entries of the element, of whatever properties.
-  Result<void> skip_element(const PlyElement& element);
+  base::Result<void> skip_element(const PlyElement& element);
 
   /// In a text file every entry stands on a line of its own; empty lines are passed over.
-  Result<void> begin_entry(const PlyElement& element);
-  Result<void> end_entry();
+  base::Result<void> begin_entry(const PlyElement& element);
+  base::Result<void> end_entry();
 
-  Result<double> read_value(PlyScalar type);
+  base::Result<double> read_value(PlyScalar type);
   /// A value of a type that is not floating. BadValue when it does not fit.
-  Result<std::int64_t> read_whole_number(PlyScalar type);
+  base::Result<std::int64_t> read_whole_number(PlyScalar type);
   /// So many values of the list follow; they can be there.
-  Result<std::uint64_t> read_list_count(const PlyProperty& property);
-  Result<void> skip_list(const PlyProperty& property);
-  Result<void> skip_values(std::uint64_t count, PlyScalar type);
+  base::Result<std::uint64_t> read_list_count(const PlyProperty& property);
+  base::Result<void> skip_list(const PlyProperty& property);
+  base::Result<void> skip_values(std::uint64_t count, PlyScalar type);
 
   /// After the last element: bytes that belong to nothing; white space at the end of a text file does not count.
   std::uint64_t trailing_bytes();
 
   /// The file has fewer bytes than the header promises, or cannot be read.
-  Error shortage() const;
+  base::Error shortage() const;
   /// "vertex 12", counted from 0; with the line of a text file before it.
   std::string where() const;
 
  private:
-  Result<std::string_view> next_token();
-  Error not_a_number(std::string_view token) const;
+  base::Result<std::string_view> next_token();
+  base::Error not_a_number(std::string_view token) const;
 
   BlockFile& file_;
   const PlyHeader& header_;
@@ -68,4 +68,4 @@ class PlyCursor {
 /// No property of the element is a list, so that all its entries have the same size in a binary file.
 bool has_no_list(const PlyElement& element);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

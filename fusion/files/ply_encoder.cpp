@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -48,39 +48,42 @@ void PlyEncoder::put(T value) {
   size_ += bytes.size();
 }
 
-Result<void> PlyEncoder::vertices(std::span<const Vec3f> positions, std::span<const Rgb8> colours,
-                                  std::span<const float> temperature_celsius, const PlyConfidence& confidence) {
+base::Result<void> PlyEncoder::vertices(std::span<const base::Vec3f> positions, std::span<const base::Rgb8> colours,
+                                        std::span<const float> temperature_celsius, const PlyConfidence& confidence) {
   if (layout_.has_confidence &&
       (confidence.sigma_kelvin.size() != positions.size() || confidence.seen_s.size() != positions.size())) {
-    return failure(ErrorCode::Inconsistent, "the vertices to write have " + std::to_string(positions.size()) +
-                                                " positions, " + std::to_string(confidence.sigma_kelvin.size()) +
-                                                " deviations and " + std::to_string(confidence.seen_s.size()) +
-                                                " times");
+    return base::failure(base::ErrorCode::Inconsistent,
+                         "the vertices to write have " + std::to_string(positions.size()) + " positions, " +
+                             std::to_string(confidence.sigma_kelvin.size()) + " deviations and " +
+                             std::to_string(confidence.seen_s.size()) + " times");
   }
   if (colours.size() != positions.size() ||
       (layout_.has_temperature && temperature_celsius.size() != positions.size())) {
-    return failure(ErrorCode::Inconsistent, "the vertices to write have " + std::to_string(positions.size()) +
-                                                " positions, " + std::to_string(colours.size()) + " colours and " +
-                                                std::to_string(temperature_celsius.size()) + " temperatures");
+    return base::failure(base::ErrorCode::Inconsistent,
+                         "the vertices to write have " + std::to_string(positions.size()) + " positions, " +
+                             std::to_string(colours.size()) + " colours and " +
+                             std::to_string(temperature_celsius.size()) + " temperatures");
   }
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Vec3d position = {layout_.origin.x + static_cast<double>(positions[i].x),
-                            layout_.origin.y + static_cast<double>(positions[i].y),
-                            layout_.origin.z + static_cast<double>(positions[i].z)};
+    const base::Vec3d position = {layout_.origin.x + static_cast<double>(positions[i].x),
+                                  layout_.origin.y + static_cast<double>(positions[i].y),
+                                  layout_.origin.z + static_cast<double>(positions[i].z)};
     BOOST_OUTCOME_TRY(vertex(position, colours[i], layout_.has_temperature ? temperature_celsius[i] : 0));
     if (layout_.has_confidence) {
       put(confidence.sigma_kelvin[i]);
       put(confidence.seen_s[i]);
     }
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyEncoder::left_out_vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius) {
+base::Result<void> PlyEncoder::left_out_vertex(const base::Vec3d& position, base::Rgb8 colour,
+                                               float temperature_celsius) {
   return vertex(position, colour, temperature_celsius);
 }
 
-inline Result<void> PlyEncoder::vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius) {
+inline base::Result<void> PlyEncoder::vertex(const base::Vec3d& position, base::Rgb8 colour,
+                                             float temperature_celsius) {
   if (buffer_.size() - size_ < kMaxEntryBytes) {
     BOOST_OUTCOME_TRY(flush());
   }
@@ -96,11 +99,11 @@ inline Result<void> PlyEncoder::vertex(const Vec3d& position, Rgb8 colour, float
   put(colour.b);
   if (layout_.has_temperature) put(temperature_celsius);
   ++vertices_done_;
-  return success();
+  return base::success();
 }
 
-Result<void> PlyEncoder::triangles(std::span<const Triangle> triangles) {
-  for (const Triangle& triangle : triangles) {
+base::Result<void> PlyEncoder::triangles(std::span<const base::Triangle> triangles) {
+  for (const base::Triangle& triangle : triangles) {
     if (buffer_.size() - size_ < kMaxEntryBytes) {
       BOOST_OUTCOME_TRY(flush());
     }
@@ -108,22 +111,23 @@ Result<void> PlyEncoder::triangles(std::span<const Triangle> triangles) {
     for (const std::uint32_t index : triangle) put(index);
   }
   triangles_done_ += triangles.size();
-  return success();
+  return base::success();
 }
 
-Result<void> PlyEncoder::finish() {
+base::Result<void> PlyEncoder::finish() {
   if (vertices_done_ != layout_.vertex_count || triangles_done_ != layout_.triangle_count) {
-    return failure(ErrorCode::Inconsistent, "the header promises " + std::to_string(layout_.vertex_count) +
-                                                " vertices and " + std::to_string(layout_.triangle_count) +
-                                                " triangles, but " + std::to_string(vertices_done_) + " and " +
-                                                std::to_string(triangles_done_) + " were written");
+    return base::failure(base::ErrorCode::Inconsistent, "the header promises " + std::to_string(layout_.vertex_count) +
+                                                            " vertices and " + std::to_string(layout_.triangle_count) +
+                                                            " triangles, but " + std::to_string(vertices_done_) +
+                                                            " and " + std::to_string(triangles_done_) +
+                                                            " were written");
   }
   return flush();
 }
 
-Result<void> PlyEncoder::flush() {
+base::Result<void> PlyEncoder::flush() {
   const std::size_t size = std::exchange(size_, 0);
   return sink_(std::span<const std::byte>(buffer_).first(size));
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

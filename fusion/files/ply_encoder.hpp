@@ -10,13 +10,13 @@
 #include "fusion/base/error.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What a PLY file that Spectra writes will hold.
 struct PlyLayout {
   std::uint64_t vertex_count = 0;
   std::uint64_t triangle_count = 0;  ///< 0: no element 'face'.
-  Vec3d origin;                      ///< Added to every position.
+  base::Vec3d origin;                ///< Added to every position.
   bool double_positions = false;
   bool has_temperature = false;
   bool has_confidence = false;  ///< temperature_sigma and seen after the temperature.
@@ -32,23 +32,23 @@ struct PlyConfidence {
 /// Makes the bytes of a binary little-endian PLY file, block after block, in constant memory.
 class PlyEncoder {
  public:
-  using Sink = std::function<Result<void>(std::span<const std::byte>)>;
+  using Sink = std::function<base::Result<void>(std::span<const std::byte>)>;
 
   PlyEncoder(const PlyLayout& layout, Sink sink);
 
   /// In this order: all vertices in any number of calls, then all triangles, then finish(). `temperature_celsius` is
   /// read when the layout has one, `confidence` when it has that; the spans have the same length.
-  Result<void> vertices(std::span<const Vec3f> positions, std::span<const Rgb8> colours,
-                        std::span<const float> temperature_celsius, const PlyConfidence& confidence = {});
+  base::Result<void> vertices(std::span<const base::Vec3f> positions, std::span<const base::Rgb8> colours,
+                              std::span<const float> temperature_celsius, const PlyConfidence& confidence = {});
   /// One vertex more, whose position is written as it is: it may be no finite one.
-  Result<void> left_out_vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius);
-  Result<void> triangles(std::span<const Triangle> triangles);
+  base::Result<void> left_out_vertex(const base::Vec3d& position, base::Rgb8 colour, float temperature_celsius);
+  base::Result<void> triangles(std::span<const base::Triangle> triangles);
   /// Hands on what is still buffered. Inconsistent when there were not as many vertices and triangles as was said.
-  Result<void> finish();
+  base::Result<void> finish();
 
  private:
-  Result<void> vertex(const Vec3d& position, Rgb8 colour, float temperature_celsius);
-  Result<void> flush();
+  base::Result<void> vertex(const base::Vec3d& position, base::Rgb8 colour, float temperature_celsius);
+  base::Result<void> flush();
   template <class T>
   void put(T value);
 
@@ -60,4 +60,4 @@ class PlyEncoder {
   std::uint64_t triangles_done_ = 0;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -7,17 +7,17 @@
 
 #include "fusion/files/ply_values.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
 constexpr std::size_t kBlockTriangles = 4096;
 
-Result<std::uint32_t> vertex_index(const PlyCursor& cursor, std::int64_t value, std::uint64_t vertex_count) {
+base::Result<std::uint32_t> vertex_index(const PlyCursor& cursor, std::int64_t value, std::uint64_t vertex_count) {
   if (value < 0 || static_cast<std::uint64_t>(value) >= vertex_count) {
-    return failure(ErrorCode::BadValue, cursor.where() + " refers to vertex " + std::to_string(value) +
-                                            ", but there are " + std::to_string(vertex_count) +
-                                            " vertices, counted from 0");
+    return base::failure(base::ErrorCode::BadValue, cursor.where() + " refers to vertex " + std::to_string(value) +
+                                                        ", but there are " + std::to_string(vertex_count) +
+                                                        " vertices, counted from 0");
   }
   return static_cast<std::uint32_t>(value);
 }
@@ -58,7 +58,7 @@ FaceFacts PlyFaceReader::facts() const {
   return facts;
 }
 
-Result<void> PlyFaceReader::read_faces(const PlyElement& element, std::size_t corner_list) {
+base::Result<void> PlyFaceReader::read_faces(const PlyElement& element, std::size_t corner_list) {
   const PlyProperty& list = element.properties[corner_list];
   const bool is_usual = !cursor_.is_text() && left_out_.is_empty() && element.properties.size() == 1 &&
                         size_bytes(list.count_type) == 1 && size_bytes(list.type) == 4;
@@ -77,7 +77,7 @@ Result<void> PlyFaceReader::read_faces(const PlyElement& element, std::size_t co
 /// Faces of a one-byte count and four-byte indices, as long as they are valid triangles and in the buffer; whatever
 /// else comes is left to read_face().
 template <bool kSwapped>
-Result<void> PlyFaceReader::read_plain_triangles(const PlyElement& element) {
+base::Result<void> PlyFaceReader::read_plain_triangles(const PlyElement& element) {
   constexpr std::size_t kTriangleBytes = 13;
   const auto vertex_count = static_cast<std::uint32_t>(vertex_count_);
   BlockFile& file = cursor_.file();
@@ -100,12 +100,12 @@ Result<void> PlyFaceReader::read_plain_triangles(const PlyElement& element) {
     }
     file.consume(done * kTriangleBytes);
     cursor_.entry += done;
-    if (done < count || count == 0) return success();
+    if (done < count || count == 0) return base::success();
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyFaceReader::read_face(const PlyElement& element, std::size_t corner_list) {
+base::Result<void> PlyFaceReader::read_face(const PlyElement& element, std::size_t corner_list) {
   BOOST_OUTCOME_TRY(cursor_.begin_entry(element));
   for (std::size_t p = 0; p < element.properties.size(); ++p) {
     const PlyProperty& property = element.properties[p];
@@ -121,8 +121,8 @@ Result<void> PlyFaceReader::read_face(const PlyElement& element, std::size_t cor
   return add_fan();
 }
 
-Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint64_t vertex_count,
-                          std::vector<std::uint32_t>& corners) {
+base::Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint64_t vertex_count,
+                                std::vector<std::uint32_t>& corners) {
   corners.clear();
   BOOST_OUTCOME_TRY(const std::uint64_t count, cursor.read_list_count(list));
   // A face of fewer than three corners is left out, whatever they are.
@@ -132,21 +132,21 @@ Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint6
     BOOST_OUTCOME_TRY(const std::uint32_t index, vertex_index(cursor, value, vertex_count));
     corners.push_back(index);
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyFaceReader::add_fan() {
+base::Result<void> PlyFaceReader::add_fan() {
   if (corners_.size() < 3) {
     ++facts_.incomplete_face_count;
-    return success();
+    return base::success();
   }
   if (!left_out_.is_empty() &&
       std::any_of(corners_.begin(), corners_.end(), [this](std::uint32_t corner) { return left_out_[corner]; })) {
     ++facts_.left_out_face_count;
-    return success();
+    return base::success();
   }
   for (std::size_t i = 2; i < corners_.size(); ++i) {
-    const Triangle triangle = {corners_[0], corners_[i - 1], corners_[i]};
+    const base::Triangle triangle = {corners_[0], corners_[i - 1], corners_[i]};
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) {
       ++facts_.degenerate_triangle_count;
       continue;
@@ -154,10 +154,10 @@ Result<void> PlyFaceReader::add_fan() {
     BOOST_OUTCOME_TRY(add_triangle(triangle));
   }
   if (corners_.size() > 3) ++facts_.polygon_count;
-  return success();
+  return base::success();
 }
 
-Result<void> PlyFaceReader::read_strips(const PlyElement& element, std::size_t corner_list) {
+base::Result<void> PlyFaceReader::read_strips(const PlyElement& element, std::size_t corner_list) {
   for (; cursor_.entry < element.count; ++cursor_.entry) {
     BOOST_OUTCOME_TRY(cursor_.begin_entry(element));
     for (std::size_t p = 0; p < element.properties.size(); ++p) {
@@ -177,7 +177,7 @@ Result<void> PlyFaceReader::read_strips(const PlyElement& element, std::size_t c
 
 /// Every vertex after the second of a strip makes a triangle with the two before it, turned the other way each time.
 /// Triangles with a vertex twice only lead from one part of a strip to the next.
-Result<void> PlyFaceReader::read_strip(const PlyProperty& list) {
+base::Result<void> PlyFaceReader::read_strip(const PlyProperty& list) {
   BOOST_OUTCOME_TRY(const std::uint64_t count, cursor_.read_list_count(list));
   std::uint64_t length = 0;
   std::uint32_t before = 0;
@@ -196,23 +196,24 @@ Result<void> PlyFaceReader::read_strip(const PlyProperty& list) {
         ++facts_.left_out_face_count;
       } else {
         const bool is_turned = length % 2 == 0;
-        BOOST_OUTCOME_TRY(add_triangle(is_turned ? Triangle{last, before, vertex} : Triangle{before, last, vertex}));
+        BOOST_OUTCOME_TRY(
+            add_triangle(is_turned ? base::Triangle{last, before, vertex} : base::Triangle{before, last, vertex}));
       }
     }
     before = last;
     last = vertex;
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyFaceReader::add_triangle(const Triangle& triangle) {
+base::Result<void> PlyFaceReader::add_triangle(const base::Triangle& triangle) {
   triangles_.push_back(triangle);
-  return triangles_.size() < kBlockTriangles ? success() : flush();
+  return triangles_.size() < kBlockTriangles ? base::success() : flush();
 }
 
-Result<void> PlyFaceReader::flush() {
-  if (triangles_.empty()) return success();
-  for (const Triangle& triangle : triangles_) {
+base::Result<void> PlyFaceReader::flush() {
+  if (triangles_.empty()) return base::success();
+  for (const base::Triangle& triangle : triangles_) {
     for (const std::uint32_t index : triangle) is_referenced_.set(index);
   }
   facts_.triangle_count += triangles_.size();
@@ -222,7 +223,7 @@ Result<void> PlyFaceReader::flush() {
     BOOST_OUTCOME_TRY(std::move(result));
   }
   triangles_.clear();
-  return success();
+  return base::success();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -10,7 +10,7 @@
 #include "fusion/files/ply_cursor.hpp"
 #include "fusion/files/ply_schema.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// One bit a vertex.
 class VertexBits {
@@ -39,14 +39,14 @@ struct FaceFacts {
 /// Reads the elements 'face' and 'tristrips' as the triangles that will be drawn.
 class PlyFaceReader {
  public:
-  using Sink = std::function<Result<void>(std::span<const Triangle>)>;
+  using Sink = std::function<base::Result<void>(std::span<const base::Triangle>)>;
 
   /// Faces with a vertex of `left_out` (empty: none) are left out. An empty sink is not called; when it fails, so does the
   /// reading, with its error. All of it outlives the reader.
   PlyFaceReader(PlyCursor& cursor, std::uint64_t vertex_count, const VertexBits& left_out, const Sink& sink);
 
-  Result<void> read_faces(const PlyElement& element, std::size_t corner_list);
-  Result<void> read_strips(const PlyElement& element, std::size_t corner_list);
+  base::Result<void> read_faces(const PlyElement& element, std::size_t corner_list);
+  base::Result<void> read_strips(const PlyElement& element, std::size_t corner_list);
 
   FaceFacts facts() const;
   bool is_referenced(std::uint64_t vertex) const { return is_referenced_[vertex]; }
@@ -55,12 +55,12 @@ class PlyFaceReader {
 
  private:
   template <bool kSwapped>
-  Result<void> read_plain_triangles(const PlyElement& element);
-  Result<void> read_face(const PlyElement& element, std::size_t corner_list);
-  Result<void> read_strip(const PlyProperty& list);
-  Result<void> add_fan();
-  Result<void> add_triangle(const Triangle& triangle);
-  Result<void> flush();
+  base::Result<void> read_plain_triangles(const PlyElement& element);
+  base::Result<void> read_face(const PlyElement& element, std::size_t corner_list);
+  base::Result<void> read_strip(const PlyProperty& list);
+  base::Result<void> add_fan();
+  base::Result<void> add_triangle(const base::Triangle& triangle);
+  base::Result<void> flush();
 
   PlyCursor& cursor_;
   const std::uint64_t vertex_count_;
@@ -68,13 +68,13 @@ class PlyFaceReader {
   const Sink& sink_;
   FaceFacts facts_;
   VertexBits is_referenced_;
-  std::vector<Triangle> triangles_;
+  std::vector<base::Triangle> triangles_;
   std::vector<std::uint32_t> corners_;  ///< Of the face that is read.
   bool sink_has_failed_ = false;
 };
 
 /// Reads the corners of one face, whose list comes next; replaces what is in `corners`.
-Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint64_t vertex_count,
-                          std::vector<std::uint32_t>& corners);
+base::Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint64_t vertex_count,
+                                std::vector<std::uint32_t>& corners);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

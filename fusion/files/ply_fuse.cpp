@@ -12,20 +12,20 @@
 #include "fusion/files/scene_origin.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
 /// The first pass: what the fusion and the output's header must know of the whole.
 struct FirstPass {
   PlyBodyFacts facts;
-  TemperatureSummary temperature;
+  fusion::TemperatureSummary temperature;
 };
 
 /// Calls `use` with the parts of a block that are no holes, as the first index and the number of vertices, and `use_hole`
 /// with every hole between them.
 template <class Use, class UseHole>
-Result<void> for_each_part(const PlyVertexBlock& block, Use&& use, UseHole&& use_hole) {
+base::Result<void> for_each_part(const PlyVertexBlock& block, Use&& use, UseHole&& use_hole) {
   std::size_t begin = 0;
   for (const std::uint32_t hole : block.left_out) {
     BOOST_OUTCOME_TRY(use(begin, hole - begin));
@@ -37,19 +37,19 @@ Result<void> for_each_part(const PlyVertexBlock& block, Use&& use, UseHole&& use
 
 /// Calls `use` with the temperatures of the block's vertices that are not left out.
 template <class Use>
-Result<void> for_each_temperature(const PlyVertexBlock& block, Use&& use) {
-  if (block.temperature_celsius.empty()) return success();
+base::Result<void> for_each_temperature(const PlyVertexBlock& block, Use&& use) {
+  if (block.temperature_celsius.empty()) return base::success();
   return for_each_part(
       block,
-      [&](std::size_t begin, std::size_t count) -> Result<void> {
+      [&](std::size_t begin, std::size_t count) -> base::Result<void> {
         use(block.temperature_celsius.subspan(begin, count));
-        return success();
+        return base::success();
       },
-      [](std::uint32_t) -> Result<void> { return success(); });
+      [](std::uint32_t) -> base::Result<void> { return base::success(); });
 }
 
-Result<FirstPass> first_pass(PlyStream& stream) {
-  std::optional<TemperatureAccumulator> temperatures(std::in_place);
+base::Result<FirstPass> first_pass(PlyStream& stream) {
+  std::optional<fusion::TemperatureAccumulator> temperatures(std::in_place);
   PlyHandlers handlers;
   handlers.vertices = [&](const PlyVertexBlock& block) {
     return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures->add(celsius); });
@@ -63,41 +63,42 @@ Result<FirstPass> first_pass(PlyStream& stream) {
 }
 
 /// The histogram of the file, by another pass over it; the pass's error, if any, is kept in `error`.
-Histogram file_histogram(PlyStream& stream, const TemperatureSummary& summary, std::uint32_t bins,
-                         std::optional<Error>& error) {
-  Histogram histogram;
+fusion::Histogram file_histogram(PlyStream& stream, const fusion::TemperatureSummary& summary, std::uint32_t bins,
+                                 std::optional<base::Error>& error) {
+  fusion::Histogram histogram;
   histogram.minimum = summary.minimum;
   histogram.maximum = summary.maximum;
   histogram.counts.resize(bins);
   PlyHandlers handlers;
   handlers.vertices = [&](const PlyVertexBlock& block) {
-    return for_each_temperature(block, [&](std::span<const float> celsius) { add_to_histogram(celsius, histogram); });
+    return for_each_temperature(block,
+                                [&](std::span<const float> celsius) { fusion::add_to_histogram(celsius, histogram); });
   };
   if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
   return histogram;
 }
 
 /// The hues of the file's colours, by another pass over it; the pass's error, if any, is kept in `error`.
-Hues file_hues(PlyStream& stream, std::optional<Error>& error) {
-  Hues hues;
+fusion::Hues file_hues(PlyStream& stream, std::optional<base::Error>& error) {
+  fusion::Hues hues;
   PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
-    if (block.visible.empty()) return success();
+  handlers.vertices = [&](const PlyVertexBlock& block) -> base::Result<void> {
+    if (block.visible.empty()) return base::success();
     return for_each_part(
         block,
-        [&](std::size_t begin, std::size_t count) -> Result<void> {
-          add_to_hues(block.visible.subspan(begin, count), hues);
-          return success();
+        [&](std::size_t begin, std::size_t count) -> base::Result<void> {
+          fusion::add_to_hues(block.visible.subspan(begin, count), hues);
+          return base::success();
         },
-        [](std::uint32_t) -> Result<void> { return success(); });
+        [](std::uint32_t) -> base::Result<void> { return base::success(); });
   };
   if (auto facts = stream.read(handlers); !facts) error = std::move(facts).error();
   return hues;
 }
 
 /// The last pass: every block fused and written. What the file does not have is filled in as MultispectralMesh does.
-Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const FusionPlan& plan,
-                            PlyEncoder::Sink sink) {
+base::Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const fusion::FusionPlan& plan,
+                                  PlyEncoder::Sink sink) {
   PlyLayout layout;
   layout.vertex_count = stream.vertex_count();
   layout.triangle_count = facts.faces.triangle_count;
@@ -106,15 +107,15 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
   layout.has_temperature = stream.has_temperature();
   PlyEncoder encoder(layout, std::move(sink));
 
-  MultispectralMesh block_mesh;
-  std::vector<Rgb8> fused;
+  mesh::MultispectralMesh block_mesh;
+  std::vector<base::Rgb8> fused;
   PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+  handlers.vertices = [&](const PlyVertexBlock& block) -> base::Result<void> {
     const std::size_t count = block.positions.size();
     if (block_mesh.vertex_count() != count) block_mesh.resize_vertices(count);
     fused.resize(count);
     std::transform(block.positions.begin(), block.positions.end(), block_mesh.positions().begin(),
-                   [&layout](const Vec3d& position) { return relative_to(layout.origin, position); });
+                   [&layout](const base::Vec3d& position) { return relative_to(layout.origin, position); });
     std::copy(block.visible.begin(), block.visible.end(), block_mesh.visible().begin());
     std::copy(block.temperature_celsius.begin(), block.temperature_celsius.end(),
               block_mesh.temperature_celsius().begin());
@@ -131,14 +132,15 @@ Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const 
                                          block_mesh.temperature_celsius()[hole]);
         });
   };
-  handlers.triangles = [&](std::span<const Triangle> triangles) { return encoder.triangles(triangles); };
+  handlers.triangles = [&](std::span<const base::Triangle> triangles) { return encoder.triangles(triangles); };
   BOOST_OUTCOME_TRY(stream.read(handlers));
   return encoder.finish();
 }
 
-Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
-                            const FusionSettings& settings, const PaletteTable* palette, const ReadOptions& options) {
-  std::string_view phase = kReadingPhase;
+base::Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesystem::path& out,
+                                  const fusion::FusionSettings& settings, const fusion::PaletteTable* palette,
+                                  const ReadOptions& options) {
+  std::string_view phase = base::kReadingPhase;
   double begin_share = 0;
   double end_share = 1;
   ReadOptions watched = options;
@@ -149,14 +151,14 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
   }
   BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(in, watched));
   BOOST_OUTCOME_TRY(const FirstPass pass, first_pass(stream));
-  std::optional<Error> pass_error;
-  SceneTemperature scene;
+  std::optional<base::Error> pass_error;
+  fusion::SceneTemperature scene;
   scene.summary = pass.temperature;
   // Nobody knows how many passes the plan will ask for, so each is half of what remains of their phase.
   const auto count_again = [&] {
-    begin_share = phase == kHistogramPhase ? end_share : 0;
+    begin_share = phase == base::kHistogramPhase ? end_share : 0;
     end_share = (begin_share + 1) / 2;
-    phase = kHistogramPhase;
+    phase = base::kHistogramPhase;
   };
   scene.histogram = [&](std::uint32_t bins) {
     count_again();
@@ -166,12 +168,12 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
     count_again();
     return file_hues(stream, pass_error);
   };
-  auto plan =
-      palette == nullptr ? FusionPlan::prepare(settings, scene) : FusionPlan::prepare(settings, scene, *palette);
+  auto plan = palette == nullptr ? fusion::FusionPlan::prepare(settings, scene)
+                                 : fusion::FusionPlan::prepare(settings, scene, *palette);
   if (pass_error) return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(*pass_error));
   BOOST_OUTCOME_TRY(plan);
 
-  phase = kFusingPhase;
+  phase = base::kFusingPhase;
   begin_share = 0;
   end_share = 1;
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
@@ -184,14 +186,15 @@ Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::filesyst
 
 }  // namespace
 
-Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const ReadOptions& options) {
+base::Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                                 const fusion::FusionSettings& settings, const ReadOptions& options) {
   return fuse_file(in, out, settings, nullptr, options);
 }
 
-Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const PaletteTable& palette, const ReadOptions& options) {
+base::Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                                 const fusion::FusionSettings& settings, const fusion::PaletteTable& palette,
+                                 const ReadOptions& options) {
   return fuse_file(in, out, settings, &palette, options);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -11,12 +11,12 @@
 #include "fusion/fusion_plan.hpp"
 #include "fusion/settings.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What was fused, and with what.
 struct FusedFile {
-  FusionPlan plan;
-  TemperatureSummary temperature;
+  fusion::FusionPlan plan;
+  fusion::TemperatureSummary temperature;
   std::uint64_t vertex_count = 0;
   std::uint64_t triangle_count = 0;
   std::vector<Note> notes;  ///< As read_ply() has them.
@@ -26,12 +26,12 @@ struct FusedFile {
 /// holding it: one pass for the statistics, one more for a method that asks for a histogram, one to fuse and write. Memory
 /// is constant but for one bit a vertex. The bytes are those of read_ply(), FusionPlan::fuse() and write_ply(). Errors are
 /// theirs too; safe on untrusted input. The progress of `options` is told of kReadingPhase, kHistogramPhase and kFusingPhase.
-Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const ReadOptions& options = {});
+base::Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                                 const fusion::FusionSettings& settings, const ReadOptions& options = {});
 
 /// The same with a palette table of the caller's.
-Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
-                           const FusionSettings& settings, const PaletteTable& palette,
-                           const ReadOptions& options = {});
+base::Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
+                                 const fusion::FusionSettings& settings, const fusion::PaletteTable& palette,
+                                 const ReadOptions& options = {});
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

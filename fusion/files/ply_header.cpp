@@ -10,7 +10,7 @@
 
 #include "fusion/files/file_kind.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -56,8 +56,8 @@ class HeaderParser {
  public:
   explicit HeaderParser(std::string_view text) : text_(text) {}
 
-  Result<PlyHeader> parse() {
-    if (text_.empty()) return failure(ErrorCode::BadHeader, "the file is empty");
+  base::Result<PlyHeader> parse() {
+    if (text_.empty()) return base::failure(base::ErrorCode::BadHeader, "the file is empty");
     BOOST_OUTCOME_TRY(read_first_line());
     std::string_view line;
     while (next_line(line)) {
@@ -72,15 +72,15 @@ class HeaderParser {
       BOOST_OUTCOME_TRY(read_line(keyword, words));
     }
     if (text_.size() >= kMaxPlyHeaderBytes) {
-      return failure(ErrorCode::BadHeader,
-                     "no end_header within the first " + std::to_string(kMaxPlyHeaderBytes) + " bytes");
+      return base::failure(base::ErrorCode::BadHeader,
+                           "no end_header within the first " + std::to_string(kMaxPlyHeaderBytes) + " bytes");
     }
-    return failure(ErrorCode::BadHeader, "the file ends before end_header");
+    return base::failure(base::ErrorCode::BadHeader, "the file ends before end_header");
   }
 
  private:
   /// Passes over what editors put before the word, and finds out how lines end.
-  Result<void> read_first_line() {
+  base::Result<void> read_first_line() {
     constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
     if (text_.substr(0, kByteOrderMark.size()) == kByteOrderMark) position_ = kByteOrderMark.size();
     const std::size_t begin = text_.find_first_not_of(" \t\r\n", position_);
@@ -92,10 +92,10 @@ class HeaderParser {
     std::string_view line;
     std::vector<std::string_view> words;
     while (words.empty() && next_line(line)) words = words_of(line);
-    if (words.size() == 1 && lower_case(words[0]) == "ply") return success();
+    if (words.size() == 1 && lower_case(words[0]) == "ply") return base::success();
     const std::string_view kind = file_kind(text_);
-    return failure(ErrorCode::BadHeader, kind.empty() ? "not a PLY file: the first line is not 'ply'"
-                                                      : "not a PLY file, but " + std::string(kind));
+    return base::failure(base::ErrorCode::BadHeader, kind.empty() ? "not a PLY file: the first line is not 'ply'"
+                                                                  : "not a PLY file, but " + std::string(kind));
   }
 
   bool next_line(std::string_view& line) {
@@ -108,20 +108,20 @@ class HeaderParser {
     return true;
   }
 
-  auto bad(ErrorCode code, const std::string& what) const {
-    return failure(code, "header line " + std::to_string(line_number_) + ": " + what);
+  auto bad(base::ErrorCode code, const std::string& what) const {
+    return base::failure(code, "header line " + std::to_string(line_number_) + ": " + what);
   }
 
-  Result<void> read_line(const std::string& keyword, const std::vector<std::string_view>& words) {
+  base::Result<void> read_line(const std::string& keyword, const std::vector<std::string_view>& words) {
     if (keyword == "format") return read_format(words);
     if (keyword == "element") return read_element(words);
     if (keyword == "property") return read_property(words);
-    return bad(ErrorCode::BadHeader, "unknown keyword " + quoted(words[0]));
+    return bad(base::ErrorCode::BadHeader, "unknown keyword " + quoted(words[0]));
   }
 
-  Result<void> read_format(const std::vector<std::string_view>& words) {
-    if (has_format_) return bad(ErrorCode::BadHeader, "a second format line");
-    if (words.size() != 3) return bad(ErrorCode::BadHeader, "a format line has a name and a version");
+  base::Result<void> read_format(const std::vector<std::string_view>& words) {
+    if (has_format_) return bad(base::ErrorCode::BadHeader, "a second format line");
+    if (words.size() != 3) return bad(base::ErrorCode::BadHeader, "a format line has a name and a version");
     const std::string format = lower_case(words[1]);
     if (format == "ascii") {
       header_.format = PlyFormat::Ascii;
@@ -130,65 +130,65 @@ class HeaderParser {
     } else if (format == "binary_big_endian") {
       header_.format = PlyFormat::BinaryBigEndian;
     } else {
-      return bad(ErrorCode::Unsupported, "unknown format " + quoted(words[1]));
+      return bad(base::ErrorCode::Unsupported, "unknown format " + quoted(words[1]));
     }
     if (words[2] != "1.0") {
-      return bad(ErrorCode::Unsupported, "PLY version " + quoted(words[2]) + ", only 1.0 is known");
+      return bad(base::ErrorCode::Unsupported, "PLY version " + quoted(words[2]) + ", only 1.0 is known");
     }
     has_format_ = true;
-    return success();
+    return base::success();
   }
 
-  Result<void> read_element(const std::vector<std::string_view>& words) {
-    if (words.size() != 3) return bad(ErrorCode::BadHeader, "an element line has a name and a count");
+  base::Result<void> read_element(const std::vector<std::string_view>& words) {
+    if (words.size() != 3) return bad(base::ErrorCode::BadHeader, "an element line has a name and a count");
     PlyElement element;
     element.name = words[1];
     const char* const end = words[2].data() + words[2].size();
     const auto [stop, status] = std::from_chars(words[2].data(), end, element.count);
     if (status != std::errc{} || stop != end) {
-      return bad(ErrorCode::BadHeader, "element " + quoted(words[1]) + " has the count " + quoted(words[2]) +
-                                           ", which is not a whole number from 0 to 2^64 - 1");
+      return bad(base::ErrorCode::BadHeader, "element " + quoted(words[1]) + " has the count " + quoted(words[2]) +
+                                                 ", which is not a whole number from 0 to 2^64 - 1");
     }
     if (!element_names_.insert(element.name).second) {
-      return bad(ErrorCode::BadHeader, "a second element " + quoted(words[1]));
+      return bad(base::ErrorCode::BadHeader, "a second element " + quoted(words[1]));
     }
     property_names_.clear();
     header_.elements.push_back(std::move(element));
-    return success();
+    return base::success();
   }
 
-  Result<void> read_property(const std::vector<std::string_view>& words) {
-    if (header_.elements.empty()) return bad(ErrorCode::BadHeader, "a property before any element");
+  base::Result<void> read_property(const std::vector<std::string_view>& words) {
+    if (header_.elements.empty()) return bad(base::ErrorCode::BadHeader, "a property before any element");
     PlyProperty property;
     property.is_list = words.size() > 1 && lower_case(words[1]) == "list";
     const std::size_t word_count = property.is_list ? 5 : 3;
     if (words.size() != word_count) {
-      return bad(ErrorCode::BadHeader,
+      return bad(base::ErrorCode::BadHeader,
                  "a property line is 'property TYPE NAME' or "
                  "'property list COUNT_TYPE TYPE NAME'");
     }
     if (property.is_list) {
       const auto count_type = scalar_type(words[2]);
       if (!count_type || is_floating(*count_type)) {
-        return bad(ErrorCode::BadHeader,
+        return bad(base::ErrorCode::BadHeader,
                    "a list's count has the type " + quoted(words[2]) + ", which is not a whole number's");
       }
       property.count_type = *count_type;
     }
     const auto type = scalar_type(words[word_count - 2]);
-    if (!type) return bad(ErrorCode::BadHeader, "unknown type " + quoted(words[word_count - 2]));
+    if (!type) return bad(base::ErrorCode::BadHeader, "unknown type " + quoted(words[word_count - 2]));
     property.type = *type;
     property.name = words[word_count - 1];
     if (!property_names_.insert(property.name).second) {
-      return bad(ErrorCode::BadHeader,
+      return bad(base::ErrorCode::BadHeader,
                  "a second property " + quoted(property.name) + " in element " + quoted(header_.elements.back().name));
     }
     header_.elements.back().properties.push_back(std::move(property));
-    return success();
+    return base::success();
   }
 
-  Result<PlyHeader> finished() {
-    if (!has_format_) return failure(ErrorCode::BadHeader, "the header has no format line");
+  base::Result<PlyHeader> finished() {
+    if (!has_format_) return base::failure(base::ErrorCode::BadHeader, "the header has no format line");
     header_.size_bytes = position_;
     header_.line_count = line_number_;
     return std::move(header_);
@@ -257,7 +257,7 @@ const PlyElement* PlyHeader::find(std::string_view name) const {
   return found == elements.end() ? nullptr : &*found;
 }
 
-Result<PlyHeader> parse_ply_header(std::string_view text) {
+base::Result<PlyHeader> parse_ply_header(std::string_view text) {
   return HeaderParser(text.substr(0, kMaxPlyHeaderBytes)).parse();
 }
 
@@ -271,4 +271,4 @@ std::uint64_t minimum_entry_bytes(const PlyElement& element, PlyFormat format) {
   return bytes;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

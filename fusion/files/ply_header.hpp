@@ -8,7 +8,7 @@
 
 #include "fusion/base/error.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 enum class PlyFormat { Ascii, BinaryLittleEndian, BinaryBigEndian };
 
@@ -51,7 +51,7 @@ inline constexpr std::size_t kMaxPlyHeaderBytes = std::size_t{256} * 1024;
 /// Reads a header from the first bytes of a file, which must be at least kMaxPlyHeaderBytes of it or all there is.
 /// Lines may end in LF, CR LF or CR; a byte order mark, blanks and empty lines are passed over, and keywords and types are
 /// known in any case. What is no PLY file is called by its own name where that is known. Safe on untrusted input; BadHeader and Unsupported name the line.
-Result<PlyHeader> parse_ply_header(std::string_view text);
+base::Result<PlyHeader> parse_ply_header(std::string_view text);
 
 /// A word in lower case; ASCII only.
 std::string lower_case(std::string_view text);
@@ -62,4 +62,4 @@ std::string printable(std::string_view name);
 /// The fewest bytes that the element's entries can take in the body, each; for ascii with its separators.
 std::uint64_t minimum_entry_bytes(const PlyElement& element, PlyFormat format);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

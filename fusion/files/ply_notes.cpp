@@ -13,7 +13,7 @@
 #include "fusion/files/scene_origin.hpp"
 #include "fusion/files/temperature_name.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -129,7 +129,7 @@ class Notes {
   std::string coordinate_text(std::size_t slot, double metres) const {
     return value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
   }
-  std::string place_text(const Vec3d& place) const {
+  std::string place_text(const base::Vec3d& place) const {
     return coordinate_text(kX, place.x) + ' ' + coordinate_text(kY, place.y) + ' ' + coordinate_text(kZ, place.z);
   }
 
@@ -153,7 +153,7 @@ class Notes {
     // Float coordinates far from 0 have been rounded before they came here.
     constexpr double kTooCoarse = 1.0 / 20'000;
     constexpr double kNoticed = 1e-5;  // metres
-    if (facts_.origin != Vec3d{} && rounding > std::max(kNoticed, kTooCoarse * bulk.extent())) {
+    if (facts_.origin != base::Vec3d{} && rounding > std::max(kNoticed, kTooCoarse * bulk.extent())) {
       add("rounded_positions", vertices_.count,
           "Positions are declared as floats and far from 0, where floats are rounded to " + short_number(rounding) +
               " m; declare them as double, or write them closer to 0");
@@ -164,7 +164,7 @@ class Notes {
       add("coarse_positions", vertices_.count,
           "Positions are kept as floats from " + number_text(facts_.origin.x) + " " + number_text(facts_.origin.y) +
               " " + number_text(facts_.origin.z) + ": the farthest of this large scene are off by up to " +
-              distance_text(kept) + "; cut it into parts where that matters");
+              base::distance_text(kept) + "; cut it into parts where that matters");
     }
   }
 
@@ -445,4 +445,4 @@ std::vector<Note> ply_notes(const PlyHeader& header, const PlyInterpretation& in
   return Notes(header, interpretation, options, facts).take();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

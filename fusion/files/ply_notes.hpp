@@ -6,7 +6,7 @@
 
 #include "fusion/files/ply_stream.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// "3 faces", "1 face".
 std::string counted(std::uint64_t count, std::string_view one, std::string_view many);
@@ -16,4 +16,4 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
 std::vector<Note> ply_notes(const PlyHeader& header, const PlyInterpretation& interpretation,
                             const ReadOptions& options, const PlyBodyFacts& facts);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

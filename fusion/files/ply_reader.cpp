@@ -10,7 +10,7 @@
 #include "fusion/files/scene_origin.hpp"
 #include "fusion/files/thermal_join.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -25,8 +25,8 @@ struct ScenePair {
   LoadedScene thermal;
 };
 
-Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
-                            const ReadOptions& options) {
+base::Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
+                                  const ReadOptions& options) {
   ReadOptions scene_options;  // those about temperature belong to the thermal file
   scene_options.metres_per_unit = options.metres_per_unit;
   scene_options.origin = options.origin;
@@ -34,20 +34,20 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
   ReadOptions thermal_options = options;
   if (options.progress) {
     thermal_options.progress = [&options](std::string_view, double share) {
-      options.progress(kReadingThermalPhase, share);
+      options.progress(base::kReadingThermalPhase, share);
     };
   }
   BOOST_OUTCOME_TRY(LoadedScene thermal, read_ply(thermal_path, thermal_options));
   if (!thermal.mesh.has_temperature) {
     const auto note = std::find_if(thermal.notes.begin(), thermal.notes.end(),
                                    [](const Note& one) { return one.id == "no_temperature"; });
-    return failure(ErrorCode::Unsupported,
-                   thermal.mesh.name + ": the thermal file has no temperature: " +
-                       (note == thermal.notes.end() ? "none of its properties can be one" : note->message),
-                   thermal.mesh.name);
+    return base::failure(base::ErrorCode::Unsupported,
+                         thermal.mesh.name + ": the thermal file has no temperature: " +
+                             (note == thermal.notes.end() ? "none of its properties can be one" : note->message),
+                         thermal.mesh.name);
   }
   BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, scene_options));
-  Result<void> overlap = check_overlap(scene, thermal);
+  base::Result<void> overlap = check_overlap(scene, thermal);
   if (!overlap && options.scale() != 1) {
     const auto tell = [&options](LoadedScene& told, const std::string& scaled, const std::string& as_it_is) {
       told.notes.push_back({"scaled_one_file", 1,
@@ -71,18 +71,18 @@ Result<ScenePair> read_pair(const std::filesystem::path& path, const std::filesy
   return ScenePair{std::move(scene), std::move(thermal)};
 }
 
-LeftOutVertex left_out_vertex(const PlyVertexBlock& block, std::uint32_t index) {
-  LeftOutVertex vertex;
+mesh::LeftOutVertex left_out_vertex(const PlyVertexBlock& block, std::uint32_t index) {
+  mesh::LeftOutVertex vertex;
   vertex.input_index = static_cast<std::uint32_t>(block.first_vertex) + index;
   vertex.position = block.positions[index];
-  vertex.visible = block.visible.empty() ? MultispectralMesh::kNoColour : block.visible[index];
+  vertex.visible = block.visible.empty() ? mesh::MultispectralMesh::kNoColour : block.visible[index];
   vertex.temperature_celsius =
       block.temperature_celsius.empty() ? std::numeric_limits<float>::quiet_NaN() : block.temperature_celsius[index];
   return vertex;
 }
 
 /// Where the vertices of the file are in the mesh, which still has room for all of them.
-std::vector<std::uint32_t> mesh_indices(const MultispectralMesh& mesh) {
+std::vector<std::uint32_t> mesh_indices(const mesh::MultispectralMesh& mesh) {
   std::vector<std::uint32_t> indices(mesh.vertex_count());
   std::uint32_t next = 0;
   auto hole = mesh.left_out.begin();
@@ -98,10 +98,10 @@ std::vector<std::uint32_t> mesh_indices(const MultispectralMesh& mesh) {
 
 }  // namespace
 
-Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options) {
+base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options) {
   BOOST_OUTCOME_TRY(PlyStream stream, PlyStream::open(path, options));
   LoadedScene scene;
-  MultispectralMesh& mesh = scene.mesh;
+  mesh::MultispectralMesh& mesh = scene.mesh;
   mesh.resize_vertices(static_cast<std::size_t>(stream.vertex_count()));
   mesh.triangles().reserve(static_cast<std::size_t>(stream.triangle_count_limit()));
   mesh.has_visible = stream.has_visible();
@@ -112,7 +112,7 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
   // Doubles wait for the origin, which is known when all are read; floats can move there without loss, unless they are
   // scaled.
   const bool is_exact = mesh.double_positions || options.scale() != 1;
-  std::vector<Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
+  std::vector<base::Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
   std::size_t kept_count = 0;
   const auto keep = [&](const PlyVertexBlock& block, std::size_t begin, std::size_t end) {
     const auto positions = block.positions.subspan(begin, end - begin);
@@ -121,7 +121,7 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
       std::copy(positions.begin(), positions.end(), exact_positions.begin() + out);
     } else {
       std::transform(positions.begin(), positions.end(), mesh.positions().begin() + out,
-                     [](const Vec3d& position) { return relative_to({}, position); });
+                     [](const base::Vec3d& position) { return relative_to({}, position); });
     }
     if (!block.visible.empty()) {
       const auto visible = block.visible.subspan(begin, end - begin);
@@ -135,7 +135,7 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
   };
   std::vector<std::uint32_t> mesh_index;  // By the file's index, when that is not the same.
   PlyHandlers handlers;
-  handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+  handlers.vertices = [&](const PlyVertexBlock& block) -> base::Result<void> {
     std::size_t begin = 0;
     for (const std::uint32_t hole : block.left_out) {
       keep(block, begin, hole);
@@ -143,17 +143,17 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
       begin = hole + 1;
     }
     keep(block, begin, block.positions.size());
-    return success();
+    return base::success();
   };
-  handlers.triangles = [&](std::span<const Triangle> triangles) -> Result<void> {
+  handlers.triangles = [&](std::span<const base::Triangle> triangles) -> base::Result<void> {
     if (!mesh.left_out.empty() && mesh_index.empty()) mesh_index = mesh_indices(mesh);
     mesh.triangles().insert(mesh.triangles().end(), triangles.begin(), triangles.end());
     if (!mesh_index.empty()) {
-      for (Triangle& triangle : std::span(mesh.triangles()).last(triangles.size())) {
+      for (base::Triangle& triangle : std::span(mesh.triangles()).last(triangles.size())) {
         for (std::uint32_t& corner : triangle) corner = mesh_index[corner];
       }
     }
-    return success();
+    return base::success();
   };
   BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
   if (stream.leave_out_hole(facts)) {
@@ -169,9 +169,9 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
   mesh.origin = facts.origin;
   if (is_exact) {
     std::transform(exact_positions.begin(), exact_positions.end(), mesh.positions().begin(),
-                   [&](const Vec3d& position) { return relative_to(mesh.origin, position); });
-  } else if (mesh.origin != Vec3d{}) {
-    for (Vec3f& p : mesh.positions()) {
+                   [&](const base::Vec3d& position) { return relative_to(mesh.origin, position); });
+  } else if (mesh.origin != base::Vec3d{}) {
+    for (base::Vec3f& p : mesh.positions()) {
       p = relative_to(mesh.origin, {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)});
     }
   }
@@ -180,11 +180,12 @@ Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOption
   return scene;
 }
 
-Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
-                                          const ReadOptions& options, double join_distance_m) {
+base::Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path,
+                                                const std::filesystem::path& thermal_path, const ReadOptions& options,
+                                                double join_distance_m) {
   if (!std::isfinite(join_distance_m) || join_distance_m < 0) {
-    return failure(ErrorCode::OutOfRange, "join_distance_m is a finite distance of 0 (automatic) or more",
-                   "join_distance_m");
+    return base::failure(base::ErrorCode::OutOfRange, "join_distance_m is a finite distance of 0 (automatic) or more",
+                         "join_distance_m");
   }
   BOOST_OUTCOME_TRY(auto pair, read_pair(path, thermal_path, options));
   LoadedScene scene = std::move(pair.scene);
@@ -196,7 +197,7 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
                            "The file's own temperatures replaced by those of the thermal file"});
   }
   scene.mesh.has_temperature = true;
-  report(options.progress, kJoiningPhase, 0);
+  base::report(options.progress, base::kJoiningPhase, 0);
   BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene, options.progress));
   const auto missing_count = static_cast<std::uint64_t>(
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
@@ -217,4 +218,4 @@ Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, con
   return scene;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

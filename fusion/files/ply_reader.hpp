@@ -11,7 +11,7 @@
 #include "fusion/files/read_options.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// One thing that was repaired, left out or interpreted while a scene was read: nothing is lost silently.
 struct Note {
@@ -24,9 +24,10 @@ struct Note {
 
 /// A scene and what has to be said about it.
 struct LoadedScene {
-  MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   std::vector<Note> notes;
-  std::optional<Bounds> core_bounds{};  ///< Of the vertices that are no strays; absent: nobody has looked for any.
+  std::optional<base::Bounds>
+      core_bounds{};                    ///< Of the vertices that are no strays; absent: nobody has looked for any.
   std::vector<std::string> comments{};  ///< The header's lines "comment ..." and "obj_info ...", whole, in order.
 };
 
@@ -45,13 +46,14 @@ struct LoadedScene {
 /// Everything else is skipped. What was guessed, cut, left out, converted or skipped is in the notes.
 /// Errors: those of check_read_options(), FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;
 /// the message begins with the file's name and says what and where.
-Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options = {});
+base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// The same, and takes the temperature of a second file, as thermal_join.hpp says; vertices without one are missing. The options
 /// about temperature then belong to the second file; the scale of positions belongs to both, or, where they overlap only so,
 /// to the one that needs it (note "scaled_one_file"). `join_distance_m`: 0 = found out.
 /// The notes tell how vertices were joined, how many and how far. Unsupported when the two do not overlap in place or size.
-Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path, const std::filesystem::path& thermal_path,
-                                          const ReadOptions& options = {}, double join_distance_m = 0);
+base::Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& path,
+                                                const std::filesystem::path& thermal_path,
+                                                const ReadOptions& options = {}, double join_distance_m = 0);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -5,7 +5,7 @@
 
 #include "fusion/files/temperature_name.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -21,15 +21,16 @@ std::optional<std::size_t> find_scalar(const PlyElement& element, std::string_vi
   return found;
 }
 
-Result<void> find_positions(const PlyElement& element, PlySlots& slots) {
+base::Result<void> find_positions(const PlyElement& element, PlySlots& slots) {
   constexpr std::array<std::string_view, 3> kAxes = {"x", "y", "z"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     slots[kX + axis] = find_scalar(element, kAxes[axis]);
     if (!slots[kX + axis]) {
-      return failure(ErrorCode::BadHeader, "element 'vertex' has no property '" + std::string(kAxes[axis]) + "'");
+      return base::failure(base::ErrorCode::BadHeader,
+                           "element 'vertex' has no property '" + std::string(kAxes[axis]) + "'");
     }
   }
-  return success();
+  return base::success();
 }
 
 /// The coding of the colours, nullopt when there are none.
@@ -81,20 +82,20 @@ std::optional<std::size_t> find_bare_t(const PlyElement& element) {
   return found;
 }
 
-Result<void> find_temperatures(const PlyElement& vertices, const PlyElement* faces, const ReadOptions& options,
-                               PlySchema& schema) {
+base::Result<void> find_temperatures(const PlyElement& vertices, const PlyElement* faces, const ReadOptions& options,
+                                     PlySchema& schema) {
   const std::string& wanted = options.temperature_property;
   if (!wanted.empty()) {
     schema.vertex[kTemperature] = find_scalar(vertices, wanted);
     if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_scalar(*faces, wanted);
-    if (schema.has_vertex_temperature() || schema.has_face_temperature()) return success();
+    if (schema.has_vertex_temperature() || schema.has_face_temperature()) return base::success();
     std::string names;
     for (const PlyProperty& property : vertices.properties) {
       if (!property.is_list && names.size() < 120) names += (names.empty() ? "" : ", ") + printable(property.name);
     }
-    return failure(ErrorCode::Unsupported,
-                   "there is no scalar property '" + printable(wanted) + "' (the vertices have " + names + ")",
-                   "temperature_property");
+    return base::failure(base::ErrorCode::Unsupported,
+                         "there is no scalar property '" + printable(wanted) + "' (the vertices have " + names + ")",
+                         "temperature_property");
   }
   schema.vertex[kTemperature] = find_temperature(vertices);
   if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_temperature(*faces);
@@ -102,11 +103,11 @@ Result<void> find_temperatures(const PlyElement& vertices, const PlyElement* fac
     schema.vertex[kTemperature] = find_bare_t(vertices);
     schema.is_temperature_doubtful = schema.has_vertex_temperature();
   }
-  return success();
+  return base::success();
 }
 
 /// The list of vertices that an element of faces or strips has.
-Result<std::size_t> find_corner_list(const PlyElement& element) {
+base::Result<std::size_t> find_corner_list(const PlyElement& element) {
   const auto is_corner_list = [](const PlyProperty& property) {
     const std::string name = lower_case(property.name);
     return name == "vertex_indices" || name == "vertex_index";
@@ -114,14 +115,15 @@ Result<std::size_t> find_corner_list(const PlyElement& element) {
   const auto list = std::find_if(element.properties.begin(), element.properties.end(), is_corner_list);
   const std::string subject = "element '" + printable(element.name) + "' has ";
   if (list == element.properties.end() || !list->is_list) {
-    return failure(ErrorCode::BadHeader, subject + "no list 'vertex_indices' or 'vertex_index'");
+    return base::failure(base::ErrorCode::BadHeader, subject + "no list 'vertex_indices' or 'vertex_index'");
   }
   if (std::find_if(std::next(list), element.properties.end(), is_corner_list) != element.properties.end()) {
-    return failure(ErrorCode::BadHeader, subject + "both 'vertex_indices' and 'vertex_index'");
+    return base::failure(base::ErrorCode::BadHeader, subject + "both 'vertex_indices' and 'vertex_index'");
   }
   if (is_floating(list->type)) {
-    return failure(ErrorCode::BadHeader, "the vertex indices of faces have the type " +
-                                             std::string(to_string(list->type)) + ", which is not a whole number's");
+    return base::failure(base::ErrorCode::BadHeader, "the vertex indices of faces have the type " +
+                                                         std::string(to_string(list->type)) +
+                                                         ", which is not a whole number's");
   }
   return static_cast<std::size_t>(list - element.properties.begin());
 }
@@ -133,10 +135,10 @@ const PlyElement* with_entries(const PlyHeader& header, std::string_view name) {
 
 }  // namespace
 
-Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options) {
+base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options) {
   const PlyElement* const vertices = header.find("vertex");
-  if (vertices == nullptr) return failure(ErrorCode::BadHeader, "the header has no element 'vertex'");
-  if (vertices->count == 0) return failure(ErrorCode::BadValue, "the scene is empty: it has 0 vertices");
+  if (vertices == nullptr) return base::failure(base::ErrorCode::BadHeader, "the header has no element 'vertex'");
+  if (vertices->count == 0) return base::failure(base::ErrorCode::BadValue, "the scene is empty: it has 0 vertices");
   PlySchema schema;
   BOOST_OUTCOME_TRY(find_positions(*vertices, schema.vertex));
   const PlyElement* const faces = with_entries(header, "face");
@@ -153,4 +155,4 @@ Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options
   return schema;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -10,7 +10,7 @@
 #include "fusion/files/ply_header.hpp"
 #include "fusion/files/read_options.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What a property means to us.
 enum PlySlot : std::size_t { kX, kY, kZ, kRed, kGreen, kBlue, kTemperature, kSlotCount };
@@ -43,6 +43,6 @@ struct PlySchema {
 };
 
 /// Finds what is of use. BadHeader, or Unsupported when the options name a property that is not there.
-Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options);
+base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -8,14 +8,14 @@
 #include "fusion/files/ply_body_reader.hpp"
 #include "fusion/files/ply_notes.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
 template <class T>
-Result<T> located(Result<T> result, const std::string& name) {
+base::Result<T> located(base::Result<T> result, const std::string& name) {
   if (result) return result;
-  Error error = std::move(result).error();
+  base::Error error = std::move(result).error();
   error.message = name + ": " + error.message;
   if (error.field.empty()) error.field = name;
   return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(error));
@@ -42,22 +42,23 @@ bool is_damaged_as_text(BlockFile& file, const PlyHeader& header) {
 
 }  // namespace
 
-Result<PlyStream> PlyStream::open(const std::filesystem::path& path, const ReadOptions& options) {
+base::Result<PlyStream> PlyStream::open(const std::filesystem::path& path, const ReadOptions& options) {
   BOOST_OUTCOME_TRY(check_read_options(options));
   const std::string name = path.filename().empty() ? path.string() : path.filename().string();
   BOOST_OUTCOME_TRY(auto file, located(BlockFile::open(path), name));
   PlyStream stream(std::move(file), name, options);
   if (options.progress) {
-    stream.file_.set_watcher([progress = options.progress](double share) { progress(kReadingPhase, share); });
+    stream.file_.set_watcher([progress = options.progress](double share) { progress(base::kReadingPhase, share); });
   }
   BOOST_OUTCOME_TRY(located(stream.interpret(), name));
   return stream;
 }
 
-Result<void> PlyStream::interpret() {
+base::Result<void> PlyStream::interpret() {
   const auto bytes = file_.ready(kMaxPlyHeaderBytes);
   if (file_.read_error() != 0) {
-    return failure(ErrorCode::FileUnreadable, "cannot be read: " + std::generic_category().message(file_.read_error()));
+    return base::failure(base::ErrorCode::FileUnreadable,
+                         "cannot be read: " + std::generic_category().message(file_.read_error()));
   }
   const std::string text(bytes.begin(),
                          bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bytes.size(), kMaxPlyHeaderBytes)));
@@ -83,10 +84,10 @@ Result<void> PlyStream::interpret() {
     interpretation_.colours.is_bytes = schema.colour_coding == ColourCoding::Channels &&
                                        header_.format != PlyFormat::Ascii && std::all_of(first, first + 3, is_byte);
   }
-  return success();
+  return base::success();
 }
 
-Result<void> PlyStream::check_size() const {
+base::Result<void> PlyStream::check_size() const {
   // The last separator of a text file may be missing.
   const bool is_text = header_.format == PlyFormat::Ascii;
   std::uint64_t left = file_.size_bytes() - header_.size_bytes + (is_text ? 1 : 0);
@@ -94,19 +95,19 @@ Result<void> PlyStream::check_size() const {
     const std::uint64_t entry_bytes = minimum_entry_bytes(element, header_.format);
     if (entry_bytes > 0 && element.count > left / entry_bytes) {
       const std::uint64_t bytes = left - (is_text ? 1 : 0);
-      return failure(ErrorCode::Truncated, "the header promises " + std::to_string(element.count) + " entries of '" +
-                                               printable(element.name) + "' of at least " +
-                                               counted(entry_bytes, "byte", "bytes") + " each, but " +
-                                               counted(bytes, "byte is", "bytes are") + " left for them");
+      return base::failure(base::ErrorCode::Truncated,
+                           "the header promises " + std::to_string(element.count) + " entries of '" +
+                               printable(element.name) + "' of at least " + counted(entry_bytes, "byte", "bytes") +
+                               " each, but " + counted(bytes, "byte is", "bytes are") + " left for them");
     }
     left -= element.count * entry_bytes;
   }
   constexpr std::uint64_t kMaxVertices = std::numeric_limits<std::int32_t>::max();
   if (vertex_count() > kMaxVertices) {
-    return failure(ErrorCode::TooLarge,
-                   std::to_string(vertex_count()) + " vertices, at most " + std::to_string(kMaxVertices) + " are read");
+    return base::failure(base::ErrorCode::TooLarge, std::to_string(vertex_count()) + " vertices, at most " +
+                                                        std::to_string(kMaxVertices) + " are read");
   }
-  return success();
+  return base::success();
 }
 
 std::uint64_t PlyStream::triangle_count_limit() const {
@@ -135,9 +136,9 @@ bool PlyStream::has_double_positions() const {
   });
 }
 
-Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
+base::Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
   PlyBodyReader reader(file_, header_, interpretation_, handlers);
-  Result<PlyBodyFacts> facts = reader.read();
+  base::Result<PlyBodyFacts> facts = reader.read();
   return reader.handler_has_failed() ? std::move(facts) : located(with_reason(std::move(facts)), name_);
 }
 
@@ -148,16 +149,17 @@ bool PlyStream::leave_out_hole(const PlyBodyFacts& facts) {
 }
 
 /// What does not fit in a damaged file, or is left over, is only what came of the damage.
-Result<PlyBodyFacts> PlyStream::with_reason(Result<PlyBodyFacts> facts) {
+base::Result<PlyBodyFacts> PlyStream::with_reason(base::Result<PlyBodyFacts> facts) {
   if (facts && facts.value().trailing_byte_count == 0) return facts;
   if (!is_damaged_as_text(file_, header_)) return facts;
-  return failure(ErrorCode::BadValue,
-                 "the file was damaged on its way by a transfer that took it for text (every line feed byte has become "
-                 "two bytes); transfer it again as binary");
+  return base::failure(
+      base::ErrorCode::BadValue,
+      "the file was damaged on its way by a transfer that took it for text (every line feed byte has become "
+      "two bytes); transfer it again as binary");
 }
 
 std::vector<Note> PlyStream::notes(const PlyBodyFacts& facts) const {
   return ply_notes(header_, interpretation_, options_, facts);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -21,13 +21,13 @@
 #include "fusion/files/vertex_colour.hpp"
 #include "fusion/files/vertex_temperature.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Some vertices in the file's order. The spans are valid during the call only.
 struct PlyVertexBlock {
   std::uint64_t first_vertex = 0;
-  std::span<const Vec3d> positions;            ///< Metres; finite, within 1e30, but for those left out.
-  std::span<const Rgb8> visible;               ///< Empty when the file has no colours.
+  std::span<const base::Vec3d> positions;      ///< Metres; finite, within 1e30, but for those left out.
+  std::span<const base::Rgb8> visible;         ///< Empty when the file has no colours.
   std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
   /// Those without a position, by their index in the block, rising: to be left out of the scene. No triangle has them.
   std::span<const std::uint32_t> left_out;
@@ -36,24 +36,24 @@ struct PlyVertexBlock {
 /// Who gets the body of a file: all vertices, then all triangles. A handler that fails ends the reading with its error; an
 /// empty one is not called.
 struct PlyHandlers {
-  std::function<Result<void>(const PlyVertexBlock&)> vertices;
+  std::function<base::Result<void>(const PlyVertexBlock&)> vertices;
   /// Triangles as they will be drawn: polygons cut into fans, strips into triangles, indices checked and of the file's
   /// order, none with a vertex twice or one that is left out.
-  std::function<Result<void>(std::span<const Triangle>)> triangles;
+  std::function<base::Result<void>(std::span<const base::Triangle>)> triangles;
 };
 
 /// What was found in the body.
 struct PlyBodyFacts {
-  Vec3d min, max;            ///< Of all positions.
+  base::Vec3d min, max;      ///< Of all positions.
   std::optional<Bulk> bulk;  ///< Where nearly all of them are, when that is more than one place.
-  Vec3d origin;              ///< What to tell them from, as scene_origin.hpp says.
+  base::Vec3d origin;        ///< What to tell them from, as scene_origin.hpp says.
   /// What stands for holes, found in this reading: PlyStream::leave_out_hole() takes it.
   std::optional<Hole> hole;
   FaceFacts faces;
   TemperatureFacts temperature;
   std::uint64_t left_out_vertex_count = 0;      ///< Without a position within 1e30 m, and holes.
   std::uint64_t hole_count = 0;                 ///< Left out because they are at the place of holes.
-  std::optional<Vec3d> crowded_place;           ///< Many vertices are there, and faces use them: it may be a hole.
+  std::optional<base::Vec3d> crowded_place;     ///< Many vertices are there, and faces use them: it may be a hole.
   std::uint64_t unreferenced_vertex_count = 0;  ///< Vertices of no triangle; 0 when there is no triangle at all.
   std::uint64_t clamped_colour_count = 0;       ///< Vertices whose colour was out of range or no number.
   std::uint64_t trailing_byte_count = 0;        ///< After the last element; white space does not count in ascii.
@@ -69,8 +69,8 @@ struct PlyInterpretation {
   ColourConversion colours;  ///< Of the vertices.
   TemperatureConversion temperature;
   double metres_per_unit;
-  std::optional<Vec3d> origin;  ///< Absent: chosen.
-  std::optional<Hole> hole;     ///< Vertices there are no part of the scene.
+  std::optional<base::Vec3d> origin;  ///< Absent: chosen.
+  std::optional<Hole> hole;           ///< Vertices there are no part of the scene.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the
@@ -79,7 +79,7 @@ struct PlyInterpretation {
 class PlyStream {
  public:
   /// Opens the file, judges its header against its size, and looks at its values where their meaning depends on them.
-  static Result<PlyStream> open(const std::filesystem::path& path, const ReadOptions& options = {});
+  static base::Result<PlyStream> open(const std::filesystem::path& path, const ReadOptions& options = {});
 
   const PlyHeader& header() const { return header_; }
   std::uint64_t vertex_count() const { return vertices().count; }
@@ -91,7 +91,7 @@ class PlyStream {
   bool has_double_positions() const;
 
   /// Reads the whole body from its beginning; may be called again.
-  Result<PlyBodyFacts> read(const PlyHandlers& handlers);
+  base::Result<PlyBodyFacts> read(const PlyHandlers& handlers);
 
   /// Where the reading found holes that are written as a number, they are left out of all later ones, and true tells that this
   /// one is void.
@@ -103,9 +103,9 @@ class PlyStream {
  private:
   PlyStream(BlockFile file, std::string name, ReadOptions options)
       : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)), interpretation_(options_) {}
-  Result<void> interpret();
-  Result<void> check_size() const;
-  Result<PlyBodyFacts> with_reason(Result<PlyBodyFacts> facts);
+  base::Result<void> interpret();
+  base::Result<void> check_size() const;
+  base::Result<PlyBodyFacts> with_reason(base::Result<PlyBodyFacts> facts);
   const PlyElement& vertices() const { return *header_.find("vertex"); }
 
   BlockFile file_;
@@ -115,4 +115,4 @@ class PlyStream {
   PlyInterpretation interpretation_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -10,7 +10,7 @@
 #include "fusion/files/ply_vertex_reader.hpp"
 #include "fusion/files/vertex_colour.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -83,12 +83,12 @@ class FaceSums {
     }
   }
 
-  Result<void> conclude(PlyScalar colour_type, PlySurvey& survey) {
+  base::Result<void> conclude(PlyScalar colour_type, PlySurvey& survey) {
     if (!colours_.empty()) {
       // Packed colours were unpacked before they were added.
       const bool is_packed = schema_.colour_coding == ColourCoding::Packed;
       BOOST_OUTCOME_TRY(const ColourConversion conversion,
-                        is_packed ? Result<ColourConversion>(ColourConversion{})
+                        is_packed ? base::Result<ColourConversion>(ColourConversion{})
                                   : colour_conversion(schema_.colour_coding, colour_type, survey.largest_colour));
       survey.face_colours.resize(colours_.size());
       for (std::size_t v = 0; v < colours_.size(); ++v) {
@@ -109,7 +109,7 @@ class FaceSums {
       survey.face_temperature_celsius.push_back(
           static_cast<float>(temperature.sum / static_cast<double>(temperature.count)));
     }
-    return success();
+    return base::success();
   }
 
  private:
@@ -119,7 +119,7 @@ class FaceSums {
     if (schema_.colour_coding == ColourCoding::Packed) {
       ColourConversion unpacking;
       unpacking.is_packed = true;
-      Rgb8 colour;
+      base::Rgb8 colour;
       std::uint64_t ignored = 0;
       unpacking.convert({std::span<const double>(&channels[0], 1), {}, {}}, {&colour, 1}, ignored);
       channels = {static_cast<double>(colour.r), static_cast<double>(colour.g), static_cast<double>(colour.b)};
@@ -149,8 +149,8 @@ class FaceSums {
 };
 
 /// Reads the faces for what they carry.
-Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, const PlySchema& schema,
-                          std::uint64_t vertex_count, FaceSums& sums, PlySurvey& survey) {
+base::Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, const PlySchema& schema,
+                                std::uint64_t vertex_count, FaceSums& sums, PlySurvey& survey) {
   std::vector<std::uint32_t> corners;
   std::array<double, kSlotCount> values{};
   for (; cursor.entry < element.count; ++cursor.entry) {
@@ -173,7 +173,7 @@ Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, const Pl
     BOOST_OUTCOME_TRY(cursor.end_entry());
     sums.add(corners, values, survey);
   }
-  return success();
+  return base::success();
 }
 
 }  // namespace
@@ -186,8 +186,8 @@ bool needs_survey(const PlyHeader& header, const PlySchema& schema) {
                      [&](const auto& index) { return vertices.properties[*index].type != PlyScalar::UInt8; });
 }
 
-Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const PlySchema& schema,
-                             const ReadOptions& options) {
+base::Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const PlySchema& schema,
+                                   const ReadOptions& options) {
   PlySurvey survey;
   const PlyElement* const vertices = header.find("vertex");
   const PlyElement* const faces = header.find("face");
@@ -224,4 +224,4 @@ Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const Ply
   return survey;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

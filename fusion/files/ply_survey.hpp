@@ -12,7 +12,7 @@
 #include "fusion/files/read_options.hpp"
 #include "fusion/files/vertex_temperature.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What the values of a PLY file tell that its header does not, for the few files whose reading depends on it: how far
 /// their colours go, whether a doubtful property is a temperature, and what the faces around a vertex carry.
@@ -26,7 +26,7 @@ struct PlySurvey {
   bool is_temperature_plausible = true;
 
   /// The mean over the faces of each vertex, when the faces have colours or temperatures: mid grey and NaN without any.
-  std::vector<Rgb8> face_colours;
+  std::vector<base::Rgb8> face_colours;
   std::vector<float> face_temperature_celsius;
   TemperatureFacts face_temperature;
   std::uint64_t clamped_colour_count = 0;  ///< Vertices.
@@ -37,7 +37,7 @@ bool needs_survey(const PlyHeader& header, const PlySchema& schema);
 
 /// One reading of the body. Memory is constant, but for files whose faces have colours (16 bytes a vertex) or temperatures
 /// (12 bytes a vertex).
-Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const PlySchema& schema,
-                             const ReadOptions& options);
+base::Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, const PlySchema& schema,
+                                   const ReadOptions& options);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

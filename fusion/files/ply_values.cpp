@@ -8,7 +8,7 @@
 #include <limits>
 #include <system_error>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -77,4 +77,4 @@ std::optional<std::int64_t> parse_whole_number(std::string_view token) {
   return value;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

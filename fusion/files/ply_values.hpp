@@ -11,7 +11,7 @@
 
 #include "fusion/files/ply_header.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// One value of a binary file, whose bytes may be in the other order and need no alignment.
 template <class T, bool kSwapped>
@@ -81,4 +81,4 @@ std::optional<double> parse_number(std::string_view token);
 /// A whole number as text files have it.
 std::optional<std::int64_t> parse_whole_number(std::string_view token);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -4,7 +4,7 @@
 
 #include "fusion/files/ply_values.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -45,7 +45,7 @@ PlyVertexReader::PlyVertexReader(PlyCursor& cursor, const PlyElement& element, c
   }
 }
 
-Result<PlyRawVertices> PlyVertexReader::next() {
+base::Result<PlyRawVertices> PlyVertexReader::next() {
   auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kBlockVertices, element_.count - cursor_.entry));
   PlyRawVertices block;
   block.first_vertex = cursor_.entry;
@@ -68,7 +68,7 @@ Result<PlyRawVertices> PlyVertexReader::next() {
 
 /// As many entries as are in the buffer, at most `count`, which becomes their number.
 template <bool kSwapped>
-Result<void> PlyVertexReader::read_columns(std::size_t& count) {
+base::Result<void> PlyVertexReader::read_columns(std::size_t& count) {
   const auto bytes = cursor_.file().ready(entry_bytes_);
   if (bytes.size() < entry_bytes_) return cursor_.shortage();
   count = std::min(count, bytes.size() / entry_bytes_);
@@ -78,10 +78,10 @@ Result<void> PlyVertexReader::read_columns(std::size_t& count) {
   }
   cursor_.file().consume(count * entry_bytes_);
   cursor_.entry += count;
-  return success();
+  return base::success();
 }
 
-Result<void> PlyVertexReader::read_one_by_one(std::size_t count) {
+base::Result<void> PlyVertexReader::read_one_by_one(std::size_t count) {
   std::vector<std::vector<const Column*>> targets(element_.properties.size());
   for (const Column& column : columns_) targets[column.property].push_back(&column);
   for (std::size_t i = 0; i < count; ++i, ++cursor_.entry) {
@@ -99,7 +99,7 @@ Result<void> PlyVertexReader::read_one_by_one(std::size_t count) {
     }
     BOOST_OUTCOME_TRY(cursor_.end_entry());
   }
-  return success();
+  return base::success();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -9,12 +9,12 @@
 #include "fusion/files/ply_cursor.hpp"
 #include "fusion/files/ply_schema.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Some vertices in the file's order, as the numbers that the file has. The spans are valid until the next block is asked for.
 struct PlyRawVertices {
   std::uint64_t first_vertex = 0;
-  std::span<Vec3d> positions;
+  std::span<base::Vec3d> positions;
   std::array<std::span<double>, 3> colours;  ///< Empty when the vertices have none. Packed ones: the first alone.
   std::span<double> temperatures;            ///< Empty when the vertices have none.
 };
@@ -25,12 +25,12 @@ class PlyVertexReader {
   PlyVertexReader(PlyCursor& cursor, const PlyElement& element, const PlySchema& schema);
 
   /// The next vertices; none at the end.
-  Result<PlyRawVertices> next();
+  base::Result<PlyRawVertices> next();
 
  private:
   template <bool kSwapped>
-  Result<void> read_columns(std::size_t& count);
-  Result<void> read_one_by_one(std::size_t count);
+  base::Result<void> read_columns(std::size_t& count);
+  base::Result<void> read_one_by_one(std::size_t count);
 
   /// A column that is read, and where its values go.
   struct Column {
@@ -46,9 +46,9 @@ class PlyVertexReader {
   const bool has_fixed_size_;
   std::size_t entry_bytes_ = 0;  ///< When they all have the same.
   std::vector<Column> columns_;
-  std::vector<Vec3d> positions_;
+  std::vector<base::Vec3d> positions_;
   std::array<std::vector<double>, 3> colours_;
   std::vector<double> temperatures_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

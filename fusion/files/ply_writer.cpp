@@ -7,12 +7,12 @@
 #include "fusion/files/output_file.hpp"
 #include "fusion/files/ply_encoder.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
 /// The triangles in the input's numbers, in which the vertices that were left out count.
-std::vector<Triangle> input_triangles(const MultispectralMesh& mesh) {
+std::vector<base::Triangle> input_triangles(const mesh::MultispectralMesh& mesh) {
   std::vector<std::uint32_t> input_index;
   input_index.reserve(mesh.vertex_count());
   auto hole = mesh.left_out.begin();
@@ -23,15 +23,15 @@ std::vector<Triangle> input_triangles(const MultispectralMesh& mesh) {
       input_index.push_back(v);
     }
   }
-  std::vector<Triangle> triangles = mesh.triangles();
-  for (Triangle& triangle : triangles) {
+  std::vector<base::Triangle> triangles = mesh.triangles();
+  for (base::Triangle& triangle : triangles) {
     for (std::uint32_t& corner : triangle) corner = input_index[corner];
   }
   return triangles;
 }
 
-Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours, const std::string& comment,
-                    PlyEncoder::Sink sink) {
+base::Result<void> encode(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                          const std::string& comment, PlyEncoder::Sink sink) {
   PlyLayout layout;
   layout.vertex_count = mesh.vertex_count() + mesh.left_out.size();
   layout.triangle_count = mesh.triangle_count();
@@ -41,9 +41,9 @@ Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours
   layout.comment = comment;
   PlyEncoder encoder(layout, std::move(sink));
   if (colours.size() != mesh.vertex_count()) {
-    return failure(ErrorCode::Inconsistent, "a mesh of " + std::to_string(mesh.vertex_count()) +
-                                                " vertices cannot be written with " + std::to_string(colours.size()) +
-                                                " colours");
+    return base::failure(base::ErrorCode::Inconsistent, "a mesh of " + std::to_string(mesh.vertex_count()) +
+                                                            " vertices cannot be written with " +
+                                                            std::to_string(colours.size()) + " colours");
   }
   std::size_t begin = 0;
   for (std::size_t i = 0; i <= mesh.left_out.size(); ++i) {
@@ -53,7 +53,7 @@ Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours
                                        mesh.temperature_celsius().subspan(begin, count)));
     begin = end;
     if (i == mesh.left_out.size()) break;
-    const LeftOutVertex& hole = mesh.left_out[i];
+    const mesh::LeftOutVertex& hole = mesh.left_out[i];
     BOOST_OUTCOME_TRY(encoder.left_out_vertex(hole.position, hole.visible, hole.temperature_celsius));
   }
   BOOST_OUTCOME_TRY(encoder.triangles(mesh.left_out.empty() ? mesh.triangles() : input_triangles(mesh)));
@@ -62,19 +62,21 @@ Result<void> encode(const MultispectralMesh& mesh, std::span<const Rgb8> colours
 
 }  // namespace
 
-Result<void> write_ply(std::ostream& out, const MultispectralMesh& mesh, std::span<const Rgb8> colours) {
-  BOOST_OUTCOME_TRY(encode(mesh, colours, {}, [&out](std::span<const std::byte> bytes) -> Result<void> {
+base::Result<void> write_ply(std::ostream& out, const mesh::MultispectralMesh& mesh,
+                             std::span<const base::Rgb8> colours) {
+  BOOST_OUTCOME_TRY(encode(mesh, colours, {}, [&out](std::span<const std::byte> bytes) -> base::Result<void> {
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (!out) return failure(ErrorCode::FileUnwritable, "the PLY stream cannot be written");
-    return success();
+    if (!out) return base::failure(base::ErrorCode::FileUnwritable, "the PLY stream cannot be written");
+    return base::success();
   }));
-  if (!out.flush()) return failure(ErrorCode::FileUnwritable, "the PLY stream cannot be written");
-  return success();
+  if (!out.flush()) return base::failure(base::ErrorCode::FileUnwritable, "the PLY stream cannot be written");
+  return base::success();
 }
 
-Result<void> write_ply(const std::filesystem::path& path, const MultispectralMesh& mesh, std::span<const Rgb8> colours,
-                       const std::string& comment, const Progress& progress) {
-  report(progress, kWritingPhase, 0);
+base::Result<void> write_ply(const std::filesystem::path& path, const mesh::MultispectralMesh& mesh,
+                             std::span<const base::Rgb8> colours, const std::string& comment,
+                             const base::Progress& progress) {
+  base::report(progress, base::kWritingPhase, 0);
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(path));
   const std::size_t vertex_bytes = (mesh.double_positions ? 24U : 12U) + 3U + (mesh.has_temperature ? 4U : 0U);
   const std::size_t whole_bytes =
@@ -83,11 +85,11 @@ Result<void> write_ply(const std::filesystem::path& path, const MultispectralMes
   BOOST_OUTCOME_TRY(encode(mesh, colours, comment, [&](std::span<const std::byte> bytes) {
     written_bytes += bytes.size();
     // The header comes on top, so a small file would be told to be more than whole.
-    report(progress, kWritingPhase,
-           std::min(1.0, static_cast<double>(written_bytes) / static_cast<double>(whole_bytes)));
+    base::report(progress, base::kWritingPhase,
+                 std::min(1.0, static_cast<double>(written_bytes) / static_cast<double>(whole_bytes)));
     return file.write(bytes);
   }));
   return file.commit();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -6,7 +6,7 @@
 #include <limits>
 #include <tuple>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -17,9 +17,9 @@ constexpr std::size_t kFewestElsewhere = 12;
 constexpr std::size_t kMoreThanAnyOther = 8;
 constexpr double kBulkReach = 32;
 
-constexpr std::array<double Vec3d::*, 3> kAxes = {&Vec3d::x, &Vec3d::y, &Vec3d::z};
+constexpr std::array<double base::Vec3d::*, 3> kAxes = {&base::Vec3d::x, &base::Vec3d::y, &base::Vec3d::z};
 
-bool is_finite(const Vec3d& p) {
+bool is_finite(const base::Vec3d& p) {
   constexpr double kFloatMax = std::numeric_limits<float>::max();
   return std::abs(p.x) <= kFloatMax && std::abs(p.y) <= kFloatMax && std::abs(p.z) <= kFloatMax;
 }
@@ -31,7 +31,7 @@ double median(std::vector<double>& values) {
 }
 
 /// From a box to a point; 0 inside.
-double distance(const Bulk& box, const Vec3d& p) {
+double distance(const Bulk& box, const base::Vec3d& p) {
   std::array<double, 3> gap{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double at = p.*kAxes[axis];
@@ -59,9 +59,9 @@ void PositionSample::choose_next() {
   ++bucket_;
 }
 
-void PositionSample::add(std::uint64_t first_vertex, std::span<const Vec3d> positions) {
+void PositionSample::add(std::uint64_t first_vertex, std::span<const base::Vec3d> positions) {
   for (; next_vertex_ < first_vertex + positions.size(); choose_next()) {
-    const Vec3d& position = positions[static_cast<std::size_t>(next_vertex_ - first_vertex)];
+    const base::Vec3d& position = positions[static_cast<std::size_t>(next_vertex_ - first_vertex)];
     if (is_finite(position)) entries_.push_back({next_vertex_, position});
   }
 }
@@ -136,7 +136,7 @@ void PositionSample::find_coordinate_hole(double metres) {
 
 void PositionSample::find_bulk() {
   if (entries_.empty()) return;
-  Vec3d middle;
+  base::Vec3d middle;
   double half = 0;
   std::vector<double> values(entries_.size());
   for (const auto axis : kAxes) {
@@ -161,4 +161,4 @@ void PositionSample::find_bulk() {
   bulk_ = bulk;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

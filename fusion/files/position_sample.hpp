@@ -8,28 +8,28 @@
 
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Where nearly all of a scene is: not its strays, nor the place that stands for "no position".
 struct Bulk {
-  Vec3d min, max;
+  base::Vec3d min, max;
 
   double extent() const;
 };
 
 /// What stands for "no position" in a file: a place, or one coordinate, such as the height of cells that nobody has measured.
 struct Hole {
-  Vec3d place;                                 ///< Metres.
+  base::Vec3d place;                           ///< Metres.
   std::array<bool, 3> axes{true, true, true};  ///< Which of its coordinates tell.
 
-  bool has(const Vec3d& p) const {
+  bool has(const base::Vec3d& p) const {
     return (!axes[0] || p.x == place.x) && (!axes[1] || p.y == place.y) && (!axes[2] || p.z == place.z);
   }
 };
 
 /// A place that stands for "no position", as files without nan write the holes of an organised cloud.
 struct HolePlace {
-  Vec3d place;
+  base::Vec3d place;
   std::vector<std::uint64_t> vertices;  ///< Some of those that are there.
   bool is_far = false;                  ///< Farther from the bulk than that is large.
 };
@@ -41,7 +41,7 @@ class PositionSample {
   explicit PositionSample(std::uint64_t vertex_count);
 
   /// The vertices that come next in the file; positions that are not finite are passed over.
-  void add(std::uint64_t first_vertex, std::span<const Vec3d> positions);
+  void add(std::uint64_t first_vertex, std::span<const base::Vec3d> positions);
 
   /// Looks for holes and bulk, in time and memory of the sample. `metres` in one unit of the file.
   void conclude(double metres);
@@ -56,7 +56,7 @@ class PositionSample {
  private:
   struct Entry {
     std::uint64_t vertex = 0;
-    Vec3d position;
+    base::Vec3d position;
   };
   void choose_next();
   void find_coordinate_hole(double metres);
@@ -72,4 +72,4 @@ class PositionSample {
   std::optional<Bulk> bulk_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -44,27 +44,29 @@ std::optional<CelsiusScale> ReadOptions::celsius_scale() const {
   return CelsiusScale{temperature_scale.value_or(1), temperature_offset.value_or(0)};
 }
 
-Result<void> check_read_options(const ReadOptions& options) {
+base::Result<void> check_read_options(const ReadOptions& options) {
   if (options.temperature_unit && (options.temperature_scale || options.temperature_offset)) {
-    return failure(ErrorCode::Inconsistent, "temperature-unit excludes temperature-scale and temperature-offset",
-                   "temperature_unit");
+    return base::failure(base::ErrorCode::Inconsistent,
+                         "temperature-unit excludes temperature-scale and temperature-offset", "temperature_unit");
   }
   if (options.temperature_scale && (!std::isfinite(*options.temperature_scale) || *options.temperature_scale == 0)) {
-    return failure(ErrorCode::OutOfRange, "temperature-scale is a finite number other than 0", "temperature_scale");
+    return base::failure(base::ErrorCode::OutOfRange, "temperature-scale is a finite number other than 0",
+                         "temperature_scale");
   }
   if (options.temperature_offset && !std::isfinite(*options.temperature_offset)) {
-    return failure(ErrorCode::OutOfRange, "temperature-offset is a finite number", "temperature_offset");
+    return base::failure(base::ErrorCode::OutOfRange, "temperature-offset is a finite number", "temperature_offset");
   }
   for (const double value : options.no_data) {
     if (std::isnan(value)) {
-      return failure(ErrorCode::OutOfRange, "no-data is a number; nan stands for no data anyway", "no_data");
+      return base::failure(base::ErrorCode::OutOfRange, "no-data is a number; nan stands for no data anyway",
+                           "no_data");
     }
   }
   if (!std::isfinite(options.scale()) || options.scale() <= 0) {
-    return failure(ErrorCode::OutOfRange, "scale is the metres in one unit of the file, a finite number above 0",
-                   "scale");
+    return base::failure(base::ErrorCode::OutOfRange,
+                         "scale is the metres in one unit of the file, a finite number above 0", "scale");
   }
-  return success();
+  return base::success();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -10,7 +10,7 @@
 #include "fusion/base/up_axis.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What a temperature property counts in.
 enum class TemperatureUnit { Celsius, Kelvin, Centikelvin, Fahrenheit };
@@ -37,11 +37,11 @@ struct ReadOptions {
   /// Metres in one unit of the file's positions; absent: nobody has said, and they are taken for metres.
   std::optional<double> metres_per_unit;
   /// What positions are to be relative to, in metres; absent: chosen as scene_origin.hpp says.
-  std::optional<Vec3d> origin;
+  std::optional<base::Vec3d> origin;
   /// Which way is up; absent: found out. Reading does not need it, survey() does.
-  std::optional<UpAxis> up;
+  std::optional<base::UpAxis> up;
   /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.
-  Progress progress;
+  base::Progress progress;
 
   double scale() const { return metres_per_unit.value_or(1); }
   /// How the temperature is scaled; nullopt: nobody said so, it is taken for degrees Celsius.
@@ -49,6 +49,6 @@ struct ReadOptions {
 };
 
 /// OutOfRange or Inconsistent, naming the option, when the options cannot be meant.
-Result<void> check_read_options(const ReadOptions& options);
+base::Result<void> check_read_options(const ReadOptions& options);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -22,19 +22,19 @@ double axis_origin(double min, double max, double extent) {
 
 }  // namespace
 
-Vec3d scene_origin(const Vec3d& min, const Vec3d& max) {
+base::Vec3d scene_origin(const base::Vec3d& min, const base::Vec3d& max) {
   const double extent = std::max({max.x - min.x, max.y - min.y, max.z - min.z});
   return {axis_origin(min.x, max.x, extent), axis_origin(min.y, max.y, extent), axis_origin(min.z, max.z, extent)};
 }
 
-Vec3d scene_origin(const Vec3d& min, const Vec3d& max, const std::optional<Bulk>& bulk) {
-  const Vec3d origin = scene_origin(min, max);
+base::Vec3d scene_origin(const base::Vec3d& min, const base::Vec3d& max, const std::optional<Bulk>& bulk) {
+  const base::Vec3d origin = scene_origin(min, max);
   constexpr double kTooCoarse = 1.0 / 20'000;
   if (!bulk || largest_rounding(*bulk, origin) <= kTooCoarse * bulk->extent()) return origin;
   return scene_origin(bulk->min, bulk->max);
 }
 
-double largest_rounding(const Bulk& bulk, const Vec3d& origin) {
+double largest_rounding(const Bulk& bulk, const base::Vec3d& origin) {
   const double farthest =
       std::max({std::abs(bulk.min.x - origin.x), std::abs(bulk.max.x - origin.x), std::abs(bulk.min.y - origin.y),
                 std::abs(bulk.max.y - origin.y), std::abs(bulk.min.z - origin.z), std::abs(bulk.max.z - origin.z)});
@@ -43,4 +43,4 @@ double largest_rounding(const Bulk& bulk, const Vec3d& origin) {
   return std::ldexp(1.0, exponent - std::numeric_limits<float>::digits - 1);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -3,7 +3,7 @@
 #include "fusion/files/ply_reader.hpp"
 #include "fusion/files/read_options.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Finds out of a scene that was read what its numbers alone do not say, for those who look at it: sets core_bounds and the
 /// mesh's up (as the options say; else as the file's comments tell it or its shape shows it; else z), and whether it is metric (when the
@@ -15,4 +15,4 @@ namespace spectra::fusion {
 /// - "may_be_millimetres": the size is one of a room, but in millimetres.
 void survey(LoadedScene& scene, const ReadOptions& options = {});
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -140,4 +140,4 @@ TemperatureName temperature_name(std::string_view name) {
   return result;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

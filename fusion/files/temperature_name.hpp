@@ -5,7 +5,7 @@
 
 #include "fusion/files/read_options.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What the name of a property tells about temperature.
 struct TemperatureName {
@@ -24,4 +24,4 @@ struct TemperatureName {
 
 TemperatureName temperature_name(std::string_view name);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -18,7 +18,7 @@
 #include "fusion/mesh/nearest_surface.hpp"
 #include "fusion/mesh/stray_points.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -50,9 +50,9 @@ struct Box {
   }
 };
 
-Box core_box(const MultispectralMesh& mesh) {
-  const Bounds core = stray_points(mesh.positions(), mesh.triangles()).core;
-  const auto absolute = [&mesh](const Vec3f& p) -> std::array<double, 3> {
+Box core_box(const mesh::MultispectralMesh& mesh) {
+  const base::Bounds core = mesh::stray_points(mesh.positions(), mesh.triangles()).core;
+  const auto absolute = [&mesh](const base::Vec3f& p) -> std::array<double, 3> {
     return {mesh.origin.x + static_cast<double>(p.x), mesh.origin.y + static_cast<double>(p.y),
             mesh.origin.z + static_cast<double>(p.z)};
   };
@@ -91,27 +91,27 @@ std::string range_text(const Box& box) {
   return text;
 }
 
-Error no_overlap(const LoadedScene& scene, const LoadedScene& thermal, const std::string& what) {
-  return {ErrorCode::Unsupported,
+base::Error no_overlap(const LoadedScene& scene, const LoadedScene& thermal, const std::string& what) {
+  return {base::ErrorCode::Unsupported,
           thermal.mesh.name + ": the thermal file does not lie on " + scene.mesh.name + ": " + what, thermal.mesh.name};
 }
 
 /// The thermal vertices relative to the scene's origin.
-std::vector<Vec3f> positions_in(const MultispectralMesh& scene, const MultispectralMesh& thermal) {
-  std::vector<Vec3f> positions(thermal.vertex_count());
+std::vector<base::Vec3f> positions_in(const mesh::MultispectralMesh& scene, const mesh::MultispectralMesh& thermal) {
+  std::vector<base::Vec3f> positions(thermal.vertex_count());
   const auto moved = [](double origin, double other_origin, float p) {
     constexpr double kLargest = std::numeric_limits<float>::max();
     return static_cast<float>(std::clamp(origin - other_origin + static_cast<double>(p), -kLargest, kLargest));
   };
-  std::transform(thermal.positions().begin(), thermal.positions().end(), positions.begin(), [&](const Vec3f& p) {
-    return Vec3f{moved(thermal.origin.x, scene.origin.x, p.x), moved(thermal.origin.y, scene.origin.y, p.y),
-                 moved(thermal.origin.z, scene.origin.z, p.z)};
+  std::transform(thermal.positions().begin(), thermal.positions().end(), positions.begin(), [&](const base::Vec3f& p) {
+    return base::Vec3f{moved(thermal.origin.x, scene.origin.x, p.x), moved(thermal.origin.y, scene.origin.y, p.y),
+                       moved(thermal.origin.z, scene.origin.z, p.z)};
   });
   return positions;
 }
 
 /// The largest difference of a coordinate, vertex by vertex.
-double largest_difference(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+double largest_difference(std::span<const base::Vec3f> a, std::span<const base::Vec3f> b) {
   double largest = 0;
   for (std::size_t v = 0; v < a.size(); ++v) {
     for (const auto& [p, q] : {std::pair{a[v].x, b[v].x}, std::pair{a[v].y, b[v].y}, std::pair{a[v].z, b[v].z}}) {
@@ -139,7 +139,7 @@ float largest_finite(std::span<const float> values) {
   return largest;
 }
 
-double squared_distance(const Vec3f& a, const Vec3f& b) {
+double squared_distance(const base::Vec3f& a, const base::Vec3f& b) {
   const double x = static_cast<double>(a.x) - static_cast<double>(b.x);
   const double y = static_cast<double>(a.y) - static_cast<double>(b.y);
   const double z = static_cast<double>(a.z) - static_cast<double>(b.z);
@@ -148,12 +148,12 @@ double squared_distance(const Vec3f& a, const Vec3f& b) {
 
 /// Vertices of the scene that are not where the thermal ones of the same number are, but for what a float in the coordinates of the file is
 /// rounded by; those farthest apart first.
-std::vector<std::uint32_t> moved_vertices(const MultispectralMesh& scene, std::span<const Vec3f> thermal) {
+std::vector<std::uint32_t> moved_vertices(const mesh::MultispectralMesh& scene, std::span<const base::Vec3f> thermal) {
   const auto is_same = [](double origin, float a, float b) {
     const double rounding = (std::abs(origin + static_cast<double>(a)) + std::abs(origin)) * 0x1p-23;
     return std::abs(static_cast<double>(a) - static_cast<double>(b)) <= rounding;
   };
-  const std::span<const Vec3f> places = scene.positions();
+  const std::span<const base::Vec3f> places = scene.positions();
   std::vector<std::uint32_t> moved;
   for (std::uint32_t v = 0; v < places.size(); ++v) {
     if (!is_same(scene.origin.x, places[v].x, thermal[v].x) || !is_same(scene.origin.y, places[v].y, thermal[v].y) ||
@@ -170,18 +170,18 @@ std::vector<std::uint32_t> moved_vertices(const MultispectralMesh& scene, std::s
 
 /// Whether the vertices of both are in the same order, within `tolerance` of each other: where one has moved, no other is nearer. Looked at is a
 /// sample of those, the farthest among them.
-bool is_in_order(const MultispectralMesh& scene, std::span<const Vec3f> thermal, double tolerance) {
+bool is_in_order(const mesh::MultispectralMesh& scene, std::span<const base::Vec3f> thermal, double tolerance) {
   constexpr std::size_t kFarthest = 64, kOthers = 64;
-  const std::span<const Vec3f> places = scene.positions();
+  const std::span<const base::Vec3f> places = scene.positions();
   if (largest_difference(places, thermal) > tolerance) return false;
   const std::vector<std::uint32_t> moved = moved_vertices(scene, thermal);
   const std::size_t pace = std::max<std::size_t>(1, moved.size() / kOthers);
   for (std::size_t i = 0; i < moved.size(); i += i < kFarthest ? 1 : pace) {
-    const Vec3f& place = places[moved[i]];
+    const base::Vec3f& place = places[moved[i]];
     const double own = squared_distance(place, thermal[moved[i]]);
     constexpr double kClearly = 0.98;
     if (std::any_of(thermal.begin(), thermal.end(),
-                    [&](const Vec3f& p) { return squared_distance(place, p) < kClearly * own; })) {
+                    [&](const base::Vec3f& p) { return squared_distance(place, p) < kClearly * own; })) {
       return false;
     }
   }
@@ -190,9 +190,9 @@ bool is_in_order(const MultispectralMesh& scene, std::span<const Vec3f> thermal,
 
 /// Vertices whose triangles do not close round them. Where the triangles run the same way round, the neighbours that come
 /// before and after a vertex are the same ones.
-std::vector<bool> border_vertices(const MultispectralMesh& mesh) {
+std::vector<bool> border_vertices(const mesh::MultispectralMesh& mesh) {
   std::vector<std::int64_t> balance(mesh.vertex_count());
-  for (const Triangle& t : mesh.triangles()) {
+  for (const base::Triangle& t : mesh.triangles()) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
       balance[t[corner]] +=
           static_cast<std::int64_t>(t[(corner + 1) % 3]) - static_cast<std::int64_t>(t[(corner + 2) % 3]);
@@ -217,7 +217,8 @@ void for_ranges(std::size_t count, Work work) {
 /// The thermal surface under a scene's vertices.
 class PlaceJoin {
  public:
-  PlaceJoin(const MultispectralMesh& scene, const MultispectralMesh& thermal, const Progress& progress)
+  PlaceJoin(const mesh::MultispectralMesh& scene, const mesh::MultispectralMesh& thermal,
+            const base::Progress& progress)
       : progress_(progress),
         scene_(scene),
         thermal_(thermal),
@@ -226,8 +227,8 @@ class PlaceJoin {
         surface_(positions_, thermal.triangles()),
         spacing_(surface_.median_spacing()) {}
 
-  const NearestSurface& surface() const { return surface_; }
-  std::span<const Vec3f> thermal_positions() const { return positions_; }
+  const mesh::NearestSurface& surface() const { return surface_; }
+  std::span<const base::Vec3f> thermal_positions() const { return positions_; }
 
   /// Looks from every vertex of the scene, not further than `most`.
   void look(double most) {
@@ -237,11 +238,12 @@ class PlaceJoin {
       for (std::size_t v = begin; v < end; ++v) {
         if (v % kReportedAt == 0) {
           const std::size_t done = done_count += kReportedAt;
-          report(progress_, kJoiningPhase,
-                 kBuildingShare + (1 - kBuildingShare) * std::min(1.0, static_cast<double>(done) /
-                                                                           static_cast<double>(scene_.vertex_count())));
+          base::report(progress_, base::kJoiningPhase,
+                       kBuildingShare +
+                           (1 - kBuildingShare) *
+                               std::min(1.0, static_cast<double>(done) / static_cast<double>(scene_.vertex_count())));
         }
-        const Vec3f& place = scene_.positions()[v];
+        const base::Vec3f& place = scene_.positions()[v];
         const auto hit = surface_.find(place, most);
         if (!hit) continue;
         places_[v] = {static_cast<float>(hit->distance), static_cast<float>(beyond_border(place, *hit)),
@@ -254,7 +256,7 @@ class PlaceJoin {
   double reach(double diagonal) {
     const bool has_surface = !thermal_.is_point_cloud();
     // Triangles cut off what is round by a share of their size.
-    const double coarser = std::max(spacing_, median_edge(scene_.positions(), scene_.triangles()));
+    const double coarser = std::max(spacing_, mesh::median_edge(scene_.positions(), scene_.triangles()));
     const double cut = std::min(kCutOff * coarser, kMostReach * diagonal);
     const double near =
         std::max(cut, has_surface ? std::min(kSpacings * spacing_, kLeastReach * diagonal) : kSpacings * spacing_);
@@ -301,7 +303,7 @@ class PlaceJoin {
   }
 
   /// How far off its edge a place is that is not over the surface; else 0.
-  double beyond_border(const Vec3f& place, const NearestSurface::Hit& hit) const {
+  double beyond_border(const base::Vec3f& place, const mesh::NearestSurface::Hit& hit) const {
     if (hit.corners[0] == hit.corners[1]) return 0;
     bool is_inside = true;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -312,12 +314,12 @@ class PlaceJoin {
       }
     }
     if (is_inside) return 0;
-    const auto vector = [](const Vec3f& from, const Vec3f& to) -> std::array<double, 3> {
+    const auto vector = [](const base::Vec3f& from, const base::Vec3f& to) -> std::array<double, 3> {
       return {static_cast<double>(to.x) - static_cast<double>(from.x),
               static_cast<double>(to.y) - static_cast<double>(from.y),
               static_cast<double>(to.z) - static_cast<double>(from.z)};
     };
-    const Vec3f& a = positions_[hit.corners[0]];
+    const base::Vec3f& a = positions_[hit.corners[0]];
     const auto u = vector(a, positions_[hit.corners[1]]);
     const auto v = vector(a, positions_[hit.corners[2]]);
     const auto w = vector(a, place);
@@ -329,7 +331,7 @@ class PlaceJoin {
   }
 
   /// Between the corners where all have one; else that of the corner that counts most.
-  float temperature(const NearestSurface::Hit& hit) const {
+  float temperature(const mesh::NearestSurface::Hit& hit) const {
     const std::span<const float> celsius = thermal_.temperature_celsius();
     double sum = 0;
     bool is_finite = true;
@@ -348,20 +350,21 @@ class PlaceJoin {
   /// Of the time, until places can be looked for.
   static constexpr double kBuildingShare = 0.1;
 
-  const Progress& progress_;
-  const MultispectralMesh& scene_;
-  const MultispectralMesh& thermal_;
-  std::vector<Vec3f> positions_;
+  const base::Progress& progress_;
+  const mesh::MultispectralMesh& scene_;
+  const mesh::MultispectralMesh& thermal_;
+  std::vector<base::Vec3f> positions_;
   std::vector<bool> is_border_;
-  NearestSurface surface_;
+  mesh::NearestSurface surface_;
   double spacing_;
   std::vector<Place> places_;  ///< Per vertex of the scene.
 };
 
 /// The share of the thermal vertices that lie within `reach` of the scene, over a sample.
-double share_on_scene(const MultispectralMesh& scene, std::span<const Vec3f> thermal_positions, double reach) {
+double share_on_scene(const mesh::MultispectralMesh& scene, std::span<const base::Vec3f> thermal_positions,
+                      double reach) {
   constexpr std::size_t kSampleCount = 1000;
-  const NearestSurface surface(scene.positions(), scene.triangles());
+  const mesh::NearestSurface surface(scene.positions(), scene.triangles());
   const std::size_t step = std::max<std::size_t>(1, thermal_positions.size() / kSampleCount);
   std::size_t sample_count = 0;
   std::size_t near_count = 0;
@@ -378,9 +381,9 @@ std::string percent_text(std::uint64_t part, std::uint64_t whole) {
   return number_text(std::round(percent * 10) / 10) + " %";
 }
 
-Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, const Box& scene_box,
-                           const Box& thermal_box, LoadedScene& scene, const Progress& progress) {
-  MultispectralMesh& mesh = scene.mesh;
+base::Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, const Box& scene_box,
+                                 const Box& thermal_box, LoadedScene& scene, const base::Progress& progress) {
+  mesh::MultispectralMesh& mesh = scene.mesh;
   PlaceJoin join(mesh, thermal.mesh, progress);
   double reach = join_distance_m;
   if (reach > 0) {
@@ -397,7 +400,7 @@ Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, c
     return BOOST_OUTCOME_V2_NAMESPACE::failure(
         no_overlap(scene, thermal,
                    "only " + std::to_string(joined_count) + " of " + std::to_string(count) +
-                       " vertices have a thermal place within " + distance_text(reach) + " (the scene spans " +
+                       " vertices have a thermal place within " + base::distance_text(reach) + " (the scene spans " +
                        range_text(scene_box) + ", the thermal file " + range_text(thermal_box) +
                        "); bring both into one frame, and see --scale if their units differ"));
   }
@@ -407,8 +410,9 @@ Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, c
   scene.notes.push_back({"thermal_joined_nearest", joined_count,
                          std::to_string(joined_count) + " of " + std::to_string(count) + " vertices (" +
                              percent_text(joined_count, count) + ") have the temperature of the nearest place of " +
-                             thermal.mesh.name + " within " + distance_text(reach) + " (half of them within " +
-                             distance_text(median_m) + ", the farthest at " + distance_text(farthest_m) + ")"});
+                             thermal.mesh.name + " within " + base::distance_text(reach) + " (half of them within " +
+                             base::distance_text(median_m) + ", the farthest at " + base::distance_text(farthest_m) +
+                             ")"});
   const float hottest = largest_finite(thermal.mesh.temperature_celsius());
   const float kept = largest_finite(mesh.temperature_celsius());
   constexpr float kNoticed = 1;
@@ -423,14 +427,14 @@ Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, c
   if (joined_count < count) {
     scene.notes.push_back({"thermal_not_reached", count - joined_count,
                            std::to_string(count - joined_count) + " vertices have no thermal place within " +
-                               distance_text(reach) + ": their temperature is missing"});
+                               base::distance_text(reach) + ": their temperature is missing"});
   }
-  return success();
+  return base::success();
 }
 
 }  // namespace
 
-Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal) {
+base::Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal) {
   const Box scene_box = core_box(scene.mesh);
   const Box thermal_box = core_box(thermal.mesh);
   if (const auto ratio = unit_ratio(scene_box, thermal_box)) {
@@ -445,17 +449,18 @@ Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal)
   }
   const double gap = scene_box.distance(thermal_box);
   if (gap > kMostReach * std::max(scene_box.diagonal(), thermal_box.diagonal())) {
-    return BOOST_OUTCOME_V2_NAMESPACE::failure(no_overlap(
-        scene, thermal,
-        "they are " + distance_text(gap) + " apart (the scene spans " + range_text(scene_box) + ", the thermal file " +
-            range_text(thermal_box) + "); bring both into one frame, and see --scale if their units differ"));
+    return BOOST_OUTCOME_V2_NAMESPACE::failure(
+        no_overlap(scene, thermal,
+                   "they are " + base::distance_text(gap) + " apart (the scene spans " + range_text(scene_box) +
+                       ", the thermal file " + range_text(thermal_box) +
+                       "); bring both into one frame, and see --scale if their units differ"));
   }
-  return success();
+  return base::success();
 }
 
-Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
-                          const Progress& progress) {
-  MultispectralMesh& mesh = scene.mesh;
+base::Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
+                                const base::Progress& progress) {
+  mesh::MultispectralMesh& mesh = scene.mesh;
   const Box scene_box = core_box(mesh);
   const Box thermal_box = core_box(thermal.mesh);
   if (thermal.mesh.vertex_count() == mesh.vertex_count()) {
@@ -466,11 +471,11 @@ Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, Lo
       scene.notes.push_back({"thermal_joined_in_order", mesh.vertex_count(),
                              "Temperatures of " + thermal.mesh.name + " taken in order: its " +
                                  std::to_string(mesh.vertex_count()) + " vertices are where those of " + mesh.name +
-                                 " are, within " + distance_text(tolerance)});
-      return success();
+                                 " are, within " + base::distance_text(tolerance)});
+      return base::success();
     }
   }
   return join_by_place(thermal, join_distance_m, scene_box, thermal_box, scene, progress);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

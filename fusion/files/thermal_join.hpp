@@ -4,12 +4,12 @@
 #include "fusion/base/progress.hpp"
 #include "fusion/files/ply_reader.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Whether two scenes can show the same thing, by their sizes and places without strays: not when one is a thousand (a hundred
 /// ...) times as large as the other in every direction, as metres are of millimetres, nor when they are apart. The error is about
 /// the thermal scene and says what mends it.
-Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal);
+base::Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal);
 
 /// Gives the scene the temperatures of another one.
 /// - In order, where it has as many vertices and each of them is where the other's is, but for the rounding of files.
@@ -20,7 +20,7 @@ Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& thermal)
 ///   What is not reached is missing. Any number of threads, the same answer.
 /// `progress` is told of kJoiningPhase. Notes are added to the scene's: "thermal_joined_in_order", or "thermal_joined_nearest" with how many and how far, and
 /// "thermal_not_reached". Unsupported when less than a tenth of either scene reaches the other.
-Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
-                          const Progress& progress = {});
+base::Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,
+                                const base::Progress& progress = {});
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -11,7 +11,7 @@
 
 #include "fusion/files/comment_words.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -22,8 +22,8 @@ constexpr double kMapFlatness = 0.25;
 /// Area that faces up to area that faces along each other axis, at least.
 constexpr double kFacing = 1.5;
 
-UpAxis opposite(UpAxis up) {
-  return static_cast<UpAxis>((static_cast<int>(up) + 3) % 6);
+base::UpAxis opposite(base::UpAxis up) {
+  return static_cast<base::UpAxis>((static_cast<int>(up) + 3) % 6);
 }
 
 bool is_one_of(std::string_view word, std::initializer_list<std::string_view> words) {
@@ -38,7 +38,7 @@ std::optional<double> number_of(const std::string& word) {
 }
 
 /// The axis that three numbers from `at` on point along.
-std::optional<UpAxis> axis_of_vector(const std::vector<std::string>& words, std::size_t at) {
+std::optional<base::UpAxis> axis_of_vector(const std::vector<std::string>& words, std::size_t at) {
   std::array<double, 3> vector{};
   for (double& component : vector) {
     while (at < words.size() && words[at] == ",") ++at;
@@ -50,27 +50,27 @@ std::optional<UpAxis> axis_of_vector(const std::vector<std::string>& words, std:
   const double length = std::hypot(vector[0], vector[1], vector[2]);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (length > 0 && std::abs(vector[axis]) > 0.9 * length) {
-      return static_cast<UpAxis>(axis + (vector[axis] < 0 ? 3U : 0U));
+      return static_cast<base::UpAxis>(axis + (vector[axis] < 0 ? 3U : 0U));
     }
   }
   return std::nullopt;
 }
 
 /// All that one line says about up.
-std::vector<UpAxis> told_by(const std::string& line) {
-  std::vector<UpAxis> told;
+std::vector<base::UpAxis> told_by(const std::string& line) {
+  std::vector<base::UpAxis> told;
   const std::vector<std::string> words = comment_words(line);
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
-    if (word == "enu") told.push_back(UpAxis::Z);
-    if (word == "ned") told.push_back(UpAxis::MinusZ);
+    if (word == "enu") told.push_back(base::UpAxis::Z);
+    if (word == "ned") told.push_back(base::UpAxis::MinusZ);
     if (word.size() == 3 && word.ends_with("up")) {
-      if (const auto axis = up_axis(word.substr(0, 1))) told.push_back(*axis);
+      if (const auto axis = base::up_axis(word.substr(0, 1))) told.push_back(*axis);
     }
     const bool is_denied = i > 0 && words[i - 1] == "not";
     if (is_denied) continue;
     std::size_t next = i + 1;
-    if (const auto axis = up_axis(word)) {
+    if (const auto axis = base::up_axis(word)) {
       const auto is_filler = [](const std::string& w) {
         return is_one_of(w, {"axis", "is", "points", "pointing", "direction", "="});
       };
@@ -94,7 +94,7 @@ std::vector<UpAxis> told_by(const std::string& line) {
     const bool is_phrase = i > 0 && words[i - 1] == "," && (next + 1 >= words.size() || words[next + 1] == ",");
     const bool is_meant = i == 0 || is_phrase || word != "up" || next > i + 1;
     if (!is_meant || next == words.size()) continue;
-    auto axis = up_axis(words[next]);
+    auto axis = base::up_axis(words[next]);
     if (!axis) axis = axis_of_vector(words, next);
     if (axis) told.push_back(is_down ? opposite(*axis) : *axis);
   }
@@ -103,10 +103,10 @@ std::vector<UpAxis> told_by(const std::string& line) {
 
 }  // namespace
 
-std::optional<UpAxis> up_told(std::span<const std::string> comments) {
-  std::optional<UpAxis> told;
+std::optional<base::UpAxis> up_told(std::span<const std::string> comments) {
+  std::optional<base::UpAxis> told;
   for (const std::string& line : comments) {
-    for (const UpAxis up : told_by(line)) {
+    for (const base::UpAxis up : told_by(line)) {
       if (told && *told != up) return std::nullopt;
       told = up;
     }
@@ -114,22 +114,22 @@ std::optional<UpAxis> up_told(std::span<const std::string> comments) {
   return told;
 }
 
-std::optional<UpAxis> up_seen(const MultispectralMesh& mesh, const Bounds& core) {
+std::optional<base::UpAxis> up_seen(const mesh::MultispectralMesh& mesh, const base::Bounds& core) {
   const std::array<double, 3> extents = {static_cast<double>(core.max.x) - static_cast<double>(core.min.x),
                                          static_cast<double>(core.max.y) - static_cast<double>(core.min.y),
                                          static_cast<double>(core.max.z) - static_cast<double>(core.min.z)};
   const auto thin = static_cast<std::size_t>(std::min_element(extents.begin(), extents.end()) - extents.begin());
   const double width = std::min(extents[(thin + 1) % 3], extents[(thin + 2) % 3]);
   if (width < kMapExtent || extents[thin] > kMapFlatness * width) return std::nullopt;
-  if (mesh.is_point_cloud()) return static_cast<UpAxis>(thin);
+  if (mesh.is_point_cloud()) return static_cast<base::UpAxis>(thin);
 
   // Twice the area as seen along each axis. Which side of it is the outer one tells nothing: many programs do not care.
   std::array<double, 3> facing{};
-  const std::span<const Vec3f> positions = mesh.positions();
-  for (const Triangle& triangle : mesh.triangles()) {
+  const std::span<const base::Vec3f> positions = mesh.positions();
+  for (const base::Triangle& triangle : mesh.triangles()) {
     const auto edge = [&](std::size_t corner) -> std::array<double, 3> {
-      const Vec3f& a = positions[triangle[0]];
-      const Vec3f& b = positions[triangle[corner]];
+      const base::Vec3f& a = positions[triangle[0]];
+      const base::Vec3f& b = positions[triangle[corner]];
       return {static_cast<double>(b.x) - static_cast<double>(a.x), static_cast<double>(b.y) - static_cast<double>(a.y),
               static_cast<double>(b.z) - static_cast<double>(a.z)};
     };
@@ -144,7 +144,7 @@ std::optional<UpAxis> up_seen(const MultispectralMesh& mesh, const Bounds& core)
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (axis != thin && facing[thin] < kFacing * facing[axis]) return std::nullopt;
   }
-  return static_cast<UpAxis>(thin);
+  return static_cast<base::UpAxis>(thin);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

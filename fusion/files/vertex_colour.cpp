@@ -7,7 +7,7 @@
 
 #include "fusion/files/ply_values.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -33,7 +33,7 @@ std::uint32_t packed_bits(double value) {
 
 }  // namespace
 
-void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<Rgb8> colours,
+void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,
                                std::uint64_t& outside_count) const {
   if (is_packed) {
     for (std::size_t i = 0; i < colours.size(); ++i) {
@@ -43,7 +43,7 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
     }
     return;
   }
-  constexpr std::array<std::uint8_t Rgb8::*, 3> kMembers = {&Rgb8::r, &Rgb8::g, &Rgb8::b};
+  constexpr std::array<std::uint8_t base::Rgb8::*, 3> kMembers = {&base::Rgb8::r, &base::Rgb8::g, &base::Rgb8::b};
   if (is_bytes) {
     for (std::size_t channel = 0; channel < 3; ++channel) {
       for (std::size_t i = 0; i < colours.size(); ++i) {
@@ -65,7 +65,7 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
   }
 }
 
-Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest) {
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest) {
   ColourConversion conversion;
   if (coding == ColourCoding::Packed) {
     conversion.is_packed = true;
@@ -79,9 +79,10 @@ Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, 
   } else if (largest < kMost16Bit && type != PlyScalar::UInt8 && type != PlyScalar::Int8) {
     conversion.factor = kSixteenToEight;
   } else {
-    return failure(ErrorCode::BadValue, "the colours go up to " + number_text(largest) +
-                                            (type == PlyScalar::UInt8 ? "; those of type uchar end at 255"
-                                                                      : "; 255 or 65535 is the most that is read"));
+    return base::failure(base::ErrorCode::BadValue,
+                         "the colours go up to " + number_text(largest) +
+                             (type == PlyScalar::UInt8 ? "; those of type uchar end at 255"
+                                                       : "; 255 or 65535 is the most that is read"));
   }
   return conversion;
 }
@@ -103,4 +104,4 @@ std::string conversion_text(ColourCoding coding, PlyScalar type, double largest)
   return range + "taken as 16 bits, divided by 257";
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

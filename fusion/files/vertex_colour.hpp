@@ -9,7 +9,7 @@
 #include "fusion/files/ply_header.hpp"
 #include "fusion/files/ply_schema.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// Turns the numbers of a file into visible colours: byte = round(factor * value + offset), or a packed one unpacked.
 struct ColourConversion {
@@ -20,15 +20,15 @@ struct ColourConversion {
 
   /// `values` are as long as `colours` (packed ones: the first alone). Below black and above white are taken as those, NaN
   /// as mid grey: how many vertices that concerns is added to `outside_count`; a hair outside does not count.
-  void convert(std::array<std::span<const double>, 3> values, std::span<Rgb8> colours,
+  void convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,
                std::uint64_t& outside_count) const;
 };
 
 /// The conversion for colours of that coding and type whose largest finite channel is `largest`: to 255 as they are,
 /// larger ones of 16 bits, floats up to about 1 as shares of white. An error tells what is too large.
-Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest);
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest);
 
 /// What was done to colours that are no bytes, for people; empty when nothing was.
 std::string conversion_text(ColourCoding coding, PlyScalar type, double largest);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 namespace {
 
@@ -107,4 +107,4 @@ void TemperatureConversion::convert(std::span<const double> values, std::span<fl
   }
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

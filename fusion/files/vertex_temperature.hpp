@@ -8,7 +8,7 @@
 
 #include "fusion/files/read_options.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 
 /// What was found among the temperatures of a file.
 struct TemperatureFacts {
@@ -50,4 +50,4 @@ class TemperatureConversion {
   std::vector<double> no_data_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// Sets that are united step by step; counts how many are left.
 class DisjointSets {
@@ -36,4 +36,4 @@ class DisjointSets {
   std::size_t set_count_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 namespace {
 
@@ -22,7 +22,7 @@ std::uint32_t previous_side(std::uint32_t side) {
 }
 
 /// Which side lies against which, kNone where there is none, or the edge is cut.
-std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vector<Triangle>& faces,
+std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
                                         HalfEdges& result) {
   const auto from = [&faces](std::uint32_t side) { return faces[side / 3][side % 3]; };
   const auto to = [&](std::uint32_t side) { return from(next_side(side)); };
@@ -70,8 +70,8 @@ std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vec
 }
 
 /// Gives every fan of a vertex but the first a vertex of its own, in `faces`.
-void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& opposite, std::vector<Triangle>& faces,
-                  HalfEdges& result) {
+void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& opposite,
+                  std::vector<base::Triangle>& faces, HalfEdges& result) {
   std::vector<bool> is_done(opposite.size(), false);
   std::vector<bool> is_seen(vertex_count, false);
   for (std::uint32_t start = 0; start < opposite.size(); ++start) {
@@ -101,7 +101,7 @@ void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& op
   }
 }
 
-void fill_kernel(std::size_t vertex_count, const std::vector<Triangle>& faces,
+void fill_kernel(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
                  const std::vector<std::uint32_t>& opposite, MeshKernel& kernel) {
   using OpenMesh::FaceHandle;
   using OpenMesh::HalfedgeHandle;
@@ -145,21 +145,23 @@ void fill_kernel(std::size_t vertex_count, const std::vector<Triangle>& faces,
 
 }  // namespace
 
-HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles, const Progress& progress) {
-  report(progress, kTopologyPhase, 0);
+HalfEdges half_edges(std::size_t vertex_count, std::span<const base::Triangle> triangles,
+                     const base::Progress& progress) {
+  base::report(progress, base::kTopologyPhase, 0);
   HalfEdges result;
-  std::vector<Triangle> faces;
+  std::vector<base::Triangle> faces;
   faces.reserve(triangles.size());
-  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(faces), [vertex_count](const Triangle& triangle) {
-    const auto& [a, b, c] = triangle;
-    return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
-  });
+  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(faces),
+               [vertex_count](const base::Triangle& triangle) {
+                 const auto& [a, b, c] = triangle;
+                 return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
+               });
   const std::vector<std::uint32_t> opposite = paired_sides(vertex_count, faces, result);
-  report(progress, kTopologyPhase, 0.4);
+  base::report(progress, base::kTopologyPhase, 0.4);
   cut_vertices(vertex_count, opposite, faces, result);
-  report(progress, kTopologyPhase, 0.5);
+  base::report(progress, base::kTopologyPhase, 0.5);
   fill_kernel(vertex_count + result.source_vertex.size(), faces, opposite, result.kernel);
   return result;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -9,7 +9,7 @@
 #include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/openmesh_kernel.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// Triangles as an OpenMesh half-edge mesh, which can hold manifolds only. Where the input is none it is cut: along edges
 /// of more than two triangles and along those whose two triangles run the same way round, and at vertices whose
@@ -30,6 +30,7 @@ struct HalfEdges {
 /// Triangles with a vertex twice or an index that is not below `vertex_count` take no part. At most 350 million triangles:
 /// OpenMesh counts half-edges in an int.
 /// `progress` is told of kTopologyPhase.
-HalfEdges half_edges(std::size_t vertex_count, std::span<const Triangle> triangles, const Progress& progress = {});
+HalfEdges half_edges(std::size_t vertex_count, std::span<const base::Triangle> triangles,
+                     const base::Progress& progress = {});
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

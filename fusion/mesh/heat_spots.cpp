@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
 /// Grows the spot around one vertex; empty when the vertex is not its apex, or it is too large.
@@ -60,7 +60,7 @@ class SpotSearch {
 
 std::vector<double> vertex_areas(const Surface& surface) {
   std::vector<double> areas(surface.positions().size());
-  for (const fusion::Triangle& t : surface.triangles()) {
+  for (const base::Triangle& t : surface.triangles()) {
     const double third =
         triangle_area(surface.positions()[t[0]], surface.positions()[t[1]], surface.positions()[t[2]]) / 3;
     for (const std::uint32_t v : t) areas[v] += third;
@@ -82,4 +82,4 @@ std::vector<HeatSpot> heat_spots(const Surface& surface, std::span<const float> 
   return spots;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

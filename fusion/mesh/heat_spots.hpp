@@ -6,7 +6,7 @@
 
 #include "fusion/mesh/surface.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 
 /// A small part of a surface that is hotter, or colder, than all around it.
 struct HeatSpot {
@@ -24,4 +24,4 @@ std::vector<double> vertex_areas(const Surface& surface);
 std::vector<HeatSpot> heat_spots(const Surface& surface, std::span<const float> temperature_celsius,
                                  std::span<const double> vertex_area_m2, double contrast_celsius, double most_area_m2);
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

@@ -6,11 +6,11 @@
 
 #include "fusion/mesh/openmesh_kernel.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 struct MultispectralMesh::Storage {
   MeshKernel kernel;
-  OpenMesh::VPropHandleT<Rgb8> visible;
+  OpenMesh::VPropHandleT<base::Rgb8> visible;
   OpenMesh::VPropHandleT<float> temperature;
 
   Storage() {
@@ -18,8 +18,8 @@ struct MultispectralMesh::Storage {
     kernel.add_property(temperature, "temperature_celsius");
   }
 
-  std::vector<Vec3f>& positions() { return kernel.property(kernel.points_property_handle()).data_vector(); }
-  std::vector<Rgb8>& visible_colours() { return kernel.property(visible).data_vector(); }
+  std::vector<base::Vec3f>& positions() { return kernel.property(kernel.points_property_handle()).data_vector(); }
+  std::vector<base::Rgb8>& visible_colours() { return kernel.property(visible).data_vector(); }
   std::vector<float>& temperatures() { return kernel.property(temperature).data_vector(); }
 };
 
@@ -42,17 +42,17 @@ void MultispectralMesh::resize_vertices(std::size_t count) {
   std::fill(temperatures.begin() + old_count, temperatures.end(), std::numeric_limits<float>::quiet_NaN());
 }
 
-std::span<const Vec3f> MultispectralMesh::positions() const {
-  return storage_ ? std::span<const Vec3f>(storage_->positions()) : std::span<const Vec3f>();
+std::span<const base::Vec3f> MultispectralMesh::positions() const {
+  return storage_ ? std::span<const base::Vec3f>(storage_->positions()) : std::span<const base::Vec3f>();
 }
-std::span<Vec3f> MultispectralMesh::positions() {
-  return storage_ ? std::span<Vec3f>(storage_->positions()) : std::span<Vec3f>();
+std::span<base::Vec3f> MultispectralMesh::positions() {
+  return storage_ ? std::span<base::Vec3f>(storage_->positions()) : std::span<base::Vec3f>();
 }
-std::span<const Rgb8> MultispectralMesh::visible() const {
-  return storage_ ? std::span<const Rgb8>(storage_->visible_colours()) : std::span<const Rgb8>();
+std::span<const base::Rgb8> MultispectralMesh::visible() const {
+  return storage_ ? std::span<const base::Rgb8>(storage_->visible_colours()) : std::span<const base::Rgb8>();
 }
-std::span<Rgb8> MultispectralMesh::visible() {
-  return storage_ ? std::span<Rgb8>(storage_->visible_colours()) : std::span<Rgb8>();
+std::span<base::Rgb8> MultispectralMesh::visible() {
+  return storage_ ? std::span<base::Rgb8>(storage_->visible_colours()) : std::span<base::Rgb8>();
 }
 std::span<const float> MultispectralMesh::temperature_celsius() const {
   return storage_ ? std::span<const float>(storage_->temperatures()) : std::span<const float>();
@@ -61,4 +61,4 @@ std::span<float> MultispectralMesh::temperature_celsius() {
   return storage_ ? std::span<float>(storage_->temperatures()) : std::span<float>();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -9,14 +9,14 @@
 #include "fusion/base/up_axis.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// A vertex of the input without a position (not finite, or a hole): no part of the scene, but kept for an output that has the input's
 /// vertices in their order.
 struct LeftOutVertex {
   std::uint32_t input_index = 0;
-  Vec3d position;  ///< As it was.
-  Rgb8 visible;
+  base::Vec3d position;  ///< As it was.
+  base::Rgb8 visible;
   float temperature_celsius = 0;
 };
 
@@ -27,7 +27,7 @@ struct LeftOutVertex {
 class MultispectralMesh {
  public:
   /// The visible colour where there is none.
-  static constexpr Rgb8 kNoColour{128, 128, 128};
+  static constexpr base::Rgb8 kNoColour{128, 128, 128};
 
   MultispectralMesh();
   ~MultispectralMesh();
@@ -42,21 +42,21 @@ class MultispectralMesh {
   void resize_vertices(std::size_t count);
 
   /// Positions in metres relative to origin().
-  std::span<const Vec3f> positions() const;
-  std::span<Vec3f> positions();
-  std::span<const Rgb8> visible() const;
-  std::span<Rgb8> visible();
+  std::span<const base::Vec3f> positions() const;
+  std::span<base::Vec3f> positions();
+  std::span<const base::Rgb8> visible() const;
+  std::span<base::Rgb8> visible();
   /// degC; NaN = missing.
   std::span<const float> temperature_celsius() const;
   std::span<float> temperature_celsius();
 
-  const std::vector<Triangle>& triangles() const { return triangles_; }
-  std::vector<Triangle>& triangles() { return triangles_; }
+  const std::vector<base::Triangle>& triangles() const { return triangles_; }
+  std::vector<base::Triangle>& triangles() { return triangles_; }
 
   /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM keeps its millimetres).
-  Vec3d origin;
+  base::Vec3d origin;
   std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
-  UpAxis up = UpAxis::Z;
+  base::UpAxis up = base::UpAxis::Z;
   bool is_metric = false;         ///< Somebody has said that positions are in metres; otherwise they are taken for it.
   bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
   bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.
@@ -66,7 +66,7 @@ class MultispectralMesh {
  private:
   struct Storage;
   std::unique_ptr<Storage> storage_;
-  std::vector<Triangle> triangles_;
+  std::vector<base::Triangle> triangles_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

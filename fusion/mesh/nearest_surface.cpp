@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 namespace {
 
@@ -16,7 +16,7 @@ constexpr std::size_t kSpacingSamples = 1024;
 /// Halving a range of 2^32 elements is at most this deep.
 constexpr std::size_t kMostWaiting = 64;
 
-Vector vector_of(const Vec3f& p) {
+Vector vector_of(const base::Vec3f& p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
 Vector difference(const Vector& a, const Vector& b) {
@@ -26,7 +26,7 @@ double dot(const Vector& a, const Vector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-double squared_distance_to_box(const Vector& p, const Bounds& box) {
+double squared_distance_to_box(const Vector& p, const base::Bounds& box) {
   const Vector low = vector_of(box.min);
   const Vector high = vector_of(box.max);
   double sum = 0;
@@ -37,12 +37,12 @@ double squared_distance_to_box(const Vector& p, const Bounds& box) {
   return sum;
 }
 
-void include(Bounds& box, const Vec3f& p) {
+void include(base::Bounds& box, const base::Vec3f& p) {
   box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
   box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
 }
 
-float coordinate(const Vec3f& p, std::size_t axis) {
+float coordinate(const base::Vec3f& p, std::size_t axis) {
   return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
 }
 
@@ -85,7 +85,8 @@ Vector weights_nearest_to_origin(const std::array<Vector, 3>& corner) {
 
 }  // namespace
 
-std::array<double, 3> nearest_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+std::array<double, 3> nearest_on_triangle(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                          const base::Vec3f& c) {
   const Vector place = vector_of(p);
   return weights_nearest_to_origin(
       {difference(vector_of(a), place), difference(vector_of(b), place), difference(vector_of(c), place)});
@@ -100,12 +101,12 @@ struct NearestSurface::Search {
   Vector weights{};
 };
 
-NearestSurface::NearestSurface(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
+NearestSurface::NearestSurface(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles)
     : positions_(positions), triangles_(triangles) {
   std::vector<bool> is_used(positions.size());
-  std::vector<Vec3f> centres;
+  std::vector<base::Vec3f> centres;
   centres.reserve(triangles.size());
-  for (const Triangle& triangle : triangles) {
+  for (const base::Triangle& triangle : triangles) {
     Vector sum{};
     for (const std::uint32_t corner : triangle) {
       is_used[corner] = true;
@@ -124,27 +125,27 @@ NearestSurface::NearestSurface(std::span<const Vec3f> positions, std::span<const
   build(centres, 0, elements_.size());
 }
 
-Triangle NearestSurface::corners(std::uint32_t element) const {
+base::Triangle NearestSurface::corners(std::uint32_t element) const {
   if (element < triangles_.size()) return triangles_[element];
   const auto vertex = static_cast<std::uint32_t>(element - triangles_.size());
   return {vertex, vertex, vertex};
 }
 
-std::uint32_t NearestSurface::build(std::span<const Vec3f> centres, std::size_t begin, std::size_t end) {
-  const auto centre = [&](std::uint32_t element) -> const Vec3f& {
+std::uint32_t NearestSurface::build(std::span<const base::Vec3f> centres, std::size_t begin, std::size_t end) {
+  const auto centre = [&](std::uint32_t element) -> const base::Vec3f& {
     return element < centres.size() ? centres[element] : positions_[element - centres.size()];
   };
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   if (end - begin <= kLeafSize) {
-    Bounds box{positions_[corners(elements_[begin])[0]], positions_[corners(elements_[begin])[0]]};
+    base::Bounds box{positions_[corners(elements_[begin])[0]], positions_[corners(elements_[begin])[0]]};
     for (std::size_t i = begin; i < end; ++i) {
       for (const std::uint32_t corner : corners(elements_[i])) include(box, positions_[corner]);
     }
     nodes_[index] = {box, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end - begin)};
     return index;
   }
-  Bounds spread{centre(elements_[begin]), centre(elements_[begin])};
+  base::Bounds spread{centre(elements_[begin]), centre(elements_[begin])};
   for (std::size_t i = begin; i < end; ++i) include(spread, centre(elements_[i]));
   const std::array<double, 3> extents = {static_cast<double>(spread.max.x) - static_cast<double>(spread.min.x),
                                          static_cast<double>(spread.max.y) - static_cast<double>(spread.min.y),
@@ -157,7 +158,7 @@ std::uint32_t NearestSurface::build(std::span<const Vec3f> centres, std::size_t 
   });
   build(centres, begin, middle);
   const std::uint32_t second = build(centres, middle, end);
-  Bounds box = nodes_[index + 1].box;
+  base::Bounds box = nodes_[index + 1].box;
   include(box, nodes_[second].box.min);
   include(box, nodes_[second].box.max);
   nodes_[index] = {box, second, 0};
@@ -165,7 +166,7 @@ std::uint32_t NearestSurface::build(std::span<const Vec3f> centres, std::size_t 
 }
 
 void NearestSurface::offer(std::uint32_t element, Search& search) const {
-  const Triangle indices = corners(element);
+  const base::Triangle indices = corners(element);
   std::array<Vector, 3> corner{};
   for (std::size_t k = 0; k < 3; ++k) corner[k] = difference(vector_of(positions_[indices[k]]), search.position);
   const bool is_point = indices[0] == indices[1];
@@ -211,7 +212,7 @@ void NearestSurface::search(Search& search) const {
   }
 }
 
-std::optional<NearestSurface::Hit> NearestSurface::find(const Vec3f& position, double max_distance) const {
+std::optional<NearestSurface::Hit> NearestSurface::find(const base::Vec3f& position, double max_distance) const {
   Search state;
   state.position = vector_of(position);
   state.best_squared = max_distance * max_distance;
@@ -220,7 +221,7 @@ std::optional<NearestSurface::Hit> NearestSurface::find(const Vec3f& position, d
   return Hit{corners(state.element), state.weights, std::sqrt(state.best_squared)};
 }
 
-double median_edge(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+double median_edge(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
   std::vector<double> edges;
   const std::size_t step = std::max<std::size_t>(1, triangles.size() / kSpacingSamples);
   for (std::size_t t = 0; t < triangles.size(); t += step) {
@@ -248,4 +249,4 @@ double NearestSurface::median_spacing() const {
   return median(spacings);
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -10,29 +10,30 @@
 #include "fusion/base/bounds.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// The point of the triangle a, b, c nearest to p, as barycentric weights; total for degenerate triangles.
-std::array<double, 3> nearest_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c);
+std::array<double, 3> nearest_on_triangle(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                          const base::Vec3f& c);
 
 /// The median length of the edges of the triangles, over a sample; 0 without any.
-double median_edge(std::span<const Vec3f> positions, std::span<const Triangle> triangles);
+double median_edge(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles);
 
 /// Finds the nearest point of a surface: of its triangles with their inside, and of vertices of no triangle. A tree of boxes,
 /// about 45 bytes a triangle; keeps references to what it is made of. Immutable, any number of threads may ask.
 class NearestSurface {
  public:
   struct Hit {
-    Triangle corners{};               ///< Vertex indices; three times the same for a vertex of no triangle.
+    base::Triangle corners{};         ///< Vertex indices; three times the same for a vertex of no triangle.
     std::array<double, 3> weights{};  ///< Of the corners, sum 1.
     double distance = 0;
   };
 
   /// Finite positions, indices in range.
-  NearestSurface(std::span<const Vec3f> positions, std::span<const Triangle> triangles);
+  NearestSurface(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles);
 
   /// The nearest point not further than `max_distance` from `position`.
-  std::optional<Hit> find(const Vec3f& position, double max_distance) const;
+  std::optional<Hit> find(const base::Vec3f& position, double max_distance) const;
 
   /// How far apart neighbours are: the median length of edges, or, without triangles, of the distance from a vertex to the
   /// nearest one at another place; over a sample. 0 when all are at one place.
@@ -41,22 +42,22 @@ class NearestSurface {
  private:
   /// A box and what is in it: elements, or two nodes, of which the first stands behind this one.
   struct Node {
-    Bounds box;
+    base::Bounds box;
     std::uint32_t first = 0;  ///< Element, or second node.
     std::uint32_t count = 0;  ///< Of elements; 0: two nodes.
   };
   struct Search;
 
-  Triangle corners(std::uint32_t element) const;
-  std::uint32_t build(std::span<const Vec3f> centres, std::size_t begin, std::size_t end);
+  base::Triangle corners(std::uint32_t element) const;
+  std::uint32_t build(std::span<const base::Vec3f> centres, std::size_t begin, std::size_t end);
   void search(Search& search) const;
   void offer(std::uint32_t element, Search& search) const;
 
-  std::span<const Vec3f> positions_;
-  std::span<const Triangle> triangles_;
+  std::span<const base::Vec3f> positions_;
+  std::span<const base::Triangle> triangles_;
   std::vector<std::uint32_t>
       elements_;  ///< Triangles by number, then vertices of no triangle by triangle count + number.
   std::vector<Node> nodes_;
 };
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

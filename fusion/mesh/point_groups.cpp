@@ -6,12 +6,12 @@
 #include <numeric>
 #include <queue>
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 
-double coordinate(const Vec3f& p, unsigned axis) {
+double coordinate(const base::Vec3f& p, unsigned axis) {
   return static_cast<double>(axis == 0 ? p.x : axis == 1 ? p.y : p.z);
 }
 
@@ -26,7 +26,7 @@ struct Group {
   }
 };
 
-Group group_of(std::span<const Vec3f> points, std::span<const std::uint32_t> members, std::size_t begin,
+Group group_of(std::span<const base::Vec3f> points, std::span<const std::uint32_t> members, std::size_t begin,
                std::size_t end) {
   Group group;
   group.begin = begin;
@@ -47,7 +47,7 @@ Group group_of(std::span<const Vec3f> points, std::span<const std::uint32_t> mem
   return group;
 }
 
-std::uint32_t representative(std::span<const Vec3f> points, std::span<const std::uint32_t> members) {
+std::uint32_t representative(std::span<const base::Vec3f> points, std::span<const std::uint32_t> members) {
   std::array<double, 3> mean{};
   for (const std::uint32_t v : members) {
     for (unsigned axis = 0; axis < 3; ++axis) mean[axis] += coordinate(points[v], axis);
@@ -71,8 +71,8 @@ std::uint32_t representative(std::span<const Vec3f> points, std::span<const std:
 
 }  // namespace
 
-std::vector<std::uint32_t> group_representatives(std::span<const Vec3f> points, std::vector<std::uint32_t> members,
-                                                 std::size_t group_count) {
+std::vector<std::uint32_t> group_representatives(std::span<const base::Vec3f> points,
+                                                 std::vector<std::uint32_t> members, std::size_t group_count) {
   std::vector<std::uint32_t> result(points.size());
   std::iota(result.begin(), result.end(), 0u);
   if (members.empty()) return result;
@@ -97,4 +97,4 @@ std::vector<std::uint32_t> group_representatives(std::span<const Vec3f> points, 
   return result;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

@@ -8,7 +8,7 @@
 
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 
 /// Numbers distinct positions in the order in which they come; 0 and -0 are the same. Open addressing, only grows.
 class PositionIndex {
@@ -21,7 +21,7 @@ class PositionIndex {
   }
 
   /// The number of a position; a new one gets the next.
-  std::uint32_t find_or_insert(const fusion::Vec3f& position) {
+  std::uint32_t find_or_insert(const base::Vec3f& position) {
     std::uint32_t& slot = slots_[slot_of(position)];
     if (slot != kAbsent) return slot;
     const auto index = slot = static_cast<std::uint32_t>(positions_.size());
@@ -31,14 +31,14 @@ class PositionIndex {
   }
 
   /// The number of a position, or kAbsent. Safe from several threads while none inserts.
-  std::uint32_t find(const fusion::Vec3f& position) const { return slots_[slot_of(position)]; }
+  std::uint32_t find(const base::Vec3f& position) const { return slots_[slot_of(position)]; }
 
   /// By number.
-  const std::vector<fusion::Vec3f>& positions() const { return positions_; }
-  std::vector<fusion::Vec3f> take_positions() && { return std::move(positions_); }
+  const std::vector<base::Vec3f>& positions() const { return positions_; }
+  std::vector<base::Vec3f> take_positions() && { return std::move(positions_); }
 
  private:
-  std::size_t slot_of(const fusion::Vec3f& p) const {
+  std::size_t slot_of(const base::Vec3f& p) const {
     std::uint64_t hash = 0;
     for (const float c : {p.x, p.y, p.z}) {
       hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9e3779b97f4a7c15;  // -0 + 0 = 0
@@ -58,7 +58,7 @@ class PositionIndex {
   }
 
   std::vector<std::uint32_t> slots_;
-  std::vector<fusion::Vec3f> positions_;
+  std::vector<base::Vec3f> positions_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

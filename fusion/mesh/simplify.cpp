@@ -11,12 +11,12 @@
 #include "fusion/base/box.hpp"
 #include "fusion/mesh/heat_spots.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
-using fusion::Rgb8;
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Rgb8;
+using base::Triangle;
+using base::Vec3f;
 
 constexpr std::uint32_t kNone = Surface::kNone;
 constexpr std::size_t kAttributes = 4;  // red, green, blue, temperature
@@ -154,7 +154,7 @@ struct Range {
 }  // namespace
 
 struct SimplifyArrays::State {
-  std::vector<Triangle> triangles;
+  std::vector<base::Triangle> triangles;
   std::vector<std::uint32_t> head, tail, next;
   std::vector<Sight> sights;
   std::vector<std::array<Range, 3>> colour_range;
@@ -239,8 +239,8 @@ class Simplifier {
 
   /// False where the scene is too large or too small for squares of squares.
   bool prepare() {
-    const std::span<const Vec3f> positions = input_.surface.positions();
-    const Bounds bounds = bounds_of(positions);
+    const std::span<const base::Vec3f> positions = input_.surface.positions();
+    const base::Bounds bounds = base::bounds_of(positions);
     const auto middle = [](float low, float high) {
       return (static_cast<double>(low) + static_cast<double>(high)) / 2;
     };
@@ -266,9 +266,9 @@ class Simplifier {
     temperature_range_.resize(positions.size());
     for (std::size_t v = 0; v < positions.size(); ++v) {
       Sight& s = sights_[v];
-      const Vec3f& p = positions[v];
+      const base::Vec3f& p = positions[v];
       s.position = Vector{static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)} - centre;
-      const Rgb8 c = input_.visible[v];
+      const base::Rgb8 c = input_.visible[v];
       const std::array<std::uint8_t, 3> channels{c.r, c.g, c.b};
       for (std::size_t j = 0; j < 3; ++j) {
         s.attribute[j] = level_in_metres_ * channels[j];
@@ -296,7 +296,7 @@ class Simplifier {
     for (std::uint32_t v = 0; v < head_.size(); ++v) {
       if (input_.is_locked[v] || head_[v] == kNone) continue;
       edges.clear();
-      around(v, [&](const Triangle& t) {
+      around(v, [&](const base::Triangle& t) {
         const unsigned corner = t[0] == v ? 0 : t[1] == v ? 1 : 2;
         edges.emplace_back(t[(corner + 1) % 3], 1);
         edges.emplace_back(t[(corner + 2) % 3], -1);
@@ -361,7 +361,7 @@ class Simplifier {
   void make_quadrics() {
     quadrics_.resize(head_.size());
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
-      const Triangle& t = triangles_[i];
+      const base::Triangle& t = triangles_[i];
       const std::array<const Sight*, 3> s{&sights_[t[0]], &sights_[t[1]], &sights_[t[2]]};
       const Vector e1 = s[1]->position - s[0]->position, e2 = s[2]->position - s[0]->position;
       const Vector e3 = s[2]->position - s[1]->position;
@@ -410,7 +410,7 @@ class Simplifier {
 
   std::size_t shared_count(std::uint32_t a, std::uint32_t b) {
     std::size_t count = 0;
-    around(a, [&](const Triangle& t) {
+    around(a, [&](const base::Triangle& t) {
       if (t[0] == b || t[1] == b || t[2] == b) ++count;
     });
     return count;
@@ -436,7 +436,7 @@ class Simplifier {
     std::uint32_t apex = kNone;
     bool is_turned = false;
     const Vector& target = sights_[to].position;
-    around(from, [&](const Triangle& t) {
+    around(from, [&](const base::Triangle& t) {
       const unsigned corner = t[0] == from ? 0 : t[1] == from ? 1 : 2;
       const std::uint32_t b = t[(corner + 1) % 3], c = t[(corner + 2) % 3];
       marked_in_[b] = marked_in_[c] = mark_;
@@ -456,7 +456,7 @@ class Simplifier {
     });
     if (is_turned || shared != (kind_[from] == Kind::Inner ? 2u : 1u)) return false;
     marked_in_[to] = 0;
-    around(to, [&](const Triangle& t) {
+    around(to, [&](const base::Triangle& t) {
       ++count;
       for (const std::uint32_t v : t) {
         if (marked_in_[v] != mark_) continue;
@@ -473,7 +473,7 @@ class Simplifier {
   Entry best_target(std::uint32_t from) {
     neighbours_.clear();
     ++seen_mark_;
-    around(from, [&](const Triangle& t) {
+    around(from, [&](const base::Triangle& t) {
       for (const std::uint32_t v : t) {
         if (v == from || seen_in_[v] == seen_mark_) continue;
         seen_in_[v] = seen_mark_;
@@ -517,7 +517,7 @@ class Simplifier {
         continue;
       }
       ring.clear();
-      around(from, [&](const Triangle& t) { ring.insert(ring.end(), t.begin(), t.end()); });
+      around(from, [&](const base::Triangle& t) { ring.insert(ring.end(), t.begin(), t.end()); });
       collapse(from, to);
       is_outdated[to] = true;
       // What could not be drawn anywhere may be now.
@@ -534,7 +534,7 @@ class Simplifier {
     std::uint32_t first = kNone, last = kNone;
     for (std::uint32_t corner = head_[from]; corner != kNone;) {
       const std::uint32_t after = next_[corner];
-      Triangle& t = triangles_[corner / 3];
+      base::Triangle& t = triangles_[corner / 3];
       if (is_alive_[corner / 3]) {
         if (t[0] == to || t[1] == to || t[2] == to) {
           is_alive_[corner / 3] = false;
@@ -598,7 +598,7 @@ class Simplifier {
   std::size_t wanted_count_;
   std::size_t live_count_ = 0;
   double celsius_in_metres_ = 0, level_in_metres_ = 0;
-  std::vector<Triangle>& triangles_;
+  std::vector<base::Triangle>& triangles_;
   std::vector<bool> is_alive_;
   std::vector<std::uint32_t>&head_, &tail_, &next_;  ///< Corners of triangles around each vertex.
   std::vector<std::uint32_t> standing_;  ///< For each vertex the one into which it has been drawn, or itself.
@@ -648,4 +648,4 @@ Simplified simplified(const SimplifyInput& input, std::size_t wanted_count, Simp
   return result;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

@@ -10,12 +10,12 @@
 #include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/surface.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 
 /// A surface with what is seen on it, and what of it must stay.
 struct SimplifyInput {
   const Surface& surface;  ///< Without degenerate triangles.
-  std::span<const fusion::Rgb8> visible;
+  std::span<const base::Rgb8> visible;
   std::span<const float> temperature_celsius;  ///< NaN = none, infinite = beyond what the sensor can tell.
   const std::vector<bool>& is_locked;          ///< Stays, as it is.
   double span_celsius = 1;                     ///< A difference that counts as much as one between black and white.
@@ -23,8 +23,8 @@ struct SimplifyInput {
 
 /// Fewer triangles over the same vertices. Values count at vertices that are used.
 struct Simplified {
-  std::vector<fusion::Triangle> triangles;
-  std::vector<fusion::Rgb8> visible;
+  std::vector<base::Triangle> triangles;
+  std::vector<base::Rgb8> visible;
   std::vector<float> temperature_celsius;
 };
 
@@ -69,4 +69,4 @@ class SimplifyMemory {
 /// surroundings are not warmer for it.
 Simplified simplified(const SimplifyInput& input, std::size_t wanted_count, SimplifyMemory& memory);
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

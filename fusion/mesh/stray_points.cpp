@@ -8,7 +8,7 @@
 
 #include "fusion/mesh/disjoint_sets.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 namespace {
 
@@ -21,7 +21,7 @@ constexpr std::size_t kFewestCells = 8;
 constexpr std::size_t kMostCells = 64;
 constexpr std::uint32_t kNoPiece = std::numeric_limits<std::uint32_t>::max();
 
-std::array<double, 3> coordinates(const Vec3f& p) {
+std::array<double, 3> coordinates(const base::Vec3f& p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
 
@@ -51,9 +51,9 @@ struct Box {
   }
 };
 
-Bounds bounds_of(const Box& box) {
+base::Bounds bounds_of(const Box& box) {
   const auto point = [](const std::array<double, 3>& p) {
-    return Vec3f{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+    return base::Vec3f{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
   };
   return {point(box.low), point(box.high)};
 }
@@ -70,7 +70,7 @@ class Grid {
   double cell_m() const { return cell_; }
   std::size_t size() const { return count_[0] * count_[1] * count_[2]; }
 
-  std::size_t cell_of(const Vec3f& position) const {
+  std::size_t cell_of(const base::Vec3f& position) const {
     const auto p = coordinates(position);
     std::size_t cell = 0;
     for (std::size_t axis = 3; axis-- > 0;) {
@@ -118,7 +118,7 @@ struct Piece {
 
 class Search {
  public:
-  Search(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
+  Search(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles)
       : positions_(positions),
         triangles_(triangles),
         count_limit_(std::min<std::uint64_t>(positions.size() / 10, kPartVertices + positions.size() / 1000)),
@@ -171,7 +171,7 @@ class Search {
     if (std::find(is_far.begin(), is_far.end(), true) == is_far.end()) return false;
 
     DisjointSets sets(pieces.size());
-    for (const Triangle& triangle : triangles_) {
+    for (const base::Triangle& triangle : triangles_) {
       if (!is_kept(triangle[0]) || !is_kept(triangle[1]) || !is_kept(triangle[2])) continue;
       std::array<std::uint32_t, 3> piece{};
       int far_count = 0;
@@ -267,8 +267,8 @@ class Search {
     return is_far;
   }
 
-  std::span<const Vec3f> positions_;
-  std::span<const Triangle> triangles_;
+  std::span<const base::Vec3f> positions_;
+  std::span<const base::Triangle> triangles_;
   const std::uint64_t count_limit_;
   const std::size_t cell_count_;
   std::uint32_t piece_count_ = 0;
@@ -278,8 +278,8 @@ class Search {
 
 }  // namespace
 
-StrayPoints stray_points(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+StrayPoints stray_points(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
   return Search(positions, triangles).run();
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -6,13 +6,13 @@
 #include "fusion/base/bounds.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// Vertices that lie far from everything else, and where everything else is.
 struct StrayPoints {
   std::uint64_t count = 0;
   double farthest_m = 0;  ///< The largest distance of one of them from `core`.
-  Bounds core;            ///< Of all other vertices: of all when none is a stray.
+  base::Bounds core;      ///< Of all other vertices: of all when none is a stray.
 };
 
 /// Finds the few vertices that would make a scene look empty: single points, triangles and tiny pieces that are farther from
@@ -23,6 +23,6 @@ struct StrayPoints {
 /// - anything when there would be more of them than a tenth of the vertices, or than 50 and a thousandth.
 /// A vertex whose triangles all stand on the rest with their other two corners is one (a spike); any other
 /// triangle holds its corners together. Linear in time; finite positions, indices in range.
-StrayPoints stray_points(std::span<const Vec3f> positions, std::span<const Triangle> triangles);
+StrayPoints stray_points(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles);
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

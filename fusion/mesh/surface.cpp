@@ -8,17 +8,17 @@
 
 #include "fusion/base/box.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
 
 struct Vector {
   double x = 0, y = 0, z = 0;
 };
 
-Vector operator-(const Vec3f& a, const Vec3f& b) {
+Vector operator-(const base::Vec3f& a, const base::Vec3f& b) {
   return {static_cast<double>(a.x) - static_cast<double>(b.x), static_cast<double>(a.y) - static_cast<double>(b.y),
           static_cast<double>(a.z) - static_cast<double>(b.z)};
 }
@@ -31,7 +31,7 @@ Vector cross(const Vector& a, const Vector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-double squared_distance_to_segment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
+double squared_distance_to_segment(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b) {
   const Vector ab = b - a, ap = p - a;
   const double length = dot(ab, ab);
   const double s = length > 0 ? std::clamp(dot(ap, ab) / length, 0.0, 1.0) : 0;
@@ -44,7 +44,7 @@ double mean_edge_length(const Surface& surface) {
   const std::size_t stride = surface.triangles().size() / 4096 + 1;
   double sum = 0, count = 0;
   for (std::size_t i = 0; i < surface.triangles().size(); i += stride) {
-    const Triangle& t = surface.triangles()[i];
+    const base::Triangle& t = surface.triangles()[i];
     for (unsigned corner = 0; corner < 3; ++corner) {
       sum += std::sqrt(squared_distance(surface.positions()[t[corner]], surface.positions()[t[(corner + 1) % 3]]));
       ++count;
@@ -56,13 +56,13 @@ double mean_edge_length(const Surface& surface) {
 /// Calls back with points of a triangle that is longer than `spacing`: its centroid, its edges cut to that length (but not to
 /// more than 16 pieces), and points as dense inside; never its corners.
 template <class Callback>
-void sample(const Vec3f& a, const Vec3f& b, const Vec3f& c, double spacing, Callback callback) {
+void sample(const base::Vec3f& a, const base::Vec3f& b, const base::Vec3f& c, double spacing, Callback callback) {
   const auto at = [&](double u, double v, double w) {
     const auto mix = [&](float from_a, float from_b, float from_c) {
       return static_cast<float>(u * static_cast<double>(from_a) + v * static_cast<double>(from_b) +
                                 w * static_cast<double>(from_c));
     };
-    return Vec3f{mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
+    return base::Vec3f{mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
   };
   callback(at(1.0 / 3, 1.0 / 3, 1.0 / 3));
   const double longest = std::sqrt(std::max({squared_distance(a, b), squared_distance(b, c), squared_distance(c, a)}));
@@ -80,7 +80,7 @@ class LargestDistance {
  public:
   explicit LargestDistance(const Surface& surface) : surface_(surface) {}
 
-  void add(const Vec3f& p, std::span<const std::uint32_t> starts) {
+  void add(const base::Vec3f& p, std::span<const std::uint32_t> starts) {
     double squared = std::numeric_limits<double>::infinity();
     for (const std::uint32_t start : starts) {
       squared = std::min(squared, surface_.squared_distance_near(p, start, largest_squared_));
@@ -106,17 +106,18 @@ class LargestDistance {
 
 }  // namespace
 
-double squared_distance(const Vec3f& a, const Vec3f& b) {
+double squared_distance(const base::Vec3f& a, const base::Vec3f& b) {
   const Vector d = a - b;
   return dot(d, d);
 }
 
-double squared_distance_to_box(const Vec3f& p, const Bounds& box) {
-  return squared_distance(p, Vec3f{std::clamp(p.x, box.min.x, box.max.x), std::clamp(p.y, box.min.y, box.max.y),
-                                   std::clamp(p.z, box.min.z, box.max.z)});
+double squared_distance_to_box(const base::Vec3f& p, const base::Bounds& box) {
+  return squared_distance(p, base::Vec3f{std::clamp(p.x, box.min.x, box.max.x), std::clamp(p.y, box.min.y, box.max.y),
+                                         std::clamp(p.z, box.min.z, box.max.z)});
 }
 
-double squared_distance_to_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+double squared_distance_to_triangle(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                    const base::Vec3f& c) {
   const Vector ab = b - a, ac = c - a, ap = p - a;
   const Vector normal = cross(ab, ac);
   const double area = dot(normal, normal);
@@ -139,12 +140,13 @@ double squared_distance_to_triangle(const Vec3f& p, const Vec3f& a, const Vec3f&
                    squared_distance_to_segment(p, c, a)});
 }
 
-double triangle_area(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+double triangle_area(const base::Vec3f& a, const base::Vec3f& b, const base::Vec3f& c) {
   const Vector n = cross(b - a, c - a);
   return std::sqrt(dot(n, n)) / 2;
 }
 
-std::array<double, 3> nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+std::array<double, 3> nearest_weights(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                      const base::Vec3f& c) {
   const Vector ab = b - a, ac = c - a, ap = p - a;
   const Vector normal = cross(ab, ac);
   const double area = dot(normal, normal);
@@ -171,9 +173,9 @@ std::array<double, 3> nearest_weights(const Vec3f& p, const Vec3f& a, const Vec3
   return best;
 }
 
-Surface::Surface(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
+Surface::Surface(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles)
     : positions_(positions), triangles_(triangles), offsets_(positions.size() + 1), around_(3 * triangles.size()) {
-  for (const Triangle& triangle : triangles) {
+  for (const base::Triangle& triangle : triangles) {
     for (const std::uint32_t v : triangle) ++offsets_[v];
   }
   std::uint32_t sum = 0;
@@ -183,17 +185,17 @@ Surface::Surface(std::span<const Vec3f> positions, std::span<const Triangle> tri
     for (const std::uint32_t v : triangles[t]) around_[--offsets_[v]] = static_cast<std::uint32_t>(t);
   }
   block_bounds_.reserve(triangles.size() / kBlockSize + 1);
-  std::vector<Vec3f> corners;
+  std::vector<base::Vec3f> corners;
   for (std::size_t begin = 0; begin < triangles.size(); begin += kBlockSize) {
     corners.clear();
-    for (const Triangle& t : triangles.subspan(begin, std::min(kBlockSize, triangles.size() - begin))) {
+    for (const base::Triangle& t : triangles.subspan(begin, std::min(kBlockSize, triangles.size() - begin))) {
       for (const std::uint32_t v : t) corners.push_back(positions[v]);
     }
-    block_bounds_.push_back(bounds_of(corners));
+    block_bounds_.push_back(base::bounds_of(corners));
   }
 }
 
-std::uint32_t Surface::nearest_vertex_near(const Vec3f& p, std::uint32_t start) const {
+std::uint32_t Surface::nearest_vertex_near(const base::Vec3f& p, std::uint32_t start) const {
   constexpr int kMostSteps = 24;
   double nearest = squared_distance(p, positions_[start]);
   for (int step = 0; step < kMostSteps; ++step) {
@@ -213,11 +215,11 @@ std::uint32_t Surface::nearest_vertex_near(const Vec3f& p, std::uint32_t start) 
   return start;
 }
 
-double Surface::squared_distance_near(const Vec3f& p, std::uint32_t start, double enough) const {
+double Surface::squared_distance_near(const base::Vec3f& p, std::uint32_t start, double enough) const {
   return triangle_near(p, start, enough).squared_distance;
 }
 
-NearTriangle Surface::triangle_near(const Vec3f& p, std::uint32_t start, double enough) const {
+NearTriangle Surface::triangle_near(const base::Vec3f& p, std::uint32_t start, double enough) const {
   constexpr std::size_t kMostSteps = 12;
   std::array<std::uint32_t, kMostSteps> visited{};
   double best = std::numeric_limits<double>::infinity();
@@ -228,7 +230,7 @@ NearTriangle Surface::triangle_near(const Vec3f& p, std::uint32_t start, double 
     const double before = best;
     const auto around = triangles_around(vertex);
     for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles))) {
-      const Triangle& triangle = triangles_[t];
+      const base::Triangle& triangle = triangles_[t];
       const double squared =
           squared_distance_to_triangle(p, positions_[triangle[0]], positions_[triangle[1]], positions_[triangle[2]]);
       if (squared < best) {
@@ -252,12 +254,12 @@ NearTriangle Surface::triangle_near(const Vec3f& p, std::uint32_t start, double 
   return {best_triangle, best};
 }
 
-double Surface::squared_distance_anywhere(const Vec3f& p, double enough, double at_most) const {
+double Surface::squared_distance_anywhere(const base::Vec3f& p, double enough, double at_most) const {
   double best = at_most;
   for (std::size_t block = 0; block < block_bounds_.size() && best > enough; ++block) {
     if (squared_distance_to_box(p, block_bounds_[block]) >= best) continue;
     const std::size_t begin = block * kBlockSize;
-    for (const Triangle& t : triangles_.subspan(begin, std::min(kBlockSize, triangles_.size() - begin))) {
+    for (const base::Triangle& t : triangles_.subspan(begin, std::min(kBlockSize, triangles_.size() - begin))) {
       best = std::min(best, squared_distance_to_triangle(p, positions_[t[0]], positions_[t[1]], positions_[t[2]]));
     }
   }
@@ -299,7 +301,7 @@ std::vector<bool> Surface::open_vertices() const {
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
     edges.clear();
     for (const std::uint32_t t : triangles_around(v)) {
-      const Triangle& triangle = triangles_[t];
+      const base::Triangle& triangle = triangles_[t];
       const unsigned corner = triangle[0] == v ? 0 : triangle[1] == v ? 1 : 2;
       edges.emplace_back(triangle[(corner + 1) % 3], 1);
       edges.emplace_back(triangle[(corner + 2) % 3], -1);
@@ -323,10 +325,10 @@ double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<
     if (fine_of_coarse[coarse_of_fine[v]] != v) from_coarse.add(fine.positions()[v], {&coarse_of_fine[v], 1});
   }
   const auto add_samples = [&](const Surface& of, LargestDistance& from, std::span<const std::uint32_t> start_of) {
-    for (const Triangle& t : of.triangles()) {
+    for (const base::Triangle& t : of.triangles()) {
       const std::array starts{start_of[t[0]], start_of[t[1]], start_of[t[2]]};
       sample(of.positions()[t[0]], of.positions()[t[1]], of.positions()[t[2]], spacing,
-             [&](const Vec3f& p) { from.add(p, starts); });
+             [&](const base::Vec3f& p) { from.add(p, starts); });
     }
   };
   add_samples(fine, from_coarse, coarse_of_fine);
@@ -334,4 +336,4 @@ double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<
   return std::max(from_coarse.metres(), from_fine.metres());
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

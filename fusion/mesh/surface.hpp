@@ -9,22 +9,22 @@
 #include "fusion/base/box.hpp"
 #include "fusion/base/vertex_types.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 
-double squared_distance(const fusion::Vec3f& a, const fusion::Vec3f& b);
+double squared_distance(const base::Vec3f& a, const base::Vec3f& b);
 
 /// Zero inside.
-double squared_distance_to_box(const fusion::Vec3f& p, const Bounds& box);
+double squared_distance_to_box(const base::Vec3f& p, const base::Bounds& box);
 
 /// To the triangle with its inside, degenerate or not. Exact to double rounding for any finite floats.
-double squared_distance_to_triangle(const fusion::Vec3f& p, const fusion::Vec3f& a, const fusion::Vec3f& b,
-                                    const fusion::Vec3f& c);
+double squared_distance_to_triangle(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                    const base::Vec3f& c);
 
-double triangle_area(const fusion::Vec3f& a, const fusion::Vec3f& b, const fusion::Vec3f& c);
+double triangle_area(const base::Vec3f& a, const base::Vec3f& b, const base::Vec3f& c);
 
 /// What each corner counts for at the point of a triangle that is nearest to `p`; they are not negative and their sum is 1.
-std::array<double, 3> nearest_weights(const fusion::Vec3f& p, const fusion::Vec3f& a, const fusion::Vec3f& b,
-                                      const fusion::Vec3f& c);
+std::array<double, 3> nearest_weights(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                      const base::Vec3f& c);
 
 /// A triangle of a surface, and how far it is.
 struct NearTriangle {
@@ -37,23 +37,23 @@ class Surface {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  Surface(std::span<const fusion::Vec3f> positions, std::span<const fusion::Triangle> triangles);
+  Surface(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles);
 
-  std::span<const fusion::Vec3f> positions() const { return positions_; }
-  std::span<const fusion::Triangle> triangles() const { return triangles_; }
+  std::span<const base::Vec3f> positions() const { return positions_; }
+  std::span<const base::Triangle> triangles() const { return triangles_; }
   std::span<const std::uint32_t> triangles_around(std::uint32_t vertex) const {
     return std::span(around_).subspan(offsets_[vertex], offsets_[vertex + 1] - offsets_[vertex]);
   }
 
   /// An upper bound of the squared distance of `p`: walks from `start` along edges towards `p` and looks at the triangles
   /// around the vertices there, until that does not help any more or the bound is not above `enough`.
-  double squared_distance_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
+  double squared_distance_near(const base::Vec3f& p, std::uint32_t start, double enough) const;
 
   /// The triangle found on that walk; `start` has one.
-  NearTriangle triangle_near(const fusion::Vec3f& p, std::uint32_t start, double enough) const;
+  NearTriangle triangle_near(const base::Vec3f& p, std::uint32_t start, double enough) const;
 
   /// The squared distance of `p` itself, or some bound that is not above `enough`. `at_most` is a bound that is known.
-  double squared_distance_anywhere(const fusion::Vec3f& p, double enough, double at_most) const;
+  double squared_distance_anywhere(const base::Vec3f& p, double enough, double at_most) const;
 
   /// For every vertex the seed that is fewest edges away (of several the nearest in space); kNone where no edges lead to one.
   std::vector<std::uint32_t> nearest_seeds(const std::vector<bool>& is_seed) const;
@@ -67,13 +67,14 @@ class Surface {
       64;  ///< Looked at around a vertex: a hub of thousands would cost squares.
 
   /// From vertex to vertex as long as they come nearer.
-  std::uint32_t nearest_vertex_near(const fusion::Vec3f& p, std::uint32_t start) const;
+  std::uint32_t nearest_vertex_near(const base::Vec3f& p, std::uint32_t start) const;
 
-  std::span<const fusion::Vec3f> positions_;
-  std::span<const fusion::Triangle> triangles_;
+  std::span<const base::Vec3f> positions_;
+  std::span<const base::Triangle> triangles_;
   std::vector<std::uint32_t> offsets_;
   std::vector<std::uint32_t> around_;
-  std::vector<Bounds> block_bounds_;  ///< Of kBlockSize triangles each: neighbours in the list are near each other.
+  std::vector<base::Bounds>
+      block_bounds_;  ///< Of kBlockSize triangles each: neighbours in the list are near each other.
 };
 
 /// The largest distance (metres) of points of one surface from the other, both ways, measured at the vertices and at
@@ -82,4 +83,4 @@ class Surface {
 double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
                           std::span<const std::uint32_t> fine_of_coarse);
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

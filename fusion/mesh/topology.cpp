@@ -6,13 +6,13 @@
 #include "fusion/mesh/disjoint_sets.hpp"
 #include "fusion/mesh/half_edges.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
-TopologyFacts topology_facts(const MultispectralMesh& mesh, const Progress& progress) {
+TopologyFacts topology_facts(const MultispectralMesh& mesh, const base::Progress& progress) {
   TopologyFacts facts;
   if (mesh.is_point_cloud()) return facts;
   const HalfEdges topology = half_edges(mesh.vertex_count(), mesh.triangles(), progress);
-  report(progress, kTopologyPhase, 0.9);
+  base::report(progress, base::kTopologyPhase, 0.9);
   const MeshKernel& kernel = topology.kernel;
   facts.non_manifold_edge_count = topology.non_manifold_edge_count;
   facts.flipped_edge_count = topology.flipped_edge_count;
@@ -41,4 +41,4 @@ TopologyFacts topology_facts(const MultispectralMesh& mesh, const Progress& prog
   return facts;
 }
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -5,7 +5,7 @@
 #include "fusion/base/progress.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 
 /// Facts of a mesh's connectivity. Triangles with a vertex twice or an index out of range take no part.
 struct TopologyFacts {
@@ -19,6 +19,6 @@ struct TopologyFacts {
 
 /// Builds the half-edge connectivity of the mesh with OpenMesh (see half_edges.hpp) and reads the facts off it. `progress` is told
 /// of kTopologyPhase.
-TopologyFacts topology_facts(const MultispectralMesh& mesh, const Progress& progress = {});
+TopologyFacts topology_facts(const MultispectralMesh& mesh, const base::Progress& progress = {});
 
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::mesh {
 
 /// From a vertex (block and number) to its index in a tile: an open-addressing hash table that only grows.
 class VertexIndexMap {
@@ -54,4 +54,4 @@ class VertexIndexMap {
   std::size_t count_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::mesh

@@ -91,14 +91,14 @@ ParameterSchema<Highlighting> schema() {
   return entries;
 }
 
-Result<void> check(const Highlighting& params) {
+base::Result<void> check(const Highlighting& params) {
   if (params.sides == Sides::Both && params.low && params.high && *params.low > *params.high) {
-    return failure(ErrorCode::Inconsistent,
-                   "low (" + std::to_string(*params.low) + " degC) must not be above high (" +
-                       std::to_string(*params.high) + " degC) when both sides are highlighted",
-                   "low");
+    return base::failure(base::ErrorCode::Inconsistent,
+                         "low (" + std::to_string(*params.low) + " degC) must not be above high (" +
+                             std::to_string(*params.high) + " degC) when both sides are highlighted",
+                         "low");
   }
-  return success();
+  return base::success();
 }
 
 HWY_EXPORT(fuse_highlighting);

@@ -102,7 +102,7 @@ HWY_INLINE Floats spread(Floats values) {
 }
 
 /// One colour for every vertex of a register.
-HWY_INLINE Floats repeated(Rgb8 colour) {
+HWY_INLINE Floats repeated(base::Rgb8 colour) {
   alignas(64) float lanes[kLanes];
   const float channels[4] = {static_cast<float>(colour.r), static_cast<float>(colour.g), static_cast<float>(colour.b),
                              0};
@@ -430,7 +430,7 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
 #if HWY_TARGET == HWY_SCALAR
   for (std::size_t i = 0; i < count; ++i) {
     const bool missing_here = kSomeMissing && hn::AllTrue(d, hn::IsNaN(hn::LoadU(d, temperature + i)));
-    const Rgb8 fixed = missing.value_or(Rgb8{visible[3 * i], visible[3 * i + 1], visible[3 * i + 2]});
+    const base::Rgb8 fixed = missing.value_or(base::Rgb8{visible[3 * i], visible[3 * i + 1], visible[3 * i + 2]});
     const std::uint8_t without[3] = {fixed.r, fixed.g, fixed.b};
     Floats f[3];
     for (std::size_t c = 0; c < 3; ++c) {
@@ -444,7 +444,7 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
     }
   }
 #else
-  const Floats fixed = repeated(missing.value_or(Rgb8{}));
+  const Floats fixed = repeated(missing.value_or(base::Rgb8{}));
   for (std::size_t i = 0; i < count; i += kLanes) {
     const auto loaded = padded.load(visible + 3 * i);
     const Floats weights = weight.values(i);

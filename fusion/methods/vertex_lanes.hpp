@@ -69,7 +69,7 @@ class LaneKernel final : public Kernel {
  public:
   LaneKernel(const Fuse& fuse, const MissingDisplay& missing) : fuse_(fuse), missing_(missing) {}
 
-  void fuse(const VertexValues& vertices, std::span<Rgb8> fused) const noexcept override {
+  void fuse(const base::VertexValues& vertices, std::span<base::Rgb8> fused) const noexcept override {
     if (fused.empty()) return;
     const auto start = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
     fuse_(VertexSpan{vertices.temperature_celsius.data(), start(vertices.baseline_celsius), start(vertices.freshness),

@@ -30,7 +30,7 @@ constexpr std::int32_t kFactsMissing = -1;
 struct State {
   char text[kTextCapacity] = {};
   std::uint32_t text_length = 0;
-  Error error = {};
+  base::Error error = {};
 
   TemperatureSummary summary;
   std::map<std::uint32_t, std::vector<double>> counts_by_bins;  ///< As the host writes them; whole numbers below 2^53.
@@ -60,7 +60,7 @@ void text_out(std::string_view text) {
   std::memcpy(now.text, text.data(), now.text_length);
 }
 
-std::int32_t refused(const Error& error) {
+std::int32_t refused(const base::Error& error) {
   state().error = error;
   text_out(error.message);
   return static_cast<std::int32_t>(error.code);
@@ -213,7 +213,7 @@ SPECTRA_MODULE_EXPORT(change_missing_visible) void module_change_missing_visible
 }
 SPECTRA_MODULE_EXPORT(change_missing_colour)
 void module_change_missing_colour(std::uint8_t r, std::uint8_t g, std::uint8_t b) {
-  state().change.missing = MissingDisplay{Rgb8{r, g, b}};
+  state().change.missing = MissingDisplay{base::Rgb8{r, g, b}};
 }
 
 /// Applies the change to the settings in force: 0, or the code of the refusal, which leaves them as they were.
@@ -302,14 +302,14 @@ SPECTRA_MODULE_EXPORT(parameter_in_force) double module_parameter_in_force(std::
 // ---- Fusing. Without a plan nothing is written.
 
 SPECTRA_MODULE_EXPORT(fuse)
-void module_fuse(const float* temperature_celsius, const Rgb8* visible, Rgb8* fused, std::uint32_t count) {
+void module_fuse(const float* temperature_celsius, const base::Rgb8* visible, base::Rgb8* fused, std::uint32_t count) {
   if (state().plan) state().plan->fuse({temperature_celsius, count}, {visible, count}, {fused, count});
 }
 
 /// The same of temperatures that are given as TemperatureCodes.
 SPECTRA_MODULE_EXPORT(fuse_codes)
-void module_fuse_codes(const std::uint16_t* code, float scale, float offset, const Rgb8* visible, Rgb8* fused,
-                       std::uint32_t count) {
+void module_fuse_codes(const std::uint16_t* code, float scale, float offset, const base::Rgb8* visible,
+                       base::Rgb8* fused, std::uint32_t count) {
   if (!state().plan) return;
   const TemperatureCodes codes{scale, offset};
   constexpr std::uint32_t kBlock = 4096;
@@ -324,14 +324,14 @@ void module_fuse_codes(const std::uint16_t* code, float scale, float offset, con
 /// The same into red, green, blue and alpha. Alpha is 255; with marks it is 0 where the method highlights the temperature so
 /// that it can be seen.
 SPECTRA_MODULE_EXPORT(fuse_codes_rgba)
-void module_fuse_codes_rgba(const std::uint16_t* code, float scale, float offset, const Rgb8* visible,
+void module_fuse_codes_rgba(const std::uint16_t* code, float scale, float offset, const base::Rgb8* visible,
                             std::uint8_t* rgba, std::uint32_t count, std::int32_t with_marks) {
   if (!state().plan) return;
   const FusionPlan& plan = *state().plan;
   const TemperatureCodes codes{scale, offset};
   constexpr std::uint32_t kBlock = 1024;
   alignas(64) static float temperature[kBlock];
-  static Rgb8 fused[kBlock];
+  static base::Rgb8 fused[kBlock];
   static std::uint8_t marked[kBlock];
   const bool has_marks = with_marks != 0 && plan.highlights();
   if (!has_marks) std::fill(marked, marked + kBlock, std::uint8_t{0});

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <string>
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 namespace {
 
 /// A float as text that strtof reads back exactly in every locale: a hexadecimal integer times a power of two.
@@ -38,4 +38,4 @@ std::vector<std::byte> bytes_of(const draco::EncoderBuffer& buffer) {
   return {data, data + buffer.size()};
 }
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 
 /// Adds an attribute of one value per point.
 template <class Value>
@@ -30,4 +30,4 @@ draco::Options quantisation_options(std::span<const float> origin, std::uint32_t
 /// A copy of what was encoded.
 std::vector<std::byte> bytes_of(const draco::EncoderBuffer& buffer);
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

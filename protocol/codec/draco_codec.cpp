@@ -15,7 +15,7 @@
 #include "protocol/codec/draco_attributes.hpp"
 #include "protocol/little_endian.hpp"
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 namespace {
 
 constexpr std::int32_t kLatticeLimit = 1 << 23;
@@ -458,4 +458,4 @@ Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> paylo
   return marks;
 }
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

@@ -9,7 +9,7 @@
 #include "protocol/rpc_error.hpp"
 #include "protocol/tile_frame.hpp"
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 
 /// Positions on the lattice of a tile: metres = origin_m + lattice * step_m.
 using LatticePoint = std::array<std::int32_t, 3>;
@@ -70,4 +70,4 @@ Result<DecodedTemperatureCodes> decoded_temperature_codes(std::span<const std::b
 /// The marks beside colours; empty where there are none.
 Result<std::vector<std::uint8_t>> decoded_marks(std::span<const std::byte> payload);
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

@@ -14,7 +14,7 @@
 
 #include "protocol/codec/draco_attributes.hpp"
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 namespace {
 
 auto internal(std::string message) {
@@ -252,4 +252,4 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   return file;
 }
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

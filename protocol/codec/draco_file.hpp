@@ -8,7 +8,7 @@
 
 #include "protocol/codec/draco_codec.hpp"
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 
 /// What a Draco file keeps of a mesh; the less, the smaller it is.
 enum class DracoKeeping {
@@ -52,4 +52,4 @@ inline constexpr float kDracoTemperatureStepCelsius = 1.0F / 64;
 /// InternalError for arrays that do not belong together.
 Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed);
 
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 constexpr std::string_view kBearer = "Bearer ";
@@ -212,4 +212,4 @@ std::optional<AccessControl::Identity> AccessControl::of_code(std::string_view t
   return Identity{code.role, code.name, true};
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

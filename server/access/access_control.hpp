@@ -14,7 +14,7 @@
 #include "server/access/token_bucket.hpp"
 #include "server/access/token_file.hpp"
 
-namespace spectra::server {
+namespace spectra::access {
 
 /// As whom an address counts: one machine has all IPv6 addresses that begin with the same 64 bits.
 std::string who_counts(const std::string& address);
@@ -117,4 +117,4 @@ class AccessControl {
   AttemptLimit attempts_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::access

@@ -14,7 +14,7 @@
 #include <memory>
 #include <stdexcept>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 constexpr std::chrono::hours kClockDifference{1};
@@ -167,4 +167,4 @@ std::variant<CertificateFacts, std::string> certificate_facts(const std::string&
   return facts;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::access {
 
 /// A certificate that vouches for itself, and its key.
 struct SelfMadeCertificate {
@@ -29,4 +29,4 @@ struct CertificateFacts {
 /// Of the first certificate in a text in PEM form; a sentence when there is none.
 std::variant<CertificateFacts, std::string> certificate_facts(const std::string& pem);
 
-}  // namespace spectra::server
+}  // namespace spectra::access

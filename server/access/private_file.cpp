@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace spectra::server {
+namespace spectra::access {
 
 std::optional<std::string> write_private_file(const std::filesystem::path& file, const std::string& text) {
   const auto failed = [&] { return file.string() + " cannot be written: " + std::strerror(errno); };
@@ -25,4 +25,4 @@ std::optional<std::string> write_private_file(const std::filesystem::path& file,
   return problem;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

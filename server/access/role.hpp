@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::access {
 
 /// Who somebody is, by the token that he showed.
 enum class AccessRole { Viewer, Operator, Ingest, Admin };
@@ -57,4 +57,4 @@ inline std::optional<AccessRole> access_role(std::string_view name) {
   return std::nullopt;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

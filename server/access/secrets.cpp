@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 std::string random_of(std::size_t length, std::string_view letters) {
@@ -69,4 +69,4 @@ bool from_hex(std::string_view text, Digest& digest) {
   return true;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::access {
 
 using Digest = std::array<std::uint8_t, 32>;
 
@@ -25,4 +25,4 @@ std::string to_hex(const Digest& digest);
 /// False when the text is not 64 hexadecimal digits.
 bool from_hex(std::string_view text, Digest& digest);
 
-}  // namespace spectra::server
+}  // namespace spectra::access

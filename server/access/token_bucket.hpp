@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spectra::server {
+namespace spectra::access {
 
 /// Lets `rate_per_s` things through in the long run and `burst` at once. Time is handed in (seconds of a steady clock).
 class TokenBucket {
@@ -36,4 +36,4 @@ class TokenBucket {
   double last_s_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::access

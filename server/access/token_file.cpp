@@ -11,7 +11,7 @@
 
 #include "server/access/private_file.hpp"
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 constexpr std::size_t kSecretLength = 43;  // 258 bits
@@ -132,4 +132,4 @@ std::string new_token(AccessRole role) {
   return "spectra_" + std::string(to_string(role)) + '_' + random_text(kTokenLength);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::access

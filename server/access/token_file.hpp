@@ -10,7 +10,7 @@
 #include "server/access/role.hpp"
 #include "server/access/secrets.hpp"
 
-namespace spectra::server {
+namespace spectra::access {
 
 /// What is kept of a token: not the token itself.
 struct AccessToken {
@@ -45,4 +45,4 @@ AccessResult<TokenList> tokens_of_text(std::string_view text);
 /// A new token, to be shown once.
 std::string new_token(AccessRole role);
 
-}  // namespace spectra::server
+}  // namespace spectra::access

@@ -11,28 +11,28 @@
 #include "server/session/served_scene.hpp"
 #include "server/sources/map_keeper.hpp"
 
-namespace spectra::server {
+namespace spectra::api {
 
 /// The paths of docs/protocol.md, "Blocks of the map".
 class BlockApi {
  public:
   /// A block that is given back takes a slot of the exports.
-  BlockApi(ServedScene& served, MapKeeper& map, ExportShelf& exports);
+  BlockApi(session::ServedScene& served, sources::MapKeeper& map, exports::ExportShelf& exports);
 
   /// The path is kBlocksPath or begins with it and a slash.
-  void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply);
 
   /// As BlockHandler says.
-  void change(BlockChange change, std::function<void(BlockOutcome)> done);
+  void change(net::BlockChange change, std::function<void(net::BlockOutcome)> done);
 
  private:
-  void put(const std::string& id, const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void put(const std::string& id, const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply);
   void give(const std::string& id, const std::vector<std::pair<std::string, std::string>>& query,
-            const std::function<void(HttpReply)>& reply);
+            const std::function<void(net::HttpReply)>& reply);
 
-  ServedScene& served_;
-  MapKeeper& map_;
-  ExportShelf& exports_;
+  session::ServedScene& served_;
+  sources::MapKeeper& map_;
+  exports::ExportShelf& exports_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::api

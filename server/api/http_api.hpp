@@ -9,31 +9,31 @@
 #include "server/net/net_metrics.hpp"
 #include "server/session/served_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::api {
 
 /// The paths of docs/protocol.md, "HTTP", beside the web client: health, metrics, methods and palettes, the scene and its exports. What takes
 /// time runs on the worker pool; at most two exports are in memory at a time, further ones are told to come back.
 class HttpApi {
  public:
-  HttpApi(ServedScene& served, MapKeeper& map);
+  HttpApi(session::ServedScene& served, sources::MapKeeper& map);
 
-  void handle(const HttpRequest& request, const std::function<void(HttpReply)>& reply);
+  void handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply);
 
   /// As BlockHandler says.
-  void change_block(BlockChange change, std::function<void(BlockOutcome)> done) {
+  void change_block(net::BlockChange change, std::function<void(net::BlockOutcome)> done) {
     blocks_.change(std::move(change), std::move(done));
   }
 
   /// Where the network side counts; to be set before the first request.
-  void set_metrics(const NetMetrics& metrics) { net_metrics_ = &metrics; }
+  void set_metrics(const net::NetMetrics& metrics) { net_metrics_ = &metrics; }
 
  private:
-  void handle_export(RequestTarget target, const std::function<void(HttpReply)>& reply);
+  void handle_export(net::RequestTarget target, const std::function<void(net::HttpReply)>& reply);
 
-  ServedScene& served_;
-  ExportShelf exports_;
+  session::ServedScene& served_;
+  exports::ExportShelf exports_;
   BlockApi blocks_;
-  const NetMetrics* net_metrics_ = nullptr;
+  const net::NetMetrics* net_metrics_ = nullptr;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::api

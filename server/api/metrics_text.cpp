@@ -13,7 +13,7 @@
 #include "server/session/version.hpp"
 #include "server/stream/duration_histogram.hpp"
 
-namespace spectra::server {
+namespace spectra::api {
 namespace {
 
 class Metrics {
@@ -25,13 +25,14 @@ class Metrics {
     metrics_.push_back({std::move(name), std::move(help), value, true, "", ""});
   }
   /// One of several of a name, told apart by whose it is.
-  void of_role(std::string name, std::string help, AccessRole role, double value, bool is_counter) {
+  void of_role(std::string name, std::string help, access::AccessRole role, double value, bool is_counter) {
     metrics_.push_back({std::move(name), std::move(help), value, is_counter, "role", std::string(to_string(role))});
   }
-  void durations(std::string name, std::string help, const std::string& what, const DurationHistogram& histogram) {
+  void durations(std::string name, std::string help, const std::string& what,
+                 const stream::DurationHistogram& histogram) {
     const auto counts = histogram.counts();
-    Metric metric{std::move(name), std::move(help), 0, false, "what", what};
-    metric.distribution = {{DurationHistogram::kBounds_s.begin(), DurationHistogram::kBounds_s.end()},
+    net::Metric metric{std::move(name), std::move(help), 0, false, "what", what};
+    metric.distribution = {{stream::DurationHistogram::kBounds_s.begin(), stream::DurationHistogram::kBounds_s.end()},
                            {counts.counts.begin(), counts.counts.end()},
                            counts.sum_s};
     metrics_.push_back(std::move(metric));
@@ -39,10 +40,10 @@ class Metrics {
   void info(std::string name, std::string help, std::string label, std::string text) {
     metrics_.push_back({std::move(name), std::move(help), 1, false, std::move(label), std::move(text)});
   }
-  std::string text() const { return prometheus_text(metrics_); }
+  std::string text() const { return net::prometheus_text(metrics_); }
 
  private:
-  std::vector<Metric> metrics_;
+  std::vector<net::Metric> metrics_;
 };
 
 double as_double(std::uint64_t count) {
@@ -77,9 +78,9 @@ double cpu_seconds() {
 
 }  // namespace
 
-std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
+std::string metrics_text(const session::ServedScene& served, const net::NetMetrics& net) {
   Metrics out;
-  out.info("spectra_build_info", "The version that runs.", "version", std::string(kVersion));
+  out.info("spectra_build_info", "The version that runs.", "version", std::string(session::kVersion));
   out.gauge("spectra_viewers", "Viewers connected now.", static_cast<double>(net.viewers));
   out.counter("spectra_viewers_total", "Viewers that have connected.", as_double(net.viewers_total));
   out.counter("spectra_viewers_cut_total", "Viewers cut by a deadline or a full queue.", as_double(net.viewers_cut));
@@ -109,29 +110,29 @@ std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
               as_double(served.cache.hit_count()));
   out.counter("spectra_frame_cache_misses_total", "Frames that had to be encoded.",
               as_double(served.cache.miss_count()));
-  const EncodingTimes& times = served.cache.times();
+  const stream::EncodingTimes& times = served.cache.times();
   for (const auto& [what, histogram] :
        {std::pair{"geometry", &times.geometry}, std::pair{"fusing", &times.fusing},
         std::pair{"colours", &times.colours}, std::pair{"raw_layer", &times.raw_layer}}) {
     out.durations("spectra_encoding_seconds", "What making the frames of a tile took.", what, *histogram);
   }
-  for (const AccessRole role : kRoles) {
+  for (const access::AccessRole role : access::kRoles) {
     out.of_role("spectra_role_viewers", "Viewers connected now, by role.", role,
                 static_cast<double>(net.of(role).viewers), false);
   }
-  for (const AccessRole role : kRoles) {
+  for (const access::AccessRole role : access::kRoles) {
     out.of_role("spectra_role_frames_sent_total", "Tile frames sent, by role.", role,
                 as_double(net.of(role).frames_sent), true);
   }
-  for (const AccessRole role : kRoles) {
+  for (const access::AccessRole role : access::kRoles) {
     out.of_role("spectra_role_frame_bytes_sent_total", "Their bytes, by role.", role,
                 as_double(net.of(role).frame_bytes_sent), true);
   }
-  for (const AccessRole role : kRoles) {
+  for (const access::AccessRole role : access::kRoles) {
     out.of_role("spectra_role_queued_bytes", "Messages that wait for viewers, by role.", role,
                 static_cast<double>(net.of(role).queued_bytes), false);
   }
-  for (const AccessRole role : kRoles) {
+  for (const access::AccessRole role : access::kRoles) {
     out.of_role("spectra_role_viewers_cut_total", "Viewers cut by a deadline or a full queue, by role.", role,
                 as_double(net.of(role).viewers_cut), true);
   }
@@ -147,4 +148,4 @@ std::string metrics_text(const ServedScene& served, const NetMetrics& net) {
   return out.text();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::api

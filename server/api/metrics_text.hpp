@@ -5,9 +5,9 @@
 #include "server/net/net_metrics.hpp"
 #include "server/session/served_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::api {
 
 /// Everything that is counted, in the text format of Prometheus.
-std::string metrics_text(const ServedScene& served, const NetMetrics& net);
+std::string metrics_text(const session::ServedScene& served, const net::NetMetrics& net);
 
-}  // namespace spectra::server
+}  // namespace spectra::api

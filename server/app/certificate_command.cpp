@@ -12,7 +12,7 @@
 #include "server/app/commands.hpp"
 #include "server/net/interface_addresses.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 /// What this machine is called by others.
@@ -25,7 +25,7 @@ std::vector<std::string> own_names() {
     if (host.find('.') == std::string::npos) names.push_back(host + ".local");
   }
   names.emplace_back("localhost");
-  for (const auto& address : interface_addresses(true)) names.push_back(address.to_string());
+  for (const auto& address : net::interface_addresses(true)) names.push_back(address.to_string());
   return names;
 }
 
@@ -39,14 +39,15 @@ int run_certificate(const CertificateOptions& options) {
     }
   }
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const auto made =
-      make_certificate(options.names.empty() ? own_names() : options.names, now, std::chrono::days(options.days));
+  const auto made = access::make_certificate(options.names.empty() ? own_names() : options.names, now,
+                                             std::chrono::days(options.days));
   if (const auto* problem = std::get_if<std::string>(&made)) return fail(kWrongUsage, "--name: " + *problem);
-  const auto& pair = std::get<SelfMadeCertificate>(made);
+  const auto& pair = std::get<access::SelfMadeCertificate>(made);
   // The key first: a server that reads both in between finds that they do not fit, and goes on with the old ones.
-  if (const auto problem = write_private_file(options.key, pair.key)) return fail(kJobFailed, *problem);
-  if (const auto problem = write_private_file(options.certificate, pair.certificate)) return fail(kJobFailed, *problem);
-  const auto facts = std::get<CertificateFacts>(certificate_facts(pair.certificate));
+  if (const auto problem = access::write_private_file(options.key, pair.key)) return fail(kJobFailed, *problem);
+  if (const auto problem = access::write_private_file(options.certificate, pair.certificate))
+    return fail(kJobFailed, *problem);
+  const auto facts = std::get<access::CertificateFacts>(access::certificate_facts(pair.certificate));
   fmt::print("{}\n", facts.fingerprint);
   fmt::print(stderr, "SHA-256 fingerprint of {}, good until {:%Y-%m-%d} for {}; its key is in {}\n",
              options.certificate.string(), fmt::gmtime(std::chrono::system_clock::to_time_t(facts.not_after)),
@@ -54,4 +55,4 @@ int run_certificate(const CertificateOptions& options) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

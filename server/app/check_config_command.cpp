@@ -5,7 +5,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/serve_setup.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 int run_check_config(const std::filesystem::path& file, const ServeOptions& options) {
   const auto setup = serve_setup(options);
@@ -22,4 +22,4 @@ int run_check_config(const std::filesystem::path& file, const ServeOptions& opti
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -9,7 +9,7 @@
 #include "server/app/commands.hpp"
 #include "server/app/progress_line.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 /// One line in one write, so that lines of several threads do not mix.
@@ -37,8 +37,8 @@ int fail(int status, std::string_view message) {
   return status;
 }
 
-int fail(const fusion::Error& error) {
-  const bool is_usage = static_cast<int>(error.code) < static_cast<int>(fusion::ErrorCode::FileNotFound);
+int fail(const base::Error& error) {
+  const bool is_usage = static_cast<int>(error.code) < static_cast<int>(base::ErrorCode::FileNotFound);
   return fail(is_usage ? kWrongUsage : kJobFailed, error.message);
 }
 
@@ -46,7 +46,7 @@ void warn(std::string_view message) {
   print_line("warning: ", message);
 }
 
-void print_notes(const std::vector<fusion::Note>& notes) {
+void print_notes(const std::vector<files::Note>& notes) {
   for (const auto& note : notes) print_line("note: ", note.message);
 }
 
@@ -54,29 +54,29 @@ std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
                                         const std::optional<std::filesystem::path>& thermal,
                                         std::vector<ProgressStage> next) {
   std::vector<ProgressStage> stages;
-  if (thermal) stages.push_back({fusion::kReadingThermalPhase, "reading " + thermal->filename().string(), 1});
-  stages.push_back({fusion::kReadingPhase, "reading " + scene.filename().string(), 1});
-  if (thermal) stages.push_back({fusion::kJoiningPhase, "joining temperatures", 40});
-  stages.push_back({fusion::kSurveyPhase, "surveying " + scene.filename().string(), 0.3});
+  if (thermal) stages.push_back({base::kReadingThermalPhase, "reading " + thermal->filename().string(), 1});
+  stages.push_back({base::kReadingPhase, "reading " + scene.filename().string(), 1});
+  if (thermal) stages.push_back({base::kJoiningPhase, "joining temperatures", 40});
+  stages.push_back({base::kSurveyPhase, "surveying " + scene.filename().string(), 0.3});
   stages.insert(stages.end(), std::move_iterator(next.begin()), std::move_iterator(next.end()));
   return stages;
 }
 
-fusion::ReadOptions watched(fusion::ReadOptions options, ProgressLine& line) {
+files::ReadOptions watched(files::ReadOptions options, ProgressLine& line) {
   options.progress = line.sink();
   return options;
 }
 
-fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
-                                               const std::optional<std::filesystem::path>& thermal,
-                                               const fusion::ReadOptions& options) {
-  auto loaded = thermal ? fusion::read_ply_with_thermal(scene, *thermal, options) : fusion::read_ply(scene, options);
-  fusion::report(options.progress, fusion::kSurveyPhase, 0);
+base::Result<files::LoadedScene> load_scene(const std::filesystem::path& scene,
+                                            const std::optional<std::filesystem::path>& thermal,
+                                            const files::ReadOptions& options) {
+  auto loaded = thermal ? files::read_ply_with_thermal(scene, *thermal, options) : files::read_ply(scene, options);
+  base::report(options.progress, base::kSurveyPhase, 0);
   if (!loaded) return loaded;
-  fusion::survey(loaded.value(), options);
+  files::survey(loaded.value(), options);
   loaded.value().mesh.name = as_utf8(loaded.value().mesh.name);
-  for (fusion::Note& note : loaded.value().notes) note.message = as_utf8(note.message);
+  for (files::Note& note : loaded.value().notes) note.message = as_utf8(note.message);
   return loaded;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -9,19 +9,19 @@
 #include "fusion/files/ply_reader.hpp"
 #include "server/app/progress_line.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// Writes "spectra: MESSAGE" to standard error and returns `status`.
 int fail(int status, std::string_view message);
 
 /// The same for an error of the fusion library: what was asked for wrongly is wrong usage, the rest a failed job.
-int fail(const fusion::Error& error);
+int fail(const base::Error& error);
 
 /// Writes "spectra: warning: MESSAGE" to standard error.
 void warn(std::string_view message);
 
 /// Writes what was repaired, left out or interpreted to standard error, one line each.
-void print_notes(const std::vector<fusion::Note>& notes);
+void print_notes(const std::vector<files::Note>& notes);
 
 /// The stages of reading a scene, and those that follow.
 std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
@@ -29,11 +29,11 @@ std::vector<ProgressStage> with_loading(const std::filesystem::path& scene,
                                         std::vector<ProgressStage> next);
 
 /// The options, with their progress told to the line.
-fusion::ReadOptions watched(fusion::ReadOptions options, ProgressLine& line);
+files::ReadOptions watched(files::ReadOptions options, ProgressLine& line);
 
 /// Reads a scene, with the temperatures of a second file where one is given, and surveys it.
-fusion::Result<fusion::LoadedScene> load_scene(const std::filesystem::path& scene,
-                                               const std::optional<std::filesystem::path>& thermal,
-                                               const fusion::ReadOptions& options);
+base::Result<files::LoadedScene> load_scene(const std::filesystem::path& scene,
+                                            const std::optional<std::filesystem::path>& thermal,
+                                            const files::ReadOptions& options);
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -15,7 +15,7 @@
 #include "server/session/settings_text.hpp"
 #include "server/store/block_store.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// Exit statuses of the program.
 inline constexpr int kDone = 0;
@@ -36,31 +36,31 @@ struct ServeOptions {
   std::vector<std::string> allowed_hosts;
   std::optional<std::filesystem::path> tokens;            ///< Whom to let in; absent: what the environment says.
   std::optional<std::filesystem::path> certificate, key;  ///< PEM; both: connections are encrypted.
-  NetLimits limits;
+  net::NetLimits limits;
   LogOptions log;
-  bool is_insecure = false;           ///< Others are let in without a token.
-  std::optional<AccessRole> invited;  ///< Print a link that lets one browser in.
-  bool is_fused_only = false;         ///< Viewers get no raw layers.
+  bool is_insecure = false;                   ///< Others are let in without a token.
+  std::optional<access::AccessRole> invited;  ///< Print a link that lets one browser in.
+  bool is_fused_only = false;                 ///< Viewers get no raw layers.
   std::optional<std::filesystem::path> web;
   unsigned thread_count = 0;     ///< Of the worker pool; 0 = as many as processors.
   bool has_config_file = false;  ///< They come from one, in part at least.
-  fusion::ReadOptions read;
+  files::ReadOptions read;
 };
 
 struct FuseOptions {
   std::filesystem::path input;
   std::filesystem::path output;
   std::optional<std::filesystem::path> thermal;
-  SettingsText settings;
-  fusion::ReadOptions read;
-  protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< In a Draco file.
+  session::SettingsText settings;
+  files::ReadOptions read;
+  protocol::codec::DracoKeeping keeping = protocol::codec::DracoKeeping::Shape;  ///< In a Draco file.
 };
 
 struct InfoOptions {
   std::filesystem::path input;
   std::optional<std::filesystem::path> thermal;
   bool as_json = false;
-  fusion::ReadOptions read;
+  files::ReadOptions read;
 };
 
 struct DemoSceneFileOptions {
@@ -74,7 +74,7 @@ struct TradeoffCommandOptions {
   std::filesystem::path folder;  ///< For the tables and the report; made when it does not exist.
   std::optional<std::filesystem::path> thermal;
   std::string palette;  ///< From whose colours the temperature is read back; empty: the default.
-  fusion::ReadOptions read;
+  files::ReadOptions read;
 };
 
 struct StoreSalvageOptions {
@@ -98,7 +98,7 @@ struct PushOptions {
   std::optional<std::filesystem::path> trusted;     ///< PEM; absent: whom this machine trusts.
   std::optional<std::filesystem::path> token_file;  ///< Holds a token in its first line; absent: the environment's.
   std::string observed_at = "file";                 ///< "file", "now" or Unix seconds.
-  fusion::ReadOptions read;
+  files::ReadOptions read;
 };
 
 struct CertificateOptions {
@@ -151,4 +151,4 @@ int run_store_salvage(const StoreSalvageOptions& options);
 /// Parses the arguments, runs the command, returns the exit status. Catches everything.
 int run_program(int argc, const char* const* argv);
 
-}  // namespace spectra::server
+}  // namespace spectra::app

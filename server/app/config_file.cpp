@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 /// Values go into the options as the file is read, so that whatever an option refuses is told with its line: CLI11's own reader knows
@@ -98,4 +98,4 @@ void add_config_file(CLI::App& program, CLI::App& command) {
   program.config_formatter(std::make_shared<TomlConfig>(program, command));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

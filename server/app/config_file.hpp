@@ -4,7 +4,7 @@ namespace CLI {
 class App;
 }
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// Gives the program the option `--config`: a TOML file whose section named like `command` holds that command's options by their
 /// long names, and its positional ones by theirs. The command line decides where both say something. What cannot be meant
@@ -12,4 +12,4 @@ namespace spectra::server {
 /// and the key. Both apps must outlive the parsing.
 void add_config_file(CLI::App& program, CLI::App& command);
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -8,18 +8,17 @@
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 int run_demo_scene(const DemoSceneFileOptions& options) {
   const Interruption interruption;
-  ProgressLine line({{fusion::kModellingPhase, "modelling the demo scene", 14},
-                     {fusion::kWritingPhase, "writing " + options.output.filename().string(), 1}});
-  const auto mesh = fusion::demo_scene({options.vertex_count, options.seed}, line.sink());
-  const auto written =
-      fusion::write_ply(options.output, mesh, mesh.visible(),
-                        "up " + std::string(to_string(mesh.up)) + "; positions in metres", line.sink());
+  ProgressLine line({{base::kModellingPhase, "modelling the demo scene", 14},
+                     {base::kWritingPhase, "writing " + options.output.filename().string(), 1}});
+  const auto mesh = demo::demo_scene({options.vertex_count, options.seed}, line.sink());
+  const auto written = files::write_ply(options.output, mesh, mesh.visible(),
+                                        "up " + std::string(to_string(mesh.up)) + "; positions in metres", line.sink());
   line.end();
   return written ? kDone : fail(written.error());
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

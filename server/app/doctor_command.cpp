@@ -25,7 +25,7 @@
 #include "server/net/tls_identity.hpp"
 #include "server/store/store_file.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace fs = std::filesystem;
 using boost::asio::ip::tcp;
 using std::chrono::system_clock;
@@ -129,7 +129,7 @@ bool answers_as_spectra(const tcp::endpoint& endpoint) {
 }
 
 void look_at_address(Report& report, const ServeOptions& options, bool has_tokens) {
-  const auto listen = parsed_listen_address(options.listen);
+  const auto listen = net::parsed_listen_address(options.listen);
   if (!listen) {
     report.wrong("address: " + options.listen + " is none; ADDRESS:PORT is wanted, such as 0.0.0.0:8080");
     return;
@@ -162,9 +162,9 @@ void look_at_address(Report& report, const ServeOptions& options, bool has_token
   if (is_open_to_strangers(options, *listen, has_tokens)) {
     report.wrong("access: others reach " + options.listen +
                  ", and there are no tokens: spectra token --file FILE makes one, for tokens = \"FILE\"");
-  } else if (!is_loopback(*listen) && !has_tokens) {
+  } else if (!net::is_loopback(*listen) && !has_tokens) {
     report.note("access: anybody on the network may watch and operate (insecure)");
-  } else if (!is_loopback(*listen) && !options.certificate) {
+  } else if (!net::is_loopback(*listen) && !options.certificate) {
     report.note(
         "access: tokens and pictures go over the network in the clear; spectra certificate makes what encrypts them");
   }
@@ -177,7 +177,7 @@ bool look_at_tokens(Report& report, const ServeOptions& options) {
     report.wrong("tokens: " + *problem);
     return true;
   }
-  const auto& list = std::get<std::optional<TokenList>>(read);
+  const auto& list = std::get<std::optional<access::TokenList>>(read);
   if (!list) {
     report.ok("tokens: none asked for");
   } else if (list->tokens.empty()) {
@@ -191,17 +191,17 @@ bool look_at_tokens(Report& report, const ServeOptions& options) {
 void look_at_certificate(Report& report, const ServeOptions& options) {
   if (!options.certificate) return;
   const std::string file = "certificate: " + options.certificate->string();
-  if (const auto problem = TlsIdentity(*options.certificate, *options.key).load()) {
+  if (const auto problem = net::TlsIdentity(*options.certificate, *options.key).load()) {
     report.wrong("certificate: " + *problem);
     return;
   }
   std::ifstream in(*options.certificate);
-  const auto read = certificate_facts({std::istreambuf_iterator<char>(in), {}});
+  const auto read = access::certificate_facts({std::istreambuf_iterator<char>(in), {}});
   if (const auto* problem = std::get_if<std::string>(&read)) {
     report.wrong(file + ": " + *problem);
     return;
   }
-  const auto& facts = std::get<CertificateFacts>(read);
+  const auto& facts = std::get<access::CertificateFacts>(read);
   const auto day = [](std::chrono::sys_seconds time) {
     return fmt::format("{:%Y-%m-%d}", fmt::gmtime(system_clock::to_time_t(time)));
   };
@@ -227,7 +227,7 @@ void look_at_store(Report& report, const ServeOptions& options) {
     return;
   }
   const fs::path folder = options.store->has_parent_path() ? options.store->parent_path() : fs::path(".");
-  if (access(folder.c_str(), W_OK) != 0) {
+  if (::access(folder.c_str(), W_OK) != 0) {
     report.wrong(file + ": this user may not write into " + folder.string() + "; ask as the user who serves");
   }
   std::error_code error;
@@ -301,4 +301,4 @@ int run_doctor(const std::optional<fs::path>& file, const std::variant<ServeOpti
   return report.is_wrong() ? kJobFailed : kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -15,66 +15,68 @@
 #include "server/app/progress_line.hpp"
 #include "server/exports/fused_file.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 struct FusedFacts {
-  std::vector<fusion::Note> notes;
+  std::vector<files::Note> notes;
   fusion::TemperatureSummary temperature;
 };
 
 ProgressStage writing(const FuseOptions& options, double weight) {
-  return {fusion::kWritingPhase, "writing " + options.output.filename().string(), weight};
+  return {base::kWritingPhase, "writing " + options.output.filename().string(), weight};
 }
 
 /// PLY to PLY, in constant memory whatever the size of the scene.
-fusion::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fusion::FusionSettings& settings) {
-  ProgressLine line({{fusion::kReadingPhase, "reading " + options.input.filename().string(), 1},
-                     {fusion::kHistogramPhase, "counting temperatures and hues", 0.5},
-                     {fusion::kFusingPhase, "fusing to " + options.output.filename().string(), 2}});
-  BOOST_OUTCOME_TRY(auto fused, fusion::fuse_ply(options.input, options.output, settings, watched(options.read, line)));
+base::Result<FusedFacts> fused_in_blocks(const FuseOptions& options, const fusion::FusionSettings& settings) {
+  ProgressLine line({{base::kReadingPhase, "reading " + options.input.filename().string(), 1},
+                     {base::kHistogramPhase, "counting temperatures and hues", 0.5},
+                     {base::kFusingPhase, "fusing to " + options.output.filename().string(), 2}});
+  BOOST_OUTCOME_TRY(auto fused, files::fuse_ply(options.input, options.output, settings, watched(options.read, line)));
   return FusedFacts{std::move(fused.notes), fused.temperature};
 }
 
 /// To a file that needs no lattice.
-fusion::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
-                                           const SceneFileOptions& file) {
+base::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusion::FusionSettings& settings,
+                                         const exports::SceneFileOptions& file) {
   ProgressLine line(with_loading(options.input, options.thermal, {writing(options, 8)}));
   BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
-  const auto temperature = temperature_of(loaded.mesh);
+  const auto temperature = exports::temperature_of(loaded.mesh);
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, temperature));
-  BOOST_OUTCOME_TRYV(
-      write_scene_file(options.output, loaded.mesh, fused_colours(loaded.mesh, plan), file, line.sink()));
+  BOOST_OUTCOME_TRYV(exports::write_scene_file(options.output, loaded.mesh, exports::fused_colours(loaded.mesh, plan),
+                                               file, line.sink()));
   return FusedFacts{std::move(loaded.notes), temperature.summary};
 }
 
 /// To a Draco file on the lattice of the scene.
-fusion::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
-                                            SceneFileOptions file) {
-  ProgressLine line(
-      with_loading(options.input, options.thermal, {{kTilingPhase, "cutting into tiles", 10}, writing(options, 20)}));
+base::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
+                                          exports::SceneFileOptions file) {
+  ProgressLine line(with_loading(options.input, options.thermal,
+                                 {{map::kTilingPhase, "cutting into tiles", 10}, writing(options, 20)}));
   BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
   auto notes = loaded.notes;
-  WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
-  const auto scene =
-      SceneSnapshot::build(std::move(loaded), 1, pool, kLeafVertexCount, LevelsOfDetail::LeavesOnly, line.sink());
+  jobs::WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
+  const auto scene = map::SceneSnapshot::build(std::move(loaded), 1, pool, map::kLeafVertexCount,
+                                               map::LevelsOfDetail::LeavesOnly, line.sink());
   BOOST_OUTCOME_TRY(const auto plan, fusion::FusionPlan::prepare(settings, scene->temperature()));
   auto mesh = scene->whole_mesh();
-  BOOST_OUTCOME_TRYV(round_for_file(*scene, mesh, file));
-  BOOST_OUTCOME_TRY(const auto losses,
-                    write_scene_file(options.output, mesh, fused_colours(mesh, plan), file, line.sink()));
+  BOOST_OUTCOME_TRYV(exports::round_for_file(*scene, mesh, file));
+  BOOST_OUTCOME_TRY(
+      const auto losses,
+      exports::write_scene_file(options.output, mesh, exports::fused_colours(mesh, plan), file, line.sink()));
   notes.insert(notes.end(), losses.begin(), losses.end());
   return FusedFacts{std::move(notes), scene->temperature().summary};
 }
 
-fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::FusionSettings& settings,
-                                 SceneFileFormat format) {
-  SceneFileOptions file;
+base::Result<FusedFacts> fused(const FuseOptions& options, const fusion::FusionSettings& settings,
+                               exports::SceneFileFormat format) {
+  exports::SceneFileOptions file;
   file.format = format;
   file.keeping = options.keeping;
-  const bool is_lossless = format != SceneFileFormat::Draco || file.keeping == protocol::DracoKeeping::Everything;
+  const bool is_lossless =
+      format != exports::SceneFileFormat::Draco || file.keeping == protocol::codec::DracoKeeping::Everything;
   if (!is_lossless) return fused_on_lattice(options, settings, file);
-  if (format == SceneFileFormat::Ply && !options.thermal) return fused_in_blocks(options, settings);
+  if (format == exports::SceneFileFormat::Ply && !options.thermal) return fused_in_blocks(options, settings);
   return fused_in_memory(options, settings, file);
 }
 
@@ -82,7 +84,7 @@ fusion::Result<FusedFacts> fused(const FuseOptions& options, const fusion::Fusio
 
 int run_fuse(const FuseOptions& options) {
   const Interruption interruption;
-  const auto format = scene_file_format(options.output.string());
+  const auto format = exports::scene_file_format(options.output.string());
   if (!format) {
     return fail(kWrongUsage, options.output.string() + ": the output must end in .ply, .glb or .drc");
   }
@@ -92,7 +94,7 @@ int run_fuse(const FuseOptions& options) {
       return fail(kWrongUsage, options.output.string() + ": the output is the input, which would be lost");
     }
   }
-  const auto settings = settings_from_text(options.settings);
+  const auto settings = session::settings_from_text(options.settings);
   if (!settings) return fail(settings.error());
   const auto facts = fused(options, settings.value(), *format);
   if (!facts) return fail(facts.error());
@@ -113,4 +115,4 @@ int run_fuse(const FuseOptions& options) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -14,10 +14,10 @@
 #include "server/exports/fused_file.hpp"
 #include "server/session/conversions.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
-protocol::Bounds bounds_of(std::span<const fusion::Vec3f> positions) {
+protocol::Bounds bounds_of(std::span<const base::Vec3f> positions) {
   protocol::Bounds bounds;
   bool is_first = true;
   for (const auto& p : positions) {
@@ -32,7 +32,7 @@ protocol::Bounds bounds_of(std::span<const fusion::Vec3f> positions) {
 }
 
 /// Without strays.
-protocol::Bounds core_bounds_of(const fusion::LoadedScene& loaded) {
+protocol::Bounds core_bounds_of(const files::LoadedScene& loaded) {
   const auto& [low, high] = *loaded.core_bounds;
   return {{double{low.x}, double{low.y}, double{low.z}}, {double{high.x}, double{high.y}, double{high.z}}};
 }
@@ -41,8 +41,8 @@ std::array<double, 3> size_of(const protocol::Bounds& bounds) {
   return {bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1], bounds.max[2] - bounds.min[2]};
 }
 
-nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::TemperatureSummary& temperature,
-                         const protocol::Bounds& bounds, const fusion::TopologyFacts& topology) {
+nlohmann::json info_json(const files::LoadedScene& loaded, const fusion::TemperatureSummary& temperature,
+                         const protocol::Bounds& bounds, const mesh::TopologyFacts& topology) {
   const auto& mesh = loaded.mesh;
   const auto core = core_bounds_of(loaded);
   const auto size = size_of(core);
@@ -63,7 +63,7 @@ nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::Temper
           {"size_m", {size[0], size[1], size[2]}},
           {"metric", mesh.is_metric},
           {"up", to_string(mesh.up)},
-          {"temperature", protocol::to_json(to_message(temperature))},
+          {"temperature", protocol::to_json(session::to_message(temperature))},
           {"topology",
            {{"boundary_edge_count", topology.boundary_edge_count},
             {"non_manifold_edge_count", topology.non_manifold_edge_count},
@@ -74,8 +74,8 @@ nlohmann::json info_json(const fusion::LoadedScene& loaded, const fusion::Temper
           {"notes", notes}};
 }
 
-void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSummary& temperature,
-                const protocol::Bounds& bounds, const fusion::TopologyFacts& topology) {
+void print_info(const files::LoadedScene& loaded, const fusion::TemperatureSummary& temperature,
+                const protocol::Bounds& bounds, const mesh::TopologyFacts& topology) {
   const auto& mesh = loaded.mesh;
   fmt::print("name         {}\n", mesh.name);
   fmt::print("vertices     {}\n", mesh.vertex_count());
@@ -115,13 +115,13 @@ void print_info(const fusion::LoadedScene& loaded, const fusion::TemperatureSumm
 int run_info(const InfoOptions& options) {
   const Interruption interruption;
   ProgressLine line(
-      with_loading(options.input, options.thermal, {{fusion::kTopologyPhase, "examining the topology", 12}}));
+      with_loading(options.input, options.thermal, {{base::kTopologyPhase, "examining the topology", 12}}));
   const auto loaded = load_scene(options.input, options.thermal, watched(options.read, line));
   if (!loaded) return fail(loaded.error());
   const auto& mesh = loaded.value().mesh;
-  const auto temperature = temperature_of(mesh).summary;
+  const auto temperature = exports::temperature_of(mesh).summary;
   const auto bounds = bounds_of(mesh.positions());
-  const auto topology = fusion::topology_facts(mesh, line.sink());
+  const auto topology = mesh::topology_facts(mesh, line.sink());
   line.end();
   if (options.as_json) {
     const auto json = info_json(loaded.value(), temperature, bounds, topology);
@@ -132,4 +132,4 @@ int run_info(const InfoOptions& options) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -6,7 +6,7 @@
 #include "fusion/files/output_file.hpp"
 #include "server/app/progress_line.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 /// Wakes the waiting thread when there is nothing left to wait for. From anybody else it means nothing, as by default.
@@ -48,10 +48,10 @@ void Interruption::wait() {
   int signal = 0;
   while (!is_over_) {
     if (sigwait(&signals_, &signal) != 0 || signal == kWakeUp) continue;
-    fusion::OutputFile::abandon_all();
+    files::OutputFile::abandon_all();
     ProgressLine::make_way(true);
     end_by(signal);
   }
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -4,7 +4,7 @@
 #include <csignal>
 #include <thread>
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// While it lives, SIGINT, SIGTERM and SIGHUP end the process as they do by default (a shell sees 130, 143, 129), but
 /// files that are not finished are removed first; the ones that the process was started to ignore stay ignored. A file
@@ -26,4 +26,4 @@ class Interruption {
   std::thread thread_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::app

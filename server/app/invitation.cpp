@@ -4,7 +4,7 @@
 
 #include <memory>
 
-namespace spectra::server {
+namespace spectra::app {
 
 std::string qr_text(const std::string& text) {
   const std::unique_ptr<QRcode, void (*)(QRcode*)> code(
@@ -28,4 +28,4 @@ std::string qr_text(const std::string& text) {
   return picture;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

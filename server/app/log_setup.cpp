@@ -14,7 +14,7 @@
 
 #include "server/app/progress_line.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 constexpr std::size_t kFileBytes = 10'000'000;
@@ -75,4 +75,4 @@ std::optional<std::string> set_up_log(const LogOptions& options) {
   return std::nullopt;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

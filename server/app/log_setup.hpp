@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// How the log of a server looks and where it goes.
 struct LogOptions {
@@ -18,4 +18,4 @@ struct LogOptions {
 /// Takes the place of the program's log. A sentence when the file cannot be written.
 std::optional<std::string> set_up_log(const LogOptions& options);
 
-}  // namespace spectra::server
+}  // namespace spectra::app

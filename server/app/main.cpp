@@ -1,5 +1,5 @@
 #include "server/app/commands.hpp"
 
 int main(int argc, char** argv) {
-  return spectra::server::run_program(argc, argv);
+  return spectra::app::run_program(argc, argv);
 }

@@ -22,7 +22,7 @@
 #include "server/mapping/map_ply.hpp"
 #include "server/mapping/mapper.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 constexpr std::string_view kMappingPhase = "mapping";
@@ -115,7 +115,7 @@ int run_map(const MapOptions& options) {
   auto folder = mapping::FrameFolder::open(options.frames, options.poses);
   if (!folder) return fail(folder.error());
   const unsigned threads = options.thread_count > 0 ? options.thread_count : std::thread::hardware_concurrency();
-  WorkerPool pool(std::max(2U, threads) - 1);  // this one works as well
+  jobs::WorkerPool pool(std::max(2U, threads) - 1);  // this one works as well
   mapping::MapperSettings settings;
   settings.voxel_m = options.voxel_m;
   mapping::Mapper mapper(folder.value().calibration(), settings, pool);
@@ -128,8 +128,8 @@ int run_map(const MapOptions& options) {
   const std::size_t count = folder.value().rows().size();
   ProgressLine line({{kMappingPhase, "mapping " + options.frames.filename().string(), static_cast<double>(count)},
                      {mapping::Mapper::kMeshingPhase, "meshing", 10},
-                     {fusion::kWritingPhase, "writing " + options.output.filename().string(), 5}});
-  const fusion::Progress progress = line.sink();
+                     {base::kWritingPhase, "writing " + options.output.filename().string(), 5}});
+  const base::Progress progress = line.sink();
   mapping::FaultLog faults = folder.value().faults();
   std::vector<double> frame_ms;
   FrameReader reader(folder.value());
@@ -144,7 +144,7 @@ int run_map(const MapOptions& options) {
           sender->send_changes(mapper, folder.value().trajectory().at(loaded.frame.time_s), row + 1 == count, pool);
       if (problem) return fail(kJobFailed, *problem);
     }
-    fusion::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
+    base::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
   }
   const mapping::UnitMesh mesh = mapper.whole_mesh(progress);
   if (mesh.triangles.empty()) {
@@ -153,7 +153,7 @@ int run_map(const MapOptions& options) {
     return fail(kJobFailed, options.frames.string() + ": none of its frames gives a surface; nothing was written");
   }
   const auto written = options.output.empty()
-                           ? fusion::Result<void>(fusion::success())
+                           ? base::Result<void>(base::success())
                            : mapping::write_map_ply(options.output, mesh, mapper.begin_s(), progress);
   line.end();
   print_faults(faults);
@@ -166,4 +166,4 @@ int run_map(const MapOptions& options) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

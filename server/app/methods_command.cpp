@@ -10,7 +10,7 @@
 #include "server/app/commands.hpp"
 #include "server/session/conversions.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 struct ValueText {
@@ -41,7 +41,7 @@ std::string bounds_text(const fusion::Parameter& parameter) {
 int run_methods(bool as_json) {
   if (as_json) {
     auto methods = nlohmann::json::array();
-    for (const auto& method : method_messages()) methods.push_back(protocol::to_json(method));
+    for (const auto& method : session::method_messages()) methods.push_back(protocol::to_json(method));
     fmt::print("{}\n", methods.dump(2));
     return kDone;
   }
@@ -60,4 +60,4 @@ int run_methods(bool as_json) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

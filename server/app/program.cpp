@@ -20,18 +20,18 @@
 #include "server/session/version.hpp"
 #include "server/store/time_text.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 using Run = std::function<int()>;
 constexpr const char* kQuietHelp = "No progress on the terminal";
 
 /// The options of every command that reads a scene: what a person knows of the file.
-void add_reading(CLI::App& command, fusion::ReadOptions& options) {
+void add_reading(CLI::App& command, files::ReadOptions& options) {
   command.add_option("--temperature-property", options.temperature_property,
                      "The property that holds the temperature, whatever its name");
   const auto set_unit = [&options](const std::string& name) {
-    options.temperature_unit = fusion::temperature_unit(name);
+    options.temperature_unit = files::temperature_unit(name);
     if (!options.temperature_unit) {
       throw CLI::ValidationError("--temperature-unit " + name, "celsius, kelvin, centikelvin or fahrenheit is wanted");
     }
@@ -45,7 +45,7 @@ void add_reading(CLI::App& command, fusion::ReadOptions& options) {
   command.add_option("--scale", options.metres_per_unit, "Metres in one unit of the file's positions")
       ->capture_default_str();
   const auto set_up = [&options](const std::string& name) {
-    options.up = fusion::up_axis(name);
+    options.up = base::up_axis(name);
     if (!options.up && name != "auto")
       throw CLI::ValidationError("--up " + name, "x, y, z, -x, -y, -z or auto is wanted");
   };
@@ -115,7 +115,7 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
       ->excludes("--tokens");
   const auto set_limits = [&options](const std::vector<std::string>& texts) {
     for (const std::string& text : texts) {
-      if (const auto problem = set_limit(options.limits, text)) throw CLI::ValidationError("--limit " + *problem);
+      if (const auto problem = net::set_limit(options.limits, text)) throw CLI::ValidationError("--limit " + *problem);
     }
   };
   command
@@ -133,7 +133,7 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--log-file", options.log.file,
                       "Log to this file instead of standard error; at 10 MB it is begun anew, and five are kept");
   const auto set_invited = [&options](const std::string& role) {
-    options.invited = access_role(role);
+    options.invited = access::access_role(role);
     if (!options.invited) throw CLI::ValidationError("--invite " + role, "viewer, operator, ingest or admin is wanted");
   };
   command->add_option_function<std::string>(
@@ -169,8 +169,8 @@ void add_fuse(CLI::App& app, FuseOptions& options, std::vector<std::string>& set
   command->add_flag("--keep-order", keep.order, "In a .drc: the scene's vertices and triangles in order and number");
   command->add_flag("--lossless", keep.everything, "In a .drc: that, and every position and temperature as it is");
   command->final_callback([&options, &sets, &keep, &run] {
-    if (keep.order) options.keeping = protocol::DracoKeeping::Order;
-    if (keep.everything) options.keeping = protocol::DracoKeeping::Everything;
+    if (keep.order) options.keeping = protocol::codec::DracoKeeping::Order;
+    if (keep.everything) options.keeping = protocol::codec::DracoKeeping::Everything;
     for (const auto& set : sets) {
       const auto equals = set.find('=');
       if (equals == std::string::npos || equals == 0)
@@ -200,7 +200,7 @@ void add_demo_scene(CLI::App& app, DemoSceneFileOptions& options, Run& run) {
   auto* command = app.add_subcommand("demo-scene", "Write the generated demo scene to a PLY file");
   command->add_option("output", options.output, "The file to write")->required();
   command->add_option("--vertices", options.vertex_count, "About how many vertices")
-      ->check(CLI::Range(fusion::kDemoSceneLeastVertices, fusion::kDemoSceneMostVertices))
+      ->check(CLI::Range(demo::kDemoSceneLeastVertices, demo::kDemoSceneMostVertices))
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Another number, another scene")->capture_default_str();
   command->final_callback([&options, &run] { run = [&options] { return run_demo_scene(options); }; });
@@ -377,7 +377,7 @@ void add_doctor(CLI::App& app, std::optional<std::filesystem::path>& file, Run& 
 
 int parse_and_run(int argc, const char* const* argv) {
   CLI::App app("Spectra: fuses visible and thermal 3D scenes and streams them to browsers", "spectra");
-  app.set_version_flag("--version", "spectra " + std::string(kVersion));
+  app.set_version_flag("--version", "spectra " + std::string(session::kVersion));
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Print the help of every command and exit");
   ServeOptions serve;
@@ -457,4 +457,4 @@ int run_program(int argc, const char* const* argv) {
   }
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 constexpr double kFirstSeconds = 0.4;  ///< What is done sooner needs no line.
@@ -100,7 +100,7 @@ ProgressLine::~ProgressLine() {
   end();
 }
 
-fusion::Progress ProgressLine::sink() {
+base::Progress ProgressLine::sink() {
   if (!is_shown_) return {};
   return [this](std::string_view phase, double share) { set(phase, share); };
 }
@@ -182,4 +182,4 @@ double ProgressLine::seconds() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

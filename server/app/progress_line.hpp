@@ -12,7 +12,7 @@
 
 #include "fusion/base/progress.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// One part of a command's work.
 struct ProgressStage {
@@ -48,7 +48,7 @@ class ProgressLine {
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   /// Where the jobs report; phases that are not among the stages are not shown. Not to be used after end().
-  fusion::Progress sink();
+  base::Progress sink();
 
   /// Erases the line, for good.
   void end();
@@ -80,4 +80,4 @@ class ProgressLine {
   std::thread drawer_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -24,7 +24,7 @@
 #include "server/sources/block_options.hpp"
 #include "server/store/block_record.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -46,9 +46,9 @@ std::optional<std::string> block_id_of(const fs::path& path) {
   return std::nullopt;
 }
 
-fusion::Result<std::vector<BlockFile>> block_files(const PushOptions& options) {
+base::Result<std::vector<BlockFile>> block_files(const PushOptions& options) {
   const auto failed = [&](const std::string& what) {
-    return fusion::failure(fusion::ErrorCode::FileUnreadable, options.input.string() + ": " + what);
+    return base::failure(base::ErrorCode::FileUnreadable, options.input.string() + ": " + what);
   };
   std::vector<BlockFile> files;
   std::error_code error;
@@ -72,10 +72,10 @@ fusion::Result<std::vector<BlockFile>> block_files(const PushOptions& options) {
   std::map<std::string, fs::path> named;
   for (const BlockFile& file : files) {
     if (!store::is_block_id(file.id)) {
-      return fusion::failure(fusion::ErrorCode::FileUnreadable,
-                             file.path.string() + ": \"" + file.id +
-                                 "\" is no name of a block (1 to 64 of a-z A-Z 0-9 . _ -); rename the file" +
-                                 (files.size() == 1 ? ", or name the block with --id" : ""));
+      return base::failure(base::ErrorCode::FileUnreadable,
+                           file.path.string() + ": \"" + file.id +
+                               "\" is no name of a block (1 to 64 of a-z A-Z 0-9 . _ -); rename the file" +
+                               (files.size() == 1 ? ", or name the block with --id" : ""));
     }
     const auto [other, is_new] = named.emplace(file.id, file.path);
     if (!is_new) {
@@ -117,7 +117,7 @@ std::optional<std::string> token_of(const PushOptions& options) {
 /// Sends files and keeps the account of what has become of them.
 class Push {
  public:
-  Push(const PushOptions& options, std::vector<BlockFile> files, const IngestAddress& to, std::string token)
+  Push(const PushOptions& options, std::vector<BlockFile> files, const net::IngestAddress& to, std::string token)
       : options_(options),
         token_(std::move(token)),
         files_(std::move(files)),
@@ -127,15 +127,15 @@ class Push {
 
   int run() {
     const auto begin = std::chrono::steady_clock::now();
-    const BlocksToSend blocks{files_.size(), [this](std::size_t i, std::uint64_t most) { return read(i, most); },
-                              [this](std::size_t i, const auto& answer) { acknowledged(i, answer); },
-                              [this](std::size_t i, const auto& answer) { refused(i, answer); },
-                              [](const std::string& why) { warn(why + "; connecting again"); }};
-    SendingLimits limits;
+    const net::BlocksToSend blocks{files_.size(), [this](std::size_t i, std::uint64_t most) { return read(i, most); },
+                                   [this](std::size_t i, const auto& answer) { acknowledged(i, answer); },
+                                   [this](std::size_t i, const auto& answer) { refused(i, answer); },
+                                   [](const std::string& why) { warn(why + "; connecting again"); }};
+    net::SendingLimits limits;
     limits.blocks_per_s = options_.blocks_per_s;
     limits.token = token_;
     if (options_.trusted) limits.trusted = options_.trusted->string();
-    const auto problem = send_blocks(to_, blocks, limits);
+    const auto problem = net::send_blocks(to_, blocks, limits);
     line_.end();
     print_notes(notes());
     const std::string done = fmt::format("{} of {} block{} acknowledged", acknowledged_count_, files_.size(),
@@ -148,7 +148,7 @@ class Push {
   }
 
  private:
-  std::optional<OutgoingBlock> read(std::size_t index, std::uint64_t max_block_bytes) {
+  std::optional<net::OutgoingBlock> read(std::size_t index, std::uint64_t max_block_bytes) {
     const BlockFile& file = files_[index];
     const auto leave_out = [&](const std::string& why) {
       settled(index);
@@ -162,11 +162,11 @@ class Push {
     if (size > max_block_bytes) {
       return leave_out(fmt::format("is {} bytes, and the server takes blocks of {} at most", size, max_block_bytes));
     }
-    auto query = query_of(options_.read);
+    auto query = sources::query_of(options_.read);
     if (auto time = observed_at(options_.observed_at, file.path); !time.empty()) {
       query.insert(query.begin(), {"observed_at", std::move(time)});
     }
-    OutgoingBlock block{target_text(file.id, query), std::string(static_cast<std::size_t>(size), '\0')};
+    net::OutgoingBlock block{net::target_text(file.id, query), std::string(static_cast<std::size_t>(size), '\0')};
     if (!in.read(block.ply.data(), static_cast<std::streamsize>(size))) return leave_out("cannot be read to its end");
     return block;
   }
@@ -188,11 +188,11 @@ class Push {
 
   void settled(std::size_t index) {
     settled_.insert(index);
-    fusion::report(progress_, kPushingPhase, static_cast<double>(settled_.size()) / static_cast<double>(files_.size()));
+    base::report(progress_, kPushingPhase, static_cast<double>(settled_.size()) / static_cast<double>(files_.size()));
   }
 
-  std::vector<fusion::Note> notes() const {
-    std::vector<fusion::Note> notes;
+  std::vector<files::Note> notes() const {
+    std::vector<files::Note> notes;
     for (const auto& [id, told] : notes_) {
       const std::string more =
           told.block_count > 1 ? fmt::format(" (and {} more blocks)", told.block_count - 1) : std::string();
@@ -209,9 +209,9 @@ class Push {
   const PushOptions& options_;
   const std::string token_;
   const std::vector<BlockFile> files_;
-  const IngestAddress& to_;
+  const net::IngestAddress& to_;
   ProgressLine line_;
-  const fusion::Progress progress_;
+  const base::Progress progress_;
   std::size_t acknowledged_count_ = 0;
   std::set<std::size_t> settled_;
   std::map<std::string, Told> notes_;
@@ -221,14 +221,14 @@ class Push {
 
 int run_push(const PushOptions& options) {
   const Interruption interruption;
-  const auto address = parsed_ingest_address(options.to);
+  const auto address = net::parsed_ingest_address(options.to);
   if (const auto* wrong = std::get_if<std::string>(&address)) return fail(kWrongUsage, "--to " + *wrong);
-  if (const auto meant = fusion::check_read_options(options.read); !meant) return fail(meant.error());
+  if (const auto meant = files::check_read_options(options.read); !meant) return fail(meant.error());
   auto files = block_files(options);
   if (!files) return fail(files.error());
   auto token = token_of(options);
   if (!token) return fail(kJobFailed, options.token_file->string() + ": there is no token in its first line");
-  return Push(options, std::move(files).value(), std::get<IngestAddress>(address), std::move(*token)).run();
+  return Push(options, std::move(files).value(), std::get<net::IngestAddress>(address), std::move(*token)).run();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

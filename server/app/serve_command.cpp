@@ -29,7 +29,7 @@
 #include "server/sources/map_keeper.hpp"
 #include "server/stream/first_picture.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -47,19 +47,19 @@ void raise_descriptor_limit() {
 }
 
 /// Reads the file again; what is wrong with it is said, and nothing changes.
-void reload_tokens(const std::filesystem::path& file, AccessControl& access) {
-  auto read = read_tokens(file);
+void reload_tokens(const std::filesystem::path& file, access::AccessControl& access) {
+  auto read = access::read_tokens(file);
   if (const auto* problem = std::get_if<std::string>(&read)) {
     spdlog::error("the tokens stay as they were: {}", *problem);
     return;
   }
-  auto& list = std::get<TokenList>(read);
+  auto& list = std::get<access::TokenList>(read);
   spdlog::info("the tokens are read again: {}", list.tokens.size());
   access.replace(std::move(list));
 }
 
 /// The certificate and key are read again; what is wrong with them is said, and nothing changes.
-void reload_certificate(TlsIdentity& tls) {
+void reload_certificate(net::TlsIdentity& tls) {
   if (const auto problem = tls.load()) {
     spdlog::error("the certificate stays as it was: {}", *problem);
   } else {
@@ -67,18 +67,19 @@ void reload_certificate(TlsIdentity& tls) {
   }
 }
 
-void print_invitation(const HttpServer& server, AccessControl& access, AccessRole role) {
-  const auto code = access.make_code({AccessRole::Admin, access.first_name(), false}, role);
+void print_invitation(const net::HttpServer& server, access::AccessControl& access, access::AccessRole role) {
+  const auto code = access.make_code({access::AccessRole::Admin, access.first_name(), false}, role);
   if (!code) return;
   const std::string link = server.urls().back() + "/login#" + *code;
   std::printf("for one %s, within %d minutes: %s\n%s", std::string(to_string(role)).c_str(),
-              static_cast<int>(AccessControl::kCodeLifetime.count()), link.c_str(), qr_text(link).c_str());
+              static_cast<int>(access::AccessControl::kCodeLifetime.count()), link.c_str(), qr_text(link).c_str());
 }
 
 /// Reads and tiles the scene in a thread of its own, while the server already answers.
 class SceneLoader {
  public:
-  SceneLoader(const ServeOptions& options, ServedScene& served, MapKeeper& map, HttpServer& server)
+  SceneLoader(const ServeOptions& options, session::ServedScene& served, sources::MapKeeper& map,
+              net::HttpServer& server)
       : thread_([this, &options, &served, &map, &server] {
           try {
             if (options.is_live || options.store || options.frames || options.is_demo_drive) {
@@ -108,27 +109,27 @@ class SceneLoader {
   }
 
  private:
-  static void load(const ServeOptions& options, ServedScene& served) {
+  static void load(const ServeOptions& options, session::ServedScene& served) {
     const std::string name = options.scene ? options.scene->filename().string() : "the demo scene";
     served.progress.set("Reading " + name);
-    fusion::LoadedScene loaded;
-    std::vector<ProgressStage> tiling{{kTilingPhase, "cutting " + name + " into tiles", 10}};
+    files::LoadedScene loaded;
+    std::vector<ProgressStage> tiling{{map::kTilingPhase, "cutting " + name + " into tiles", 10}};
     ProgressLine line(options.scene
                           ? with_loading(*options.scene, options.thermal, tiling)
-                          : std::vector<ProgressStage>{{fusion::kModellingPhase, "modelling " + name, 10}, tiling[0]});
+                          : std::vector<ProgressStage>{{base::kModellingPhase, "modelling " + name, 10}, tiling[0]});
     if (options.scene) {
       auto read = load_scene(*options.scene, options.thermal, watched(options.read, line));
       if (!read) throw std::runtime_error(read.error().message);
       loaded = std::move(read).value();
     } else {
-      loaded.mesh = fusion::demo_scene({}, line.sink());
+      loaded.mesh = demo::demo_scene({}, line.sink());
     }
     print_notes(loaded.notes);
     served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
                         " vertices)");
     const auto scene = served.scenes.replace(
-        std::move(loaded), served.pool, LevelsOfDetail::All,
-        [&served](const auto& next) { encode_first_picture(next, served.cache); }, line.sink());
+        std::move(loaded), served.pool, map::LevelsOfDetail::All,
+        [&served](const auto& next) { stream::encode_first_picture(next, served.cache); }, line.sink());
     line.end();
     served.progress.set(std::nullopt);
     spdlog::info("serving {}: {} vertices, {} triangles, {} tiles", scene->name(), scene->vertex_count(),
@@ -148,19 +149,19 @@ int run_serve(const ServeOptions& options) {
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
   auto& setup = std::get<ServeSetup>(looked);
   raise_descriptor_limit();
-  std::optional<FrameStream> frames;
+  std::optional<sources::FrameStream> frames;
   if (options.frames) {
     auto folder = mapping::FrameFolder::open(*options.frames);
     if (!folder) return fail(folder.error());
-    frames = stream_of(std::move(folder).value());
+    frames = sources::stream_of(std::move(folder).value());
   } else if (options.is_demo_drive) {
-    frames = demo_drive_stream();
+    frames = sources::demo_drive_stream();
   }
 
-  NetOptions net;
+  net::NetOptions net;
   if (setup.tokens) {
-    net.access =
-        std::make_shared<AccessControl>(std::move(*setup.tokens), "spectra_" + std::to_string(setup.listen.port));
+    net.access = std::make_shared<access::AccessControl>(std::move(*setup.tokens),
+                                                         "spectra_" + std::to_string(setup.listen.port));
   }
   net.tls = setup.tls;
   // With a config file it is a service: nobody's terminal closes with SIGHUP.
@@ -178,8 +179,8 @@ int run_serve(const ServeOptions& options) {
   net.limits.gives_raw_layers = !options.is_fused_only;
   net.stop_on_signals = true;
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
-  const auto served =
-      std::make_unique<ServedScene>(options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
+  const auto served = std::make_unique<session::ServedScene>(
+      options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
   std::unique_ptr<store::BlockStore> store;
   if (options.store) {
     store::StoreOptions keeping;
@@ -189,33 +190,34 @@ int run_serve(const ServeOptions& options) {
     if (!opened) return fail(kJobFailed, opened.error().message);
     store = std::move(opened).value();
   }
-  MapKeeper map(served->scenes, served->pool, std::move(store), options.at);
-  served->mark_baseline = [&map](BaselineDone done) { map.mark_baseline(std::move(done)); };
-  HttpApi api(*served, map);
-  std::unique_ptr<HttpServer> server;
+  sources::MapKeeper map(served->scenes, served->pool, std::move(store), options.at);
+  served->mark_baseline = [&map](sources::BaselineDone done) { map.mark_baseline(std::move(done)); };
+  api::HttpApi api(*served, map);
+  std::unique_ptr<net::HttpServer> server;
   try {
-    server = std::make_unique<HttpServer>(
-        net, [&api](const HttpRequest& request, const auto& reply) { api.handle(request, reply); },
-        [&served, limits = net.limits](const std::shared_ptr<ViewerPeer>& peer) {
-          return std::make_shared<ViewerSession>(peer, *served, limits);
+    server = std::make_unique<net::HttpServer>(
+        net, [&api](const net::HttpRequest& request, const auto& reply) { api.handle(request, reply); },
+        [&served, limits = net.limits](const std::shared_ptr<net::ViewerPeer>& peer) {
+          return std::make_shared<session::ViewerSession>(peer, *served, limits);
         },
         web_root(options),
-        [&api](BlockChange change, auto done) { api.change_block(std::move(change), std::move(done)); });
+        [&api](net::BlockChange change, auto done) { api.change_block(std::move(change), std::move(done)); });
   } catch (const std::runtime_error& error) {
     return fail(kJobFailed, error.what());
   }
   api.set_metrics(server->metrics());
   for (const auto& url : server->urls()) std::printf("listening on %s\n", url.c_str());
-  std::unique_ptr<MapFeed> feed;
+  std::unique_ptr<sources::MapFeed> feed;
   if (options.invited) print_invitation(*server, *net.access, *options.invited);
-  if (options.is_insecure && !is_loopback(setup.listen))
+  if (options.is_insecure && !net::is_loopback(setup.listen))
     spdlog::warn("anybody on the network may watch and operate (--insecure)");
   std::fflush(stdout);
 
   SceneLoader loader(options, *served, map, *server);
   if (frames) {
-    feed = std::make_unique<MapFeed>(std::move(*frames), options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01),
-                                     map, [&loader] { return loader.is_done(); });
+    feed = std::make_unique<sources::MapFeed>(std::move(*frames),
+                                              options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01), map,
+                                              [&loader] { return loader.is_done(); });
   }
   server->run();
   if (!loader.is_done()) {
@@ -237,4 +239,4 @@ int run_serve(const ServeOptions& options) {
   return loader.failure().empty() ? kDone : fail(kJobFailed, loader.failure());
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

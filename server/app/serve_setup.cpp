@@ -6,7 +6,7 @@
 
 #include "server/net/tls_identity.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -51,27 +51,27 @@ std::optional<std::string> store_problem(const ServeOptions& options) {
   return std::nullopt;
 }
 
-AccessResult<std::optional<TokenList>> token_list(const ServeOptions& options) {
-  AccessResult<TokenList> list;
+access::AccessResult<std::optional<access::TokenList>> token_list(const ServeOptions& options) {
+  access::AccessResult<access::TokenList> list;
   if (options.tokens) {
-    list = read_tokens(*options.tokens);
+    list = access::read_tokens(*options.tokens);
   } else if (const char* text = std::getenv(kTokensVariable); text != nullptr && !options.is_insecure) {
-    list = tokens_of_text(text);
+    list = access::tokens_of_text(text);
     if (auto* problem = std::get_if<std::string>(&list)) return std::string(kTokensVariable) + ": " + *problem;
   } else {
-    return std::optional<TokenList>();
+    return std::optional<access::TokenList>();
   }
   if (auto* problem = std::get_if<std::string>(&list)) return std::move(*problem);
-  return std::optional(std::get<TokenList>(std::move(list)));
+  return std::optional(std::get<access::TokenList>(std::move(list)));
 }
 
-bool is_open_to_strangers(const ServeOptions& options, const ListenAddress& listen, bool has_tokens) {
-  return !has_tokens && !options.is_insecure && !is_loopback(listen);
+bool is_open_to_strangers(const ServeOptions& options, const net::ListenAddress& listen, bool has_tokens) {
+  return !has_tokens && !options.is_insecure && !net::is_loopback(listen);
 }
 
 std::variant<ServeSetup, SetupProblem> serve_setup(const ServeOptions& options) {
   ServeSetup setup;
-  const auto listen = parsed_listen_address(options.listen);
+  const auto listen = net::parsed_listen_address(options.listen);
   if (!listen) {
     return SetupProblem{kWrongUsage,
                         "--listen " + options.listen + ": ADDRESS:PORT is wanted, such as 0.0.0.0:8080 or [::]:8080"};
@@ -82,7 +82,7 @@ std::variant<ServeSetup, SetupProblem> serve_setup(const ServeOptions& options) 
   }
   auto tokens = token_list(options);
   if (auto* problem = std::get_if<std::string>(&tokens)) return SetupProblem{kJobFailed, std::move(*problem)};
-  setup.tokens = std::get<std::optional<TokenList>>(std::move(tokens));
+  setup.tokens = std::get<std::optional<access::TokenList>>(std::move(tokens));
   if (is_open_to_strangers(options, *listen, setup.tokens.has_value())) {
     return SetupProblem{kWrongUsage, "--listen " + options.listen +
                                          " lets others in: name whom with --tokens FILE (spectra token makes it), or " +
@@ -90,11 +90,11 @@ std::variant<ServeSetup, SetupProblem> serve_setup(const ServeOptions& options) 
   }
   if (options.invited && !setup.tokens) return SetupProblem{kWrongUsage, "--invite is for a server with --tokens"};
   if (options.certificate) {
-    setup.tls = std::make_shared<TlsIdentity>(*options.certificate, *options.key);
+    setup.tls = std::make_shared<net::TlsIdentity>(*options.certificate, *options.key);
     if (auto problem = setup.tls->load()) return SetupProblem{kJobFailed, std::move(*problem)};
   }
   if (auto problem = store_problem(options)) return SetupProblem{kJobFailed, std::move(*problem)};
   return setup;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

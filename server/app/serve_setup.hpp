@@ -10,15 +10,17 @@
 #include "server/app/commands.hpp"
 #include "server/net/http_server.hpp"
 
-namespace spectra::server {
-
+namespace spectra::net {
 class TlsIdentity;
+}
+
+namespace spectra::app {
 
 /// What `spectra serve` needs before it opens its port.
 struct ServeSetup {
-  ListenAddress listen;
-  std::optional<TokenList> tokens;   ///< Whom to let in; nothing: nobody needs a token.
-  std::shared_ptr<TlsIdentity> tls;  ///< Loaded; null: connections are not encrypted.
+  net::ListenAddress listen;
+  std::optional<access::TokenList> tokens;  ///< Whom to let in; nothing: nobody needs a token.
+  std::shared_ptr<net::TlsIdentity> tls;    ///< Loaded; null: connections are not encrypted.
 };
 
 /// Why it cannot serve, for a person.
@@ -36,11 +38,11 @@ std::optional<std::string> scene_problem(const ServeOptions& options);
 std::optional<std::string> web_problem(const ServeOptions& options);
 std::optional<std::string> store_problem(const ServeOptions& options);
 /// Whom to let in: as options and environment say.
-AccessResult<std::optional<TokenList>> token_list(const ServeOptions& options);
+access::AccessResult<std::optional<access::TokenList>> token_list(const ServeOptions& options);
 /// The address lets others in, and nothing says whom.
-bool is_open_to_strangers(const ServeOptions& options, const ListenAddress& listen, bool has_tokens);
+bool is_open_to_strangers(const ServeOptions& options, const net::ListenAddress& listen, bool has_tokens);
 
 /// The built web client: as asked for, installed beside the program, or in the source tree it was built from.
 std::filesystem::path web_root(const ServeOptions& options);
 
-}  // namespace spectra::server
+}  // namespace spectra::app

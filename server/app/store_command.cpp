@@ -13,7 +13,7 @@
 #include "server/store/store_file.hpp"
 #include "server/store/time_text.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 std::string counted(std::uint64_t count, const char* one) {
@@ -33,10 +33,9 @@ int run_store_check(const std::filesystem::path& path) {
   if (!opened) return fail(kJobFailed, opened.error().message);
   store::StoreFile& file = *opened.value();
   const store::Catalogue catalogue = file.take_catalogue();
-  ProgressLine line({{fusion::kReadingPhase, "reading " + path.filename().string(), 1}});
+  ProgressLine line({{base::kReadingPhase, "reading " + path.filename().string(), 1}});
   const auto sink = line.sink();
-  const auto wrong =
-      file.check(catalogue, [&sink](double share) { fusion::report(sink, fusion::kReadingPhase, share); });
+  const auto wrong = file.check(catalogue, [&sink](double share) { base::report(sink, base::kReadingPhase, share); });
   line.end();
   if (!wrong) return fail(kJobFailed, wrong.error().message);
   for (const std::string& what : wrong.value()) warn(what);
@@ -64,14 +63,14 @@ int run_store_salvage(const StoreSalvageOptions& options) {
   if (std::filesystem::exists(options.output, ignored)) {
     return fail(kWrongUsage, options.output.string() + " is there already; name a file that is not");
   }
-  auto output = fusion::OutputFile::create(options.output);
+  auto output = files::OutputFile::create(options.output);
   if (!output) return fail(output.error());
   const std::filesystem::path unfinished = output.value().unfinished();
   if (unfinished.empty()) return fail(kWrongUsage, options.output.string() + " is no place for a store; name a file");
-  ProgressLine line({{fusion::kWritingPhase, "salvaging " + options.store.filename().string(), 1}});
+  ProgressLine line({{base::kWritingPhase, "salvaging " + options.store.filename().string(), 1}});
   const auto sink = line.sink();
   const auto report = store::salvage(options.store.string(), unfinished.string(),
-                                     [&sink](double share) { fusion::report(sink, fusion::kWritingPhase, share); });
+                                     [&sink](double share) { base::report(sink, base::kWritingPhase, share); });
   line.end();
   remove_log_of(unfinished);
   if (!report) return fail(kJobFailed, report.error().message);
@@ -84,4 +83,4 @@ int run_store_salvage(const StoreSalvageOptions& options) {
   return kDone;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

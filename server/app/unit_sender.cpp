@@ -10,7 +10,7 @@
 #include "server/net/request_target.hpp"
 #include "server/sources/map_feed.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 constexpr std::chrono::milliseconds kSendEvery{500};
@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds kSendEvery{500};
 
 std::variant<UnitSender, std::string> UnitSender::to(const std::string& url,
                                                      const std::optional<std::filesystem::path>& token_file) {
-  auto address = parsed_ingest_address(url);
+  auto address = net::parsed_ingest_address(url);
   if (const auto* wrong = std::get_if<std::string>(&address)) return "--to " + *wrong;
   std::string token;
   if (token_file) {
@@ -28,23 +28,23 @@ std::variant<UnitSender, std::string> UnitSender::to(const std::string& url,
   } else if (const char* text = std::getenv("SPECTRA_TOKEN")) {
     token = text;
   }
-  return UnitSender(std::get<IngestAddress>(std::move(address)), std::move(token));
+  return UnitSender(std::get<net::IngestAddress>(std::move(address)), std::move(token));
 }
 
 std::optional<std::string> UnitSender::send_changes(mapping::Mapper& mapper, const mapping::PoseAnswer& eye,
-                                                    bool is_last, WorkerPool& pool) {
+                                                    bool is_last, jobs::WorkerPool& pool) {
   if (eye.state == mapping::PoseState::Known) eye_ = eye.pose.translation();
   const auto now = std::chrono::steady_clock::now();
   if (!is_last && now - last_ < kSendEvery) return std::nullopt;
   last_ = now;
   const std::vector<mapping::PublishedUnit> units = mapper.changed_units(publisher_, eye_, pool);
   if (units.empty()) return std::nullopt;
-  BlocksToSend blocks;
+  net::BlocksToSend blocks;
   blocks.count = units.size();
-  blocks.read = [&](std::size_t index, std::uint64_t max_block_bytes) -> std::optional<OutgoingBlock> {
+  blocks.read = [&](std::size_t index, std::uint64_t max_block_bytes) -> std::optional<net::OutgoingBlock> {
     const mapping::PublishedUnit& unit = units[index];
-    if (unit.mesh.triangles.empty()) return OutgoingBlock{target_text(unit.id, {}), ""};
-    OutgoingBlock block{target_text(unit.id, unit_query({}, eye_)), mapping::block_ply(unit.mesh)};
+    if (unit.mesh.triangles.empty()) return net::OutgoingBlock{net::target_text(unit.id, {}), ""};
+    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query({}, eye_)), mapping::block_ply(unit.mesh)};
     if (block.ply.size() <= max_block_bytes) return block;
     ++refused_count_;
     warn(unit.id + " is larger than the server takes; map with larger voxels");
@@ -59,9 +59,9 @@ std::optional<std::string> UnitSender::send_changes(mapping::Mapper& mapper, con
     warn(units[index].id + " is refused: " + answer.reason);
   };
   blocks.broken = [](const std::string& why) { warn(why + "; connecting again"); };
-  SendingLimits limits;
+  net::SendingLimits limits;
   limits.token = token_;
-  return send_blocks(address_, blocks, limits);
+  return net::send_blocks(address_, blocks, limits);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -11,7 +11,7 @@
 #include "server/mapping/mapper.hpp"
 #include "server/net/ingest_client.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 
 /// Sends the units of a growing map to a server, as blocks of its map. For one thread.
 class UnitSender {
@@ -23,16 +23,16 @@ class UnitSender {
   /// Sends what has changed and waits until all is answered, at most twice a second unless `is_last`. A sentence when the server is not
   /// there, or did not come back; nothing otherwise. What it refuses is said as a warning.
   std::optional<std::string> send_changes(mapping::Mapper& mapper, const mapping::PoseAnswer& eye, bool is_last,
-                                          WorkerPool& pool);
+                                          jobs::WorkerPool& pool);
 
   std::size_t sent_count() const { return sent_count_; }    ///< Acknowledged.
   std::size_t again_count() const { return again_count_; }  ///< Of these, units that the server had already.
   std::size_t refused_count() const { return refused_count_; }
 
  private:
-  UnitSender(IngestAddress address, std::string token) : address_(std::move(address)), token_(std::move(token)) {}
+  UnitSender(net::IngestAddress address, std::string token) : address_(std::move(address)), token_(std::move(token)) {}
 
-  IngestAddress address_;
+  net::IngestAddress address_;
   std::string token_;
   mapping::UnitPublisher publisher_;
   std::set<std::string> known_;
@@ -41,4 +41,4 @@ class UnitSender {
   std::size_t sent_count_ = 0, again_count_ = 0, refused_count_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::app

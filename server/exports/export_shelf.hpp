@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::exports {
 
 /// Whole files on their way out: how many may be made at a time, and what those take that are being sent. A file that is being sent
 /// to somebody is not made again for others. Thread-safe; what is handed out may outlive it.
@@ -65,4 +65,4 @@ class ExportShelf {
   std::map<std::string, std::weak_ptr<const File>> files_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::exports

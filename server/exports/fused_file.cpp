@@ -13,7 +13,7 @@
 #include "fusion/files/ply_writer.hpp"
 #include "server/stream/lattice.hpp"
 
-namespace spectra::server {
+namespace spectra::exports {
 namespace {
 
 /// As the streams' default: near the smallest size at a fraction of its time.
@@ -24,9 +24,9 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
 }
 
 /// What a Draco file has lost, for people.
-std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, const SceneFileOptions& options) {
-  std::vector<fusion::Note> losses;
-  if (options.keeping == protocol::DracoKeeping::Everything) return losses;
+std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const SceneFileOptions& options) {
+  std::vector<files::Note> losses;
+  if (options.keeping == protocol::codec::DracoKeeping::Everything) return losses;
   const float coarsest_m = std::max(options.position_step_m, options.largest_position_step_m);
   std::string rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m),
                                     coarsest_m > options.position_step_m ? ", finer where the form is finer," : "");
@@ -43,7 +43,7 @@ std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, const Scene
   add("under_range_written", file.under_range_count,
       fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
                   file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
-  if (options.keeping == protocol::DracoKeeping::Order) return losses;
+  if (options.keeping == protocol::codec::DracoKeeping::Order) return losses;
   losses.push_back({"vertex_order", 0,
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
   add("left_out_vertices", file.left_out_vertex_count,
@@ -57,25 +57,25 @@ std::vector<fusion::Note> losses_of(const protocol::DracoFile& file, const Scene
   return losses;
 }
 
-fusion::Result<SceneFile> draco_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                     const SceneFileOptions& options) {
-  static_assert(sizeof(fusion::Vec3f) == sizeof(std::array<float, 3>));
-  static_assert(sizeof(fusion::Rgb8) == sizeof(protocol::ColourBytes));
+base::Result<SceneFile> draco_file(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                                   const SceneFileOptions& options) {
+  static_assert(sizeof(base::Vec3f) == sizeof(std::array<float, 3>));
+  static_assert(sizeof(base::Rgb8) == sizeof(protocol::codec::ColourBytes));
   std::vector<std::array<float, 3>> positions;
   positions.reserve(mesh.vertex_count());
   for (const auto& p : mesh.positions()) positions.push_back({p.x, p.y, p.z});
-  std::vector<protocol::ColourBytes> colour_bytes;
+  std::vector<protocol::codec::ColourBytes> colour_bytes;
   colour_bytes.reserve(colours.size());
   for (const auto& c : colours) colour_bytes.push_back({c.r, c.g, c.b});
-  protocol::DracoFileInput input;
+  protocol::codec::DracoFileInput input;
   input.positions_m = positions;
   input.colours = colour_bytes;
   if (mesh.has_temperature) input.temperature_celsius = mesh.temperature_celsius();
   input.triangles = mesh.triangles();
   input.origin_m = {mesh.origin.x, mesh.origin.y, mesh.origin.z};
-  if (options.keeping != protocol::DracoKeeping::Everything) input.position_step_m = options.position_step_m;
-  const auto file = protocol::draco_file(input, options.keeping, kDracoFileSpeed);
-  if (!file) return fusion::failure(fusion::ErrorCode::Unsupported, file.error().message);
+  if (options.keeping != protocol::codec::DracoKeeping::Everything) input.position_step_m = options.position_step_m;
+  const auto file = protocol::codec::draco_file(input, options.keeping, kDracoFileSpeed);
+  if (!file) return base::failure(base::ErrorCode::Unsupported, file.error().message);
   const auto& bytes = file.value().bytes;
   const auto* text = reinterpret_cast<const char*>(bytes.data());
   return SceneFile{std::string(text, bytes.size()), losses_of(file.value(), options)};
@@ -98,7 +98,7 @@ std::string_view content_type_of(SceneFileFormat format) {
   return format == SceneFileFormat::Glb ? "model/gltf-binary" : "application/octet-stream";
 }
 
-fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
+fusion::SceneTemperature temperature_of(const mesh::MultispectralMesh& mesh) {
   fusion::TemperatureAccumulator accumulator;
   accumulator.add(mesh.temperature_celsius());
   fusion::SceneTemperature scene;
@@ -116,52 +116,52 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
   return scene;
 }
 
-std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
-                                        std::span<const float> baseline_celsius) {
-  std::vector<fusion::Rgb8> fused(mesh.vertex_count());
+std::vector<base::Rgb8> fused_colours(const mesh::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
+                                      std::span<const float> baseline_celsius) {
+  std::vector<base::Rgb8> fused(mesh.vertex_count());
   plan.fuse({mesh.temperature_celsius(), mesh.visible(), baseline_celsius}, fused);
   return fused;
 }
 
-fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                     const SceneFileOptions& options) {
+base::Result<SceneFile> scene_file(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                                   const SceneFileOptions& options) {
   if (options.format == SceneFileFormat::Draco) return draco_file(mesh, colours, options);
   if (options.format == SceneFileFormat::Glb) {
-    BOOST_OUTCOME_TRY(auto bytes, glb_file(mesh, colours, fusion::direction_of(mesh.up)));
+    BOOST_OUTCOME_TRY(auto bytes, files::glb_file(mesh, colours, base::direction_of(mesh.up)));
     return SceneFile{std::move(bytes), {}};
   }
   std::ostringstream out;
-  BOOST_OUTCOME_TRYV(fusion::write_ply(out, mesh, colours));
+  BOOST_OUTCOME_TRYV(files::write_ply(out, mesh, colours));
   return SceneFile{std::move(out).str(), {}};
 }
 
-fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
-                                                           const fusion::MultispectralMesh& mesh,
-                                                           std::span<const fusion::Rgb8> colours,
-                                                           const SceneFileOptions& options,
-                                                           const fusion::Progress& progress) {
+base::Result<std::vector<files::Note>> write_scene_file(const std::filesystem::path& path,
+                                                        const mesh::MultispectralMesh& mesh,
+                                                        std::span<const base::Rgb8> colours,
+                                                        const SceneFileOptions& options,
+                                                        const base::Progress& progress) {
   if (options.format == SceneFileFormat::Ply) {
-    BOOST_OUTCOME_TRYV(fusion::write_ply(path, mesh, colours, {}, progress));
-    return std::vector<fusion::Note>{};
+    BOOST_OUTCOME_TRYV(files::write_ply(path, mesh, colours, {}, progress));
+    return std::vector<files::Note>{};
   }
-  fusion::report(progress, fusion::kWritingPhase, 0);
-  BOOST_OUTCOME_TRY(auto output, fusion::OutputFile::create(path));
+  base::report(progress, base::kWritingPhase, 0);
+  BOOST_OUTCOME_TRY(auto output, files::OutputFile::create(path));
   BOOST_OUTCOME_TRY(auto file, scene_file(mesh, colours, options));
-  fusion::report(progress, fusion::kWritingPhase, 0.9);
+  base::report(progress, base::kWritingPhase, 0.9);
   BOOST_OUTCOME_TRYV(output.write(std::as_bytes(std::span(file.bytes))));
   BOOST_OUTCOME_TRYV(output.commit());
   return std::move(file.losses);
 }
 
-fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::MultispectralMesh& mesh,
-                                    SceneFileOptions& options) {
-  const float usual_step_m = position_step_in_force(0, scene.suggested_position_step_m());
+base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::MultispectralMesh& mesh,
+                                  SceneFileOptions& options) {
+  const float usual_step_m = stream::position_step_in_force(0, scene.suggested_position_step_m());
   float finest_m = usual_step_m;
-  const std::span<fusion::Vec3f> positions = mesh.positions();
+  const std::span<base::Vec3f> positions = mesh.positions();
   for (const auto& tile : scene.tiles()) {
     if (tile->child_mask != 0) continue;
-    const auto lattice = tile_lattice(*tile, usual_step_m);
-    if (!lattice) return fusion::failure(fusion::ErrorCode::Unsupported, lattice.error().message);
+    const auto lattice = stream::tile_lattice(*tile, usual_step_m);
+    if (!lattice) return base::failure(base::ErrorCode::Unsupported, lattice.error().message);
     const auto& [origin_m, step_m, coarsest_step_m, points] = lattice.value();
     finest_m = std::min(finest_m, step_m);
     options.largest_position_step_m = std::max(options.largest_position_step_m, coarsest_step_m);
@@ -175,13 +175,13 @@ fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::Multispe
     if (tile->triangles.empty()) {
       for (std::uint32_t v = 0; v < tile->positions.size(); ++v) round(v);
     }
-    for (const fusion::Triangle& triangle : tile->triangles) {
+    for (const base::Triangle& triangle : tile->triangles) {
       for (const std::uint32_t v : triangle) round(v);
     }
   }
-  options.position_step_m = one_step_for_all(finest_m, scene.bounds());
+  options.position_step_m = stream::one_step_for_all(finest_m, scene.bounds());
   options.largest_position_step_m = std::max(options.largest_position_step_m, options.position_step_m);
-  return fusion::success();
+  return base::success();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::exports

@@ -17,7 +17,7 @@
 #include "protocol/codec/draco_file.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::exports {
 
 /// The files a fused scene can be written as.
 enum class SceneFileFormat { Ply, Glb, Draco };
@@ -29,42 +29,43 @@ std::optional<SceneFileFormat> scene_file_format(std::string_view name);
 std::string_view content_type_of(SceneFileFormat format);
 
 /// What a method may know of a mesh that is wholly in memory. Refers to the mesh.
-fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh);
+fusion::SceneTemperature temperature_of(const mesh::MultispectralMesh& mesh);
 
 /// The fused colour of every vertex, in the mesh's order.
-std::vector<fusion::Rgb8> fused_colours(const fusion::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
-                                        std::span<const float> baseline_celsius = {});
+std::vector<base::Rgb8> fused_colours(const mesh::MultispectralMesh& mesh, const fusion::FusionPlan& plan,
+                                      std::span<const float> baseline_celsius = {});
 
 /// How a fused scene is written.
 struct SceneFileOptions {
   SceneFileFormat format = SceneFileFormat::Ply;
-  protocol::DracoKeeping keeping = protocol::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
-  float position_step_m = 0;                                       ///< Of a Draco file that does not keep everything.
-  float largest_position_step_m = 0;  ///< The step of those vertices that are rounded most.
+  protocol::codec::DracoKeeping keeping =
+      protocol::codec::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
+  float position_step_m = 0;                 ///< Of a Draco file that does not keep everything.
+  float largest_position_step_m = 0;         ///< The step of those vertices that are rounded most.
 };
 
 /// A file, and what it does not tell as the scene did.
 struct SceneFile {
   std::string bytes;
-  std::vector<fusion::Note> losses;
+  std::vector<files::Note> losses;
 };
 
 /// The bytes of a file that holds the mesh with these colours (one a vertex): the one way to make exports, so that the
 /// command line and HTTP give the same bytes. In a GLB temperature is the vertex attribute _TEMPERATURE (float, degC;
 /// kGlbMissingCelsius where there is none, because glTF allows no NaN) and the scene's origin the node's translation.
-fusion::Result<SceneFile> scene_file(const fusion::MultispectralMesh& mesh, std::span<const fusion::Rgb8> colours,
-                                     const SceneFileOptions& options);
+base::Result<SceneFile> scene_file(const mesh::MultispectralMesh& mesh, std::span<const base::Rgb8> colours,
+                                   const SceneFileOptions& options);
 
 /// The same into a file that appears whole or not at all; returns the losses. `progress` is told of kWritingPhase.
-fusion::Result<std::vector<fusion::Note>> write_scene_file(const std::filesystem::path& path,
-                                                           const fusion::MultispectralMesh& mesh,
-                                                           std::span<const fusion::Rgb8> colours,
-                                                           const SceneFileOptions& options,
-                                                           const fusion::Progress& progress = {});
+base::Result<std::vector<files::Note>> write_scene_file(const std::filesystem::path& path,
+                                                        const mesh::MultispectralMesh& mesh,
+                                                        std::span<const base::Rgb8> colours,
+                                                        const SceneFileOptions& options,
+                                                        const base::Progress& progress = {});
 
 /// Rounds the whole mesh of a scene for a Draco file that does not keep everything, as the scene is streamed: each vertex as finely
 /// as its surroundings need. Sets the options' steps; the file's is the finest, doubled until all of the scene fits on it.
-fusion::Result<void> round_for_file(const SceneSnapshot& scene, fusion::MultispectralMesh& mesh,
-                                    SceneFileOptions& options);
+base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::MultispectralMesh& mesh,
+                                  SceneFileOptions& options);
 
-}  // namespace spectra::server
+}  // namespace spectra::exports

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::jobs {
 
 struct WorkerPool::State {
   std::mutex mutex;
@@ -149,4 +149,4 @@ unsigned WorkerPool::thread_count() const {
   return static_cast<unsigned>(state_->threads.size());
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::jobs

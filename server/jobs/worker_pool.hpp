@@ -3,7 +3,7 @@
 #include <functional>
 #include <memory>
 
-namespace spectra::server {
+namespace spectra::jobs {
 
 /// Threads for everything that costs time: fusing, encoding, tiling. I/O threads never compute; jobs never block on I/O.
 /// Of two waiting jobs the one with the lower `priority` number starts first, equals in order of arrival.
@@ -31,4 +31,4 @@ class WorkerPool {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::jobs

@@ -12,16 +12,16 @@
 
 #include "fusion/mesh/surface.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 namespace bg = boost::geometry;
 namespace bgi = boost::geometry::index;
-using fusion::Vec3f;
+using base::Vec3f;
 using Point = bg::model::point<double, 3, bg::cs::cartesian>;
 using Entry = std::pair<Point, std::uint32_t>;
 
-Point point_of(const Vec3f& p) {
+Point point_of(const base::Vec3f& p) {
   return {double{p.x}, double{p.y}, double{p.z}};
 }
 
@@ -32,24 +32,24 @@ class NearestBefore {
     std::vector<std::uint32_t> order(before.positions.size());
     std::iota(order.begin(), order.end(), 0u);
     std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-      const Vec3f &p = before.positions[a], &q = before.positions[b];
+      const base::Vec3f &p = before.positions[a], &q = before.positions[b];
       return std::tie(p.x, p.y, p.z, before.source[a]) < std::tie(q.x, q.y, q.z, before.source[b]);
     });
     std::vector<Entry> entries;
     for (std::size_t i = 0; i < order.size(); ++i) {
-      const Vec3f& p = before.positions[order[i]];
+      const base::Vec3f& p = before.positions[order[i]];
       if (i == 0 || !(p == before.positions[order[i - 1]])) entries.emplace_back(point_of(p), order[i]);
     }
     tree_ = Tree(entries);
   }
 
-  std::optional<std::uint32_t> operator()(const Vec3f& p) const {
+  std::optional<std::uint32_t> operator()(const base::Vec3f& p) const {
     std::optional<std::uint32_t> best;
     double best_squared = reach_m_ * reach_m_;
     for (auto found = tree_.qbegin(bgi::nearest(point_of(p), static_cast<unsigned>(tree_.size())));
          found != tree_.qend(); ++found) {
       const std::uint32_t v = found->second;
-      const double squared = squared_distance(p, before_.positions[v]);
+      const double squared = mesh::squared_distance(p, before_.positions[v]);
       // The next ones are no nearer, but for rounding.
       if (squared > best_squared * (1 + 1e-12)) break;
       if (squared > best_squared) continue;
@@ -74,7 +74,7 @@ bool is_same(double a, double b) {
 
 }  // namespace
 
-BlockBaseline handed_on(const ReplacedVertices& before, std::span<const Vec3f> positions,
+BlockBaseline handed_on(const ReplacedVertices& before, std::span<const base::Vec3f> positions,
                         std::span<const float> temperature_celsius, double observed_at, double reach_m) {
   BlockBaseline baseline{{temperature_celsius.begin(), temperature_celsius.end()},
                          std::vector<double>(positions.size(), observed_at)};
@@ -91,4 +91,4 @@ BlockBaseline handed_on(const ReplacedVertices& before, std::span<const Vec3f> p
   return is_any_other ? baseline : BlockBaseline{};
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -4,12 +4,12 @@
 
 #include "server/map/tile_place.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
-using fusion::Vec3f;
+using base::Vec3f;
 using protocol::TileId;
 
-std::size_t BorderIndex::Hash::operator()(const Vec3f& p) const {
+std::size_t BorderIndex::Hash::operator()(const base::Vec3f& p) const {
   std::uint64_t hash = 0;
   for (const float c : {p.x, p.y, p.z}) {
     hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9e3779b97f4a7c15;  // -0 + 0 = 0
@@ -18,8 +18,8 @@ std::size_t BorderIndex::Hash::operator()(const Vec3f& p) const {
   return hash;
 }
 
-void BorderIndex::Change::add(const TileId& leaf, std::span<const Vec3f> positions) {
-  for (const Vec3f& position : positions) {
+void BorderIndex::Change::add(const TileId& leaf, std::span<const base::Vec3f> positions) {
+  for (const base::Vec3f& position : positions) {
     std::uint32_t e = index_.free_;
     if (e == kNone) {
       e = static_cast<std::uint32_t>(index_.entries_.size());
@@ -33,8 +33,8 @@ void BorderIndex::Change::add(const TileId& leaf, std::span<const Vec3f> positio
   }
 }
 
-void BorderIndex::Change::remove(const TileId& leaf, std::span<const Vec3f> positions) {
-  for (const Vec3f& position : positions) {
+void BorderIndex::Change::remove(const TileId& leaf, std::span<const base::Vec3f> positions) {
+  for (const base::Vec3f& position : positions) {
     const auto first = index_.first_.find(position);
     if (first == index_.first_.end()) continue;
     std::uint32_t* link = &first->second;
@@ -48,7 +48,7 @@ void BorderIndex::Change::remove(const TileId& leaf, std::span<const Vec3f> posi
   }
 }
 
-std::uint8_t BorderIndex::sharing_level(const Vec3f& position) const {
+std::uint8_t BorderIndex::sharing_level(const base::Vec3f& position) const {
   const auto found = first_.find(position);
   if (found == first_.end()) return kUnshared;
   TileId common = entries_[found->second].leaf;
@@ -58,12 +58,12 @@ std::uint8_t BorderIndex::sharing_level(const Vec3f& position) const {
   return common.level;
 }
 
-std::vector<std::uint8_t> BorderIndex::sharing_levels(std::span<const Vec3f> positions) const {
+std::vector<std::uint8_t> BorderIndex::sharing_levels(std::span<const base::Vec3f> positions) const {
   std::vector<std::uint8_t> levels;
   levels.reserve(positions.size());
   const std::shared_lock lock(mutex_);
-  for (const Vec3f& position : positions) levels.push_back(sharing_level(position));
+  for (const base::Vec3f& position : positions) levels.push_back(sharing_level(position));
   return levels;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

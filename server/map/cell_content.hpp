@@ -6,7 +6,7 @@
 
 #include "server/map/vertex_times.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// Names a block as long as it is part of the map; one that replaces it gets another number.
 using BlockNumber = std::uint32_t;
@@ -46,4 +46,4 @@ struct CellContent {
   friend bool operator==(const CellContent&, const CellContent&) = default;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -12,10 +12,10 @@
 #include "server/map/leaf_facts.hpp"
 #include "server/map/tile_place.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 using protocol::TileId;
 
 /// The median of all finite temperatures, the lower one of an even number, NaN without any; and between which nearly all
@@ -73,8 +73,8 @@ bool have_same_branches(const MapNode& a, const MapNode& b) {
                     });
 }
 
-double diagonal(const Bounds& bounds) {
-  return std::sqrt(squared_distance(bounds.min, bounds.max));
+double diagonal(const base::Bounds& bounds) {
+  return std::sqrt(mesh::squared_distance(bounds.min, bounds.max));
 }
 
 std::uint8_t child_mask_of(const MapNode& node) {
@@ -109,7 +109,7 @@ void take_tile_of_before(MapNode& node, const MapNode& before) {
 }  // namespace
 
 CoarseWork::CoarseWork(std::shared_ptr<const MapNode> from, bool is_top, std::shared_ptr<const BorderIndex> borders,
-                       const CoarseOptions& options, std::shared_ptr<SimplifyMemory> memory)
+                       const CoarseOptions& options, std::shared_ptr<mesh::SimplifyMemory> memory)
     : from_(std::move(from)),
       is_top_(is_top),
       borders_(std::move(borders)),
@@ -131,7 +131,7 @@ CoarseOptions CoarseLevels::coarse_options(const MapNode& root, const Options& o
           .baseline_mark = options.baseline_mark};
 }
 
-std::set<TileId> CoarseLevels::update_borders(const ChangedTree& changed, WorkerPool& pool) {
+std::set<TileId> CoarseLevels::update_borders(const ChangedTree& changed, jobs::WorkerPool& pool) {
   std::vector<MapNode*> leaves;
   for (const auto& node : changed.made) {
     if (node->is_leaf()) leaves.push_back(node.get());
@@ -174,7 +174,7 @@ bool CoarseLevels::has_new_spread(const std::shared_ptr<const MapNode>& root) {
 }
 
 void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapNode>& before, const Options& options,
-                          WorkerPool& pool, const fusion::Progress& progress) {
+                          jobs::WorkerPool& pool, const base::Progress& progress) {
   std::set<TileId> wanted = update_borders(changed, pool);
   const std::shared_ptr<const MapNode>& root = changed.root;
   if (!root) {
@@ -233,7 +233,7 @@ void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapN
     pool.for_each(level->size(), [&](std::size_t i) {
       MapNode& node = *(*level)[i];
       make_coarse_tile(node, node.id == top->id, *borders_, coarse, *memory_);
-      fusion::report(progress, kTilingPhase, static_cast<double>(++made_count) / static_cast<double>(count));
+      base::report(progress, kTilingPhase, static_cast<double>(++made_count) / static_cast<double>(count));
     });
     for (const MapNode* node : *level) {
       const bool is_outdated = std::any_of(node->branches.begin(), node->branches.end(), [&](const auto& branch) {
@@ -273,4 +273,4 @@ std::shared_ptr<const MapNode> CoarseLevels::taken(const std::shared_ptr<const M
   return with_node(root, copy);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

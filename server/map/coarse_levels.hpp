@@ -12,13 +12,13 @@
 #include "server/map/coarse_tile.hpp"
 #include "server/map/map_tree.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// A coarse tile that is to be made anew. Holds all that this needs.
 class CoarseWork {
  public:
   CoarseWork(std::shared_ptr<const MapNode> from, bool is_top, std::shared_ptr<const BorderIndex> borders,
-             const CoarseOptions& options, std::shared_ptr<SimplifyMemory> memory);
+             const CoarseOptions& options, std::shared_ptr<mesh::SimplifyMemory> memory);
 
   /// Makes the tile; from any thread, while the map goes on.
   void run();
@@ -33,7 +33,7 @@ class CoarseWork {
   bool is_top_;
   std::shared_ptr<const BorderIndex> borders_;
   CoarseOptions options_;
-  std::shared_ptr<SimplifyMemory> memory_;
+  std::shared_ptr<mesh::SimplifyMemory> memory_;
 };
 
 /// Keeps the tiles above the leaves of a map that changes. Right after a change a coarse tile may still be the one of before: what has
@@ -49,7 +49,7 @@ class CoarseLevels {
 
   /// Gives the nodes that have been made their coarse tiles: those of before where there are some, new ones where not. `before` is the tree before.
   void change(ChangedTree& changed, const std::shared_ptr<const MapNode>& before, const Options& options,
-              WorkerPool& pool, const fusion::Progress& progress);
+              jobs::WorkerPool& pool, const base::Progress& progress);
 
   /// Some tiles do not show yet what is beneath them.
   bool are_behind() const { return !outdated_.empty(); }
@@ -61,12 +61,12 @@ class CoarseLevels {
   void rest() { memory_->clear(); }
 
  private:
-  std::set<protocol::TileId> update_borders(const ChangedTree& changed, WorkerPool& pool);
+  std::set<protocol::TileId> update_borders(const ChangedTree& changed, jobs::WorkerPool& pool);
   bool has_new_spread(const std::shared_ptr<const MapNode>& root);
   CoarseOptions coarse_options(const MapNode& root, const Options& options) const;
 
   const std::shared_ptr<BorderIndex> borders_ = std::make_shared<BorderIndex>();
-  const std::shared_ptr<SimplifyMemory> memory_ = std::make_shared<SimplifyMemory>();
+  const std::shared_ptr<mesh::SimplifyMemory> memory_ = std::make_shared<mesh::SimplifyMemory>();
   float median_celsius_ = std::numeric_limits<float>::quiet_NaN();
   double span_celsius_ = 1;
   std::uint64_t spread_vertex_count_ = 0;  ///< So many vertices the map had when the last two were found.
@@ -74,4 +74,4 @@ class CoarseLevels {
   std::set<protocol::TileId> round_;       ///< Those of them that are still to be made in this round.
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -14,14 +14,14 @@
 #include "server/map/thinning.hpp"
 #include "server/map/tile_place.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
 using protocol::TileId;
 
-constexpr std::uint32_t kNone = Surface::kNone;
+constexpr std::uint32_t kNone = mesh::Surface::kNone;
 
 /// A child of the tile that is being made.
 struct Child {
@@ -48,13 +48,13 @@ float further_from(float median_celsius, float a, float b) {
 /// Which vertices of a tile are drawn.
 std::vector<bool> drawn_vertices(const Tile& tile, bool is_point_cloud) {
   std::vector<bool> is_drawn(tile.positions.size(), is_point_cloud);
-  for (const Triangle& triangle : tile.triangles) {
+  for (const base::Triangle& triangle : tile.triangles) {
     for (const std::uint32_t v : triangle) is_drawn[v] = true;
   }
   return is_drawn;
 }
 
-bool is_degenerate(const Triangle& t) {
+bool is_degenerate(const base::Triangle& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
 
@@ -74,7 +74,7 @@ Merged merged(std::vector<Child>& children, const Tile& parent, const BorderInde
     triangle_count += child.node.tile->triangles.size();
   }
   Merged result;
-  PositionIndex index(vertex_count);
+  mesh::PositionIndex index(vertex_count);
   result.visible.reserve(vertex_count);
   result.temperature_celsius.reserve(vertex_count);
   result.source_vertex.reserve(vertex_count);
@@ -105,7 +105,7 @@ Merged merged(std::vector<Child>& children, const Tile& parent, const BorderInde
       if (temperature == parent.lowest_celsius && result.lowest_at == kNone) result.lowest_at = m;
       if (temperature == parent.highest_celsius && result.highest_at == kNone) result.highest_at = m;
     }
-    for (const Triangle& t : tile.triangles) {
+    for (const base::Triangle& t : tile.triangles) {
       result.any_triangle = {merged_of[t[0]], merged_of[t[1]], merged_of[t[2]]};
       if (!is_degenerate(result.any_triangle)) result.triangles.push_back(result.any_triangle);
     }
@@ -122,7 +122,7 @@ void show_extreme(Tile& tile, std::uint32_t k, float celsius, float median_celsi
   std::vector<float>& shown = tile.temperature_celsius;
   if (std::isnan(celsius) || std::find(shown.begin(), shown.end(), celsius) != shown.end()) return;
   std::vector<std::uint32_t> near{k};
-  for (const Triangle& t : tile.triangles) {
+  for (const base::Triangle& t : tile.triangles) {
     if (t[0] == k || t[1] == k || t[2] == k) near.insert(near.end(), t.begin(), t.end());
   }
   // The other extreme is never given up for this one; a locked vertex only where there is no other.
@@ -248,7 +248,7 @@ void take_baseline(Tile& tile, const std::vector<Child>& children, const CoarseO
 /// What the children say of the tile above them.
 void take_from_children(Tile& tile, const std::vector<Child>& children) {
   TemperatureRange range;
-  std::vector<Vec3f> corners;
+  std::vector<base::Vec3f> corners;
   tile.temperature_error_celsius = std::numeric_limits<float>::quiet_NaN();
   for (const Child& child : children) {
     const Tile& below = *child.node.tile;
@@ -274,8 +274,8 @@ float sum_above(float a, double b) {
 }
 
 /// How far the tile is from its children, and how what it shows differs from the full mesh. Returns samples of that.
-std::vector<FullSample> measure(Tile& tile, const std::vector<Child>& children, const Merged& mesh, const Surface& fine,
-                                const Thinning& thinning, const CoarseOptions& options) {
+std::vector<FullSample> measure(Tile& tile, const std::vector<Child>& children, const Merged& mesh,
+                                const mesh::Surface& fine, const Thinning& thinning, const CoarseOptions& options) {
   tile.geometric_error_m = sum_above(tile.geometric_error_m, thinning.distance_m);
   std::vector<FullSample> samples;
   for (const Child& child : children) {
@@ -289,7 +289,7 @@ std::vector<FullSample> measure(Tile& tile, const std::vector<Child>& children, 
     }
   }
   thin_out(samples);
-  const Surface surface(tile.positions, tile.triangles);
+  const mesh::Surface surface(tile.positions, tile.triangles);
   measure_seen_error(tile, surface, samples);
   const SeenContrast contrast{.levels = options.seen_levels, .celsius = options.span_celsius / 16};
   const double lost_m = lost_detail_m(tile, surface, mesh, fine, thinning, contrast);
@@ -312,18 +312,18 @@ void round_as_alone(Tile& top, float step_m) {
 }  // namespace
 
 /// The positions on open edges of a leaf, as its welded surface has them.
-std::vector<Vec3f> open_positions(const Tile& leaf) {
-  PositionIndex index(leaf.positions.size());
+std::vector<base::Vec3f> open_positions(const Tile& leaf) {
+  mesh::PositionIndex index(leaf.positions.size());
   std::vector<std::uint32_t> welded(leaf.positions.size());
   for (std::size_t v = 0; v < welded.size(); ++v) welded[v] = index.find_or_insert(leaf.positions[v]);
-  std::vector<Triangle> triangles;
+  std::vector<base::Triangle> triangles;
   triangles.reserve(leaf.triangles.size());
-  for (const Triangle& t : leaf.triangles) {
-    const Triangle triangle{welded[t[0]], welded[t[1]], welded[t[2]]};
+  for (const base::Triangle& t : leaf.triangles) {
+    const base::Triangle triangle{welded[t[0]], welded[t[1]], welded[t[2]]};
     if (!is_degenerate(triangle)) triangles.push_back(triangle);
   }
-  const std::vector<bool> is_open = Surface(index.positions(), triangles).open_vertices();
-  std::vector<Vec3f> result;
+  const std::vector<bool> is_open = mesh::Surface(index.positions(), triangles).open_vertices();
+  std::vector<base::Vec3f> result;
   for (std::size_t v = 0; v < is_open.size(); ++v) {
     if (is_open[v]) result.push_back(index.positions()[v]);
   }
@@ -331,7 +331,7 @@ std::vector<Vec3f> open_positions(const Tile& leaf) {
 }
 
 void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options,
-                      SimplifyMemory& memory) {
+                      mesh::SimplifyMemory& memory) {
   std::vector<Child> children;
   for (const MapNode::Branch& branch : node.branches) {
     const auto& below = branch.node->tile;
@@ -356,7 +356,7 @@ void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, co
     if (v != kNone) is_locked[v] = true;
   }
   const ThinningOptions thinning_options{.wanted_count = wanted_count, .span_celsius = options.span_celsius};
-  const Surface fine(mesh.positions, mesh.triangles);
+  const mesh::Surface fine(mesh.positions, mesh.triangles);
   Thinning thinning = options.is_point_cloud ? thinned_points(mesh, is_locked, thinning_options)
                                              : thinned_surface(mesh, fine, is_locked, thinning_options, memory);
   show(*tile, mesh, thinning, is_locked, options.median_celsius);
@@ -374,4 +374,4 @@ void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, co
   node.tile = std::move(tile);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -8,7 +8,7 @@
 #include "server/map/map_tree.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// How coarse the tiles above the leaves are, and what they are measured by.
 struct CoarseOptions {
@@ -37,9 +37,9 @@ struct CoarseOptions {
 /// geometric_error_m bounds the distance between tile and full mesh, both ways: the largest one measured against the
 /// children, with a margin, on top of the children's own. Thread-safe for different nodes while `borders` does not change.
 void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, const CoarseOptions& options,
-                      SimplifyMemory& memory);
+                      mesh::SimplifyMemory& memory);
 
 /// The positions on open edges of a leaf, as its welded surface has them.
-std::vector<fusion::Vec3f> open_positions(const Tile& leaf);
+std::vector<base::Vec3f> open_positions(const Tile& leaf);
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace spectra::server {
+namespace spectra::map {
 
 LeafFacts leaf_facts(const Tile& leaf) {
   LeafFacts facts;
@@ -44,4 +44,4 @@ TemperatureRange temperature_range(std::span<const float> temperature_celsius) {
   return range;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

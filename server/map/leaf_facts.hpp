@@ -9,7 +9,7 @@
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// What one leaf contributes to the facts of the scene.
 struct LeafFacts {
@@ -36,4 +36,4 @@ inline std::span<const float> owned_temperature(const Tile& tile) {
   return std::span(tile.temperature_celsius).first(tile.owned_count);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -17,10 +17,10 @@
 #include <malloc.h>
 #endif
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 
 /// About what share of the making is done with the leaves; and of that, when they are cut and when the steps are known.
 constexpr double kLeavesShare = 0.25;
@@ -50,7 +50,7 @@ class FreedMemoryGoesBack {
 };
 
 /// The whole of a mesh as one tile, for PositionSteps.
-std::shared_ptr<Tile> tile_of(const fusion::MultispectralMesh& mesh) {
+std::shared_ptr<Tile> tile_of(const mesh::MultispectralMesh& mesh) {
   auto tile = std::make_shared<Tile>();
   tile->owned_count = static_cast<std::uint32_t>(mesh.vertex_count());
   tile->positions.assign(mesh.positions().begin(), mesh.positions().end());
@@ -60,15 +60,15 @@ std::shared_ptr<Tile> tile_of(const fusion::MultispectralMesh& mesh) {
   return tile;
 }
 
-Vec3f moved(const Vec3f& p, const fusion::Vec3d& by) {
+base::Vec3f moved(const base::Vec3f& p, const base::Vec3d& by) {
   return {static_cast<float>(double{p.x} + by.x), static_cast<float>(double{p.y} + by.y),
           static_cast<float>(double{p.z} + by.z)};
 }
 
 /// By what positions that are relative to one origin move to be relative to another; nothing where both are the same.
-std::optional<fusion::Vec3d> shift_to(const fusion::Vec3d& origin, const fusion::Vec3d& from) {
+std::optional<base::Vec3d> shift_to(const base::Vec3d& origin, const base::Vec3d& from) {
   if (from == origin) return std::nullopt;
-  return fusion::Vec3d{from.x - origin.x, from.y - origin.y, from.z - origin.z};
+  return base::Vec3d{from.x - origin.x, from.y - origin.y, from.z - origin.z};
 }
 
 void collect_shown(const std::shared_ptr<const MapNode>& node, bool is_point_cloud, bool with_coarse,
@@ -118,8 +118,8 @@ TileSizes LivingMap::sizes() const {
   return sizes;
 }
 
-std::optional<fusion::Error> LivingMap::refusal_of(std::span<const BlockShape> put,
-                                                   std::span<const std::string> removed) const {
+std::optional<base::Error> LivingMap::refusal_of(std::span<const BlockShape> put,
+                                                 std::span<const std::string> removed) const {
   std::set<std::string_view> gone(removed.begin(), removed.end());
   for (const BlockShape& block : put) gone.insert(block.id);
   std::uint64_t vertex_count = 0;
@@ -133,16 +133,16 @@ std::optional<fusion::Error> LivingMap::refusal_of(std::span<const BlockShape> p
     const std::string id(block.id);
     vertex_count += block.vertex_count;
     if (block.vertex_count == 0) {
-      return fusion::Error{fusion::ErrorCode::Unsupported, "the block has no vertex", id};
+      return base::Error{base::ErrorCode::Unsupported, "the block has no vertex", id};
     }
     if (vertex_count > std::numeric_limits<std::uint32_t>::max()) {
-      return fusion::Error{fusion::ErrorCode::TooLarge, "the map would have more than 4294967295 vertices", id};
+      return base::Error{base::ErrorCode::TooLarge, "the map would have more than 4294967295 vertices", id};
     }
     if (has_triangles.value_or(block.has_triangles) != block.has_triangles) {
-      return fusion::Error{fusion::ErrorCode::Unsupported,
-                           block.has_triangles ? "the map is made of points, and this block has triangles"
-                                               : "the map is made of triangles, and this block has points alone",
-                           id};
+      return base::Error{base::ErrorCode::Unsupported,
+                         block.has_triangles ? "the map is made of points, and this block has triangles"
+                                             : "the map is made of triangles, and this block has points alone",
+                         id};
     }
     has_triangles = block.has_triangles;
   }
@@ -168,18 +168,18 @@ ReplacedVertices LivingMap::replaced_vertices(BlockNumber block) const {
   return replaced;
 }
 
-BlockBaseline LivingMap::handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+BlockBaseline LivingMap::handed_on(std::string_view id, const mesh::MultispectralMesh& mesh,
                                    std::optional<double> observed_at) const {
   const auto before = blocks_.find(id);
   if (before == blocks_.end()) return {};
-  std::vector<Vec3f> placed;
-  std::span<const Vec3f> positions = mesh.positions();
+  std::vector<base::Vec3f> placed;
+  std::span<const base::Vec3f> positions = mesh.positions();
   if (const auto by = shift_to(constants_->origin, mesh.origin)) {
-    for (const Vec3f& p : positions) placed.push_back(moved(p, *by));
+    for (const base::Vec3f& p : positions) placed.push_back(moved(p, *by));
     positions = placed;
   }
-  return server::handed_on(replaced_vertices(before->second->number), positions, mesh.temperature_celsius(),
-                           observed_at.value_or(kUnknownTime), kHandedOnSteps * double{constants_->position_step_m});
+  return map::handed_on(replaced_vertices(before->second->number), positions, mesh.temperature_celsius(),
+                        observed_at.value_or(kUnknownTime), kHandedOnSteps * double{constants_->position_step_m});
 }
 
 std::shared_ptr<const SceneSnapshot> LivingMap::mark_baseline(double marked_at, std::uint32_t revision) {
@@ -190,9 +190,9 @@ std::shared_ptr<const SceneSnapshot> LivingMap::mark_baseline(double marked_at, 
   return snapshot(revision);
 }
 
-std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, std::uint32_t revision, WorkerPool& pool,
-                                                      const fusion::Progress& progress) {
-  fusion::report(progress, kTilingPhase, 0);
+std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, std::uint32_t revision,
+                                                      jobs::WorkerPool& pool, const base::Progress& progress) {
+  base::report(progress, kTilingPhase, 0);
   std::vector<BlockPut>& put = change_wanted.put;
   if (!blocks_.empty()) remembers_ = true;
   for (BlockPut& one : put) {
@@ -207,7 +207,7 @@ std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, s
   if (!put.empty() || !change_wanted.removed.empty()) change(std::move(put), change_wanted.removed, pool, progress);
 
   auto made = snapshot(revision);
-  fusion::report(progress, kTilingPhase, 1);
+  base::report(progress, kTilingPhase, 1);
   return made;
 }
 
@@ -245,7 +245,7 @@ MapVersion LivingMap::version(std::uint32_t revision) {
   }
   if (!options_.name.empty()) facts.name = options_.name;
   if (blocks_.size() == 1) facts.left_out = blocks_.begin()->second->facts.left_out;
-  std::vector<Vec3f> core;
+  std::vector<base::Vec3f> core;
   for (const auto& [id, block] : blocks_) {
     facts.vertex_count += block->facts.vertex_count;
     facts.triangle_count += block->facts.triangle_count;
@@ -291,16 +291,16 @@ bool LivingMap::is_reference_good(const MapVersion& version) {
   return !have_quantiles_moved(reference_->histogram(fusion::kPercentileBins), version.percentiles);
 }
 
-std::vector<fusion::Note> LivingMap::notes() const {
+std::vector<files::Note> LivingMap::notes() const {
   if (blocks_.size() == 1) return blocks_.begin()->second->notes;
   // A note of a kind, however many blocks have it.
   struct Told {
-    fusion::Note note;
+    files::Note note;
     std::size_t block_count = 0;
   };
   std::map<std::string, Told> by_id;
   for (const auto& [id, block] : blocks_) {
-    for (const fusion::Note& note : block->notes) {
+    for (const files::Note& note : block->notes) {
       Told& told = by_id[note.id];
       const std::uint64_t count = told.note.count + note.count;
       const bool needs_attention = told.note.needs_attention || note.needs_attention;
@@ -311,7 +311,7 @@ std::vector<fusion::Note> LivingMap::notes() const {
       ++told.block_count;
     }
   }
-  std::vector<fusion::Note> notes;
+  std::vector<files::Note> notes;
   for (auto& [id, told] : by_id) {
     if (told.block_count > 1) {
       told.note.message += " (and " + std::to_string(told.block_count - 1) + " more blocks)";
@@ -321,7 +321,7 @@ std::vector<fusion::Note> LivingMap::notes() const {
   return notes;
 }
 
-void LivingMap::put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress) {
+void LivingMap::put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress) {
   const FreedMemoryGoesBack scope;
   constants_ = {.origin = put.scene.mesh.origin,
                 .grid = MapGrid::around(put.scene.mesh.positions(), options_.first_level)};
@@ -331,12 +331,12 @@ void LivingMap::put_first(BlockPut put, WorkerPool& pool, const fusion::Progress
 }
 
 std::shared_ptr<const MapBlock> LivingMap::taken_in(BlockPut& put) {
-  fusion::MultispectralMesh& mesh = put.scene.mesh;
-  std::optional<Bounds>& core = put.scene.core_bounds;
-  const fusion::Vec3d& origin = constants_->origin;
+  mesh::MultispectralMesh& mesh = put.scene.mesh;
+  std::optional<base::Bounds>& core = put.scene.core_bounds;
+  const base::Vec3d& origin = constants_->origin;
   if (const auto by = shift_to(origin, mesh.origin)) {
-    for (Vec3f& p : mesh.positions()) p = moved(p, *by);
-    if (core) core = Bounds{moved(core->min, *by), moved(core->max, *by)};
+    for (base::Vec3f& p : mesh.positions()) p = moved(p, *by);
+    if (core) core = base::Bounds{moved(core->min, *by), moved(core->max, *by)};
     mesh.origin = origin;
   }
   auto info = std::make_shared<MapBlock>();
@@ -349,8 +349,8 @@ std::shared_ptr<const MapBlock> LivingMap::taken_in(BlockPut& put) {
   return info;
 }
 
-void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
-                       const fusion::Progress& progress) {
+void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> removed, jobs::WorkerPool& pool,
+                       const base::Progress& progress) {
   std::vector<BlockNumber> gone;
   const auto remove = [&](const std::string& id) {
     const auto found = blocks_.find(id);
@@ -381,9 +381,7 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
     blocks_.emplace(block.id, std::move(info));
   }
   const double leaves_share = options_.levels == LevelsOfDetail::All ? kLeavesShare : 1;
-  const auto made_share = [&](double share) {
-    fusion::report(progress, kTilingPhase, leaves_share * kCutShare * share);
-  };
+  const auto made_share = [&](double share) { base::report(progress, kTilingPhase, leaves_share * kCutShare * share); };
   ChangedTree changed = changed_tree(root_, constants_->grid, sizes(), gone, added, labels_, pool, made_share);
   for (const BlockNumber number : gone) labels_.of_block.erase(number);
   // Memory of a large mesh is needed for the rest.
@@ -399,11 +397,11 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
     constants_->position_step_m = steps.largest_step_m();
     pool.for_each(leaves.size(), [&](std::size_t i) { steps.apply(*leaves[i]); });
   }
-  fusion::report(progress, kTilingPhase, leaves_share * kStepsShare);
+  base::report(progress, kTilingPhase, leaves_share * kStepsShare);
   take(std::move(changed), pool, progress);
 }
 
-void LivingMap::take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress) {
+void LivingMap::take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress) {
   if (percentiles_) {
     // Good as long as the extremes stay; apply() looks at that.
     fusion::Histogram gone = *percentiles_;
@@ -422,7 +420,7 @@ void LivingMap::take(ChangedTree changed, WorkerPool& pool, const fusion::Progre
   }
   if (options_.levels == LevelsOfDetail::All) {
     const auto coarse_progress = [&](std::string_view phase, double share) {
-      fusion::report(progress, phase, kLeavesShare + (1 - kLeavesShare) * share);
+      base::report(progress, phase, kLeavesShare + (1 - kLeavesShare) * share);
     };
     coarse_.change(changed, root_, coarse_options(), pool, coarse_progress);
   }
@@ -444,4 +442,4 @@ std::shared_ptr<const SceneSnapshot> LivingMap::take_coarse(const CoarseWork& wo
   return root_ == before ? nullptr : snapshot(revision);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -22,7 +22,7 @@
 #include "server/map/map_version.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// Of a map that is expected to grow. A quarter of what others have: a block that comes in makes whole leaves anew, and coarse
 /// tiles above them.
@@ -34,7 +34,7 @@ inline constexpr double kHandedOnSteps = 8;
 /// A part of the map under a name of its own; one of the same name takes its place.
 struct BlockPut {
   std::string id;
-  fusion::LoadedScene scene;
+  files::LoadedScene scene;
   std::optional<double> observed_at;  ///< Unix seconds.
   /// What its vertices are compared with; nothing: what LivingMap::handed_on() says.
   std::optional<BlockBaseline> baseline = std::nullopt;
@@ -62,7 +62,7 @@ struct MapChange {
 
 /// What stays the same for the life of a map.
 struct MapConstants {
-  fusion::Vec3d origin;  ///< What positions are relative to.
+  base::Vec3d origin;  ///< What positions are relative to.
   MapGrid grid;
   float position_step_m = 0;  ///< The largest one.
 };
@@ -90,11 +90,11 @@ class LivingMap {
 
   /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; a block without a vertex;
   /// more vertices in all than fit 32 bits. Error: Unsupported or TooLarge; `field` is the block's name.
-  std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
+  std::optional<base::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
 
   /// What the vertices of a block that is put are compared with (see thermal_change). A block that is there hands its
   /// baseline on, over at most kHandedOnSteps of the map's position step; else each vertex is compared with itself.
-  BlockBaseline handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+  BlockBaseline handed_on(std::string_view id, const mesh::MultispectralMesh& mesh,
                           std::optional<double> observed_at) const;
 
   /// From now on temperatures are compared with those of now. The next version.
@@ -104,8 +104,8 @@ class LivingMap {
   /// The next version. Positions of blocks are taken relative to the origin of the map. The blocks that are put have different
   /// names, and there is no refusal_of() them. Coarse tiles that were there before may not show yet what has changed beneath
   /// them; see next_coarse(). Must not be called from a job of the pool. `progress` is told of kTilingPhase.
-  std::shared_ptr<const SceneSnapshot> apply(MapChange change, std::uint32_t revision, WorkerPool& pool,
-                                             const fusion::Progress& progress = {});
+  std::shared_ptr<const SceneSnapshot> apply(MapChange change, std::uint32_t revision, jobs::WorkerPool& pool,
+                                             const base::Progress& progress = {});
 
   /// Some coarse tiles do not show yet what is beneath them.
   bool is_behind() const;
@@ -121,15 +121,15 @@ class LivingMap {
   MapVersion version(std::uint32_t revision);
   /// Automatic values found with the reference are still what this version would ask for, nearly.
   bool is_reference_good(const MapVersion& version);
-  std::vector<fusion::Note> notes() const;
-  void put_first(BlockPut put, WorkerPool& pool, const fusion::Progress& progress);
-  void change(std::vector<BlockPut> put, std::span<const std::string> removed, WorkerPool& pool,
-              const fusion::Progress& progress);
+  std::vector<files::Note> notes() const;
+  void put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress);
+  void change(std::vector<BlockPut> put, std::span<const std::string> removed, jobs::WorkerPool& pool,
+              const base::Progress& progress);
   /// Of a block that comes in, its positions relative to the origin of the map from then on.
   std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
   ReplacedVertices replaced_vertices(BlockNumber block) const;
   /// The tree with what has changed.
-  void take(ChangedTree changed, WorkerPool& pool, const fusion::Progress& progress);
+  void take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress);
   TileSizes sizes() const;
   CoarseLevels::Options coarse_options() const;
 
@@ -151,4 +151,4 @@ class LivingMap {
   std::uint64_t looked_at_vertex_count_ = 0;  ///< Changed since its quantiles were looked at.
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -9,11 +9,11 @@
 #include "fusion/mesh/vertex_index_map.hpp"
 #include "server/map/leaf_facts.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
 
 /// A vertex as its piece has it.
 struct PieceVertex {
@@ -21,23 +21,23 @@ struct PieceVertex {
   std::uint32_t index;
 };
 
-std::array<double, 3> coordinates(const Vec3f& v) {
+std::array<double, 3> coordinates(const base::Vec3f& v) {
   return {double{v.x}, double{v.y}, double{v.z}};
 }
 
-Vec3f centroid(const Piece& piece, const Triangle& triangle) {
-  const auto mean = [&](float Vec3f::*axis) {
+base::Vec3f centroid(const Piece& piece, const base::Triangle& triangle) {
+  const auto mean = [&](float base::Vec3f::*axis) {
     return static_cast<float>((double{piece.positions[triangle[0]].*axis} + double{piece.positions[triangle[1]].*axis} +
                                double{piece.positions[triangle[2]].*axis}) /
                               3);
   };
-  return {mean(&Vec3f::x), mean(&Vec3f::y), mean(&Vec3f::z)};
+  return {mean(&base::Vec3f::x), mean(&base::Vec3f::y), mean(&base::Vec3f::z)};
 }
 
 /// Orders the elements of a leaf along a Morton curve through 16 x 16 x 16 cells of its box.
 void sort_along_curve(std::span<Element> elements) {
-  Bounds bounds = empty_bounds();
-  for (const Element& element : elements) include(bounds, element.place);
+  base::Bounds bounds = base::empty_bounds();
+  for (const Element& element : elements) base::include(bounds, element.place);
   const auto low = coordinates(bounds.min), high = coordinates(bounds.max);
   std::array<double, 3> scale{};
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -51,7 +51,7 @@ void sort_along_curve(std::span<Element> elements) {
       const double position = (p[axis] - low[axis]) * scale[axis];
       cell[axis] = position > 0 ? static_cast<std::uint32_t>(std::min(position, 15.0)) : 0;
     }
-    return static_cast<std::size_t>(morton_code(cell[0], cell[1], cell[2]));
+    return static_cast<std::size_t>(base::morton_code(cell[0], cell[1], cell[2]));
   };
   std::vector<std::uint16_t> cells(elements.size());
   std::vector<std::uint32_t> next(4097);
@@ -169,9 +169,9 @@ CellContent content_of(std::span<const Element> elements) {
   return sum;
 }
 
-Bounds bounds_of(std::span<const Element> elements) {
-  Bounds bounds = empty_bounds();
-  for (const Element& element : elements) include(bounds, element.place);
+base::Bounds bounds_of(std::span<const Element> elements) {
+  base::Bounds bounds = base::empty_bounds();
+  for (const Element& element : elements) base::include(bounds, element.place);
   return bounds;
 }
 
@@ -216,7 +216,7 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   const CellContent content = content_of(elements);
   std::vector<PieceVertex> vertices;
   vertices.reserve(content.owned_count);
-  VertexIndexMap index_of(content.triangle_count == 0 ? 0 : content.owned_count + content.owned_count / 16);
+  mesh::VertexIndexMap index_of(content.triangle_count == 0 ? 0 : content.owned_count + content.owned_count / 16);
   const auto key_of = [](const Piece& its, std::uint32_t v) {
     return std::uint64_t{its.block_of_vertex(v)} << 32 | its.source_of_vertex(v);
   };
@@ -241,7 +241,7 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   for (const Element& element : elements) {
     if (element.is_lone_vertex()) continue;
     const Piece& its = piece_of(element);
-    Triangle triangle{};
+    base::Triangle triangle{};
     for (unsigned corner = 0; corner < 3; ++corner) {
       const std::uint32_t v = its.triangles[element.index][corner];
       const auto next = static_cast<std::uint32_t>(vertices.size());
@@ -253,7 +253,7 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   }
   copy_vertices(vertices, *tile);
   copy_memory(vertices, labels, *tile);
-  tile->bounds = bounds_of(std::span<const Vec3f>(tile->positions));
+  tile->bounds = bounds_of(std::span<const base::Vec3f>(tile->positions));
   // The vertices that are drawn: all but the lone ones of a scene with triangles.
   const std::size_t lone_begin = content.triangle_count == 0 ? tile->owned_count : referenced_count;
   const TemperatureRange range =
@@ -265,4 +265,4 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   return tile;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

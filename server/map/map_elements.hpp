@@ -15,15 +15,15 @@
 #include "server/map/cell_content.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// Where elements come from: a block that is put in, or a leaf of the version before.
 struct Piece {
-  std::span<const fusion::Vec3f> positions;
-  std::span<const fusion::Rgb8> visible;
+  std::span<const base::Vec3f> positions;
+  std::span<const base::Rgb8> visible;
   std::span<const float> temperature_celsius;
   std::span<const StepHalvings> step_halvings;  ///< Empty: none are halved.
-  std::span<const fusion::Triangle> triangles;
+  std::span<const base::Triangle> triangles;
   std::span<const std::uint32_t> source_vertex;    ///< In the block; empty: the same number.
   std::span<const std::uint32_t> source_triangle;  ///< The same.
   std::span<const BlockNumber> vertex_block;       ///< Empty: all are of `block`.
@@ -66,7 +66,7 @@ class Pieces {
 
 /// What lies in cells: a triangle (at its centroid), or a vertex of no triangle.
 struct Element {
-  fusion::Vec3f place;
+  base::Vec3f place;
   std::uint32_t index = 0;  ///< In its piece, of the triangle or the vertex.
   std::uint32_t piece : 28 = 0;
   /// Bit k: corner k is the first in its block to use its vertex, which is therefore owned where this triangle is.
@@ -104,7 +104,7 @@ class PieceCursor {
 BlockNumber block_of(const Piece& piece, const Element& element);
 CellContent content_of(std::span<const Element> elements);
 /// Of their places.
-Bounds bounds_of(std::span<const Element> elements);
+base::Bounds bounds_of(std::span<const Element> elements);
 
 /// The elements of a piece. `triangle_order`: its triangles in an order in which those of each block ascend; empty: as they are.
 /// Vertices from `owned_count` on are owned elsewhere.
@@ -116,4 +116,4 @@ std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::
 std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>& elements, const Pieces& pieces,
                                 const BlockLabels& labels);
 
-}  // namespace spectra::server
+}  // namespace spectra::map

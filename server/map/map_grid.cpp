@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 constexpr std::size_t kSampleSize = 4096;
@@ -29,7 +29,7 @@ Interval most_of(std::vector<double>& values) {
 
 }  // namespace
 
-MapGrid MapGrid::around(std::span<const fusion::Vec3f> positions, int level) {
+MapGrid MapGrid::around(std::span<const base::Vec3f> positions, int level) {
   std::array<Interval, 3> box{};
   if (!positions.empty()) {
     const std::size_t stride = (positions.size() + kSampleSize - 1) / kSampleSize;
@@ -65,4 +65,4 @@ std::array<double, 3> MapGrid::middle_of(const protocol::TileId& cell) const {
           corner_m_[2] + (static_cast<double>(cell.z) + 0.5) * edge_m};
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

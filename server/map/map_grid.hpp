@@ -7,7 +7,7 @@
 #include "fusion/base/vertex_types.hpp"
 #include "protocol/tile_frame.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// Deepest level of a tile; a cell that cannot be cut further is a leaf whatever its size.
 inline constexpr int kDeepestLevel = 31;
@@ -22,7 +22,7 @@ class MapGrid {
   /// So that most of some positions just fill one cell of `level`; the few that are far from
   /// all others are not heeded. The cell's place in the cube is such that what grows beyond it soon has a common cell with it again. Of no positions: a
   /// cell of one metre around 0.
-  static MapGrid around(std::span<const fusion::Vec3f> positions, int level);
+  static MapGrid around(std::span<const base::Vec3f> positions, int level);
 
   /// The middle of a cell (metres), where it is cut.
   std::array<double, 3> middle_of(const protocol::TileId& cell) const;
@@ -36,9 +36,9 @@ class MapGrid {
 };
 
 /// In which octant of a cell a position lies.
-inline unsigned octant_at(const std::array<double, 3>& middle, const fusion::Vec3f& p) {
+inline unsigned octant_at(const std::array<double, 3>& middle, const base::Vec3f& p) {
   return (double{p.x} >= middle[0] ? 1u : 0u) | (double{p.y} >= middle[1] ? 2u : 0u) |
          (double{p.z} >= middle[2] ? 4u : 0u);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -13,7 +13,7 @@
 #include "server/map/octant_groups.hpp"
 #include "server/map/tile_place.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 using protocol::TileId;
@@ -49,7 +49,8 @@ class TreeChange {
         labels_(labels),
         made_share_(made_share) {}
 
-  ChangedTree run(const std::shared_ptr<const MapNode>& root, std::span<const BlockMesh> added, WorkerPool& pool) {
+  ChangedTree run(const std::shared_ptr<const MapNode>& root, std::span<const BlockMesh> added,
+                  jobs::WorkerPool& pool) {
     if (root && !removed_.empty()) find_touched(root, pool);
     total_ = root ? root->content : CellContent{};
     if (root) total_ -= removed_content(root->id);
@@ -133,7 +134,7 @@ class TreeChange {
 
   // Before anything else: which leaves lose something, and what.
 
-  void find_touched(const std::shared_ptr<const MapNode>& root, WorkerPool& pool) {
+  void find_touched(const std::shared_ptr<const MapNode>& root, jobs::WorkerPool& pool) {
     std::vector<std::shared_ptr<const MapNode>> leaves;
     collect_touched(root, leaves);
     std::vector<TouchedLeaf> parts(leaves.size());
@@ -200,7 +201,7 @@ class TreeChange {
 
   /// Makes all nodes from the root down.
   void cut(std::shared_ptr<MapNode> top, const std::shared_ptr<const MapNode>& root, std::vector<Element> incoming,
-           WorkerPool& pool) {
+           jobs::WorkerPool& pool) {
     std::vector<CellTask> tasks;
     tasks.push_back({std::move(top), root, std::move(incoming)});
     std::vector<LeafTask> leaves;
@@ -228,12 +229,12 @@ class TreeChange {
 
   static void complete(MapNode& node) {
     if (node.is_leaf()) return;
-    node.bounds = empty_bounds();
+    node.bounds = base::empty_bounds();
     node.content = {};
     for (const CellContent& octant : node.octants) node.content += octant;
     for (const auto& branch : node.branches) {
-      include(node.bounds, branch.node->bounds.min);
-      include(node.bounds, branch.node->bounds.max);
+      base::include(node.bounds, branch.node->bounds.min);
+      base::include(node.bounds, branch.node->bounds.max);
     }
   }
 
@@ -255,7 +256,7 @@ class TreeChange {
       drop_leaves(old);
     }
     const CellContent content = content_of(task.elements);
-    const Bounds bounds = bounds_of(task.elements);
+    const base::Bounds bounds = bounds_of(task.elements);
     while (!is_leaf(content, task.node->id.level) && octant_at(middle, bounds.min) == octant_at(middle, bounds.max)) {
       // All of it lies in one octant.
       const unsigned octant = octant_at(middle, bounds.min);
@@ -392,7 +393,8 @@ void collect_leaves(const std::shared_ptr<const MapNode>& node, std::vector<std:
 
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
                          std::span<const BlockNumber> removed, std::span<const BlockMesh> added,
-                         const BlockLabels& labels, WorkerPool& pool, const std::function<void(double)>& made_share) {
+                         const BlockLabels& labels, jobs::WorkerPool& pool,
+                         const std::function<void(double)>& made_share) {
   return TreeChange(grid, sizes, removed, labels, made_share).run(root, added, pool);
 }
 
@@ -409,4 +411,4 @@ std::shared_ptr<const MapNode> top_of(const std::shared_ptr<const MapNode>& root
   return top;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

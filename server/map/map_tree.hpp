@@ -17,7 +17,7 @@
 #include "server/map/scene_snapshot.hpp"
 #include "server/map/seen_error.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// A cell of the map with all that lies in it. Shared by the versions of the map in which it is the same; not changed any more
 /// once it is part of one.
@@ -30,14 +30,14 @@ struct MapNode {
 
   protocol::TileId id;
   CellContent content;
-  Bounds bounds;                 ///< Of the places of all triangles (their centroids) and of vertices of no triangle.
+  base::Bounds bounds;           ///< Of the places of all triangles (their centroids) and of vertices of no triangle.
   std::vector<Branch> branches;  ///< None: a leaf.
   std::array<CellContent, 8> octants{};  ///< Unless it is a leaf.
   std::shared_ptr<const Tile> tile;      ///< Of a leaf the full mesh; else the coarse one, null above the top.
 
-  std::vector<BlockNumber> blocks;            ///< Of a leaf: whose triangles or vertices it has, ascending.
-  std::vector<fusion::Vec3f> open_positions;  ///< Of a leaf: where vertices on open edges of its surface are.
-  std::optional<LeafFacts> facts;             ///< Of a leaf.
+  std::vector<BlockNumber> blocks;          ///< Of a leaf: whose triangles or vertices it has, ascending.
+  std::vector<base::Vec3f> open_positions;  ///< Of a leaf: where vertices on open edges of its surface are.
+  std::optional<LeafFacts> facts;           ///< Of a leaf.
 
   // Of a coarse tile, for the one above it.
   std::vector<std::uint32_t> weight;  ///< Per vertex: how many vertices of the full mesh it stands for.
@@ -50,7 +50,7 @@ struct MapNode {
 /// A mesh that becomes part of the map.
 struct BlockMesh {
   BlockNumber number = 0;
-  const fusion::MultispectralMesh* mesh = nullptr;
+  const mesh::MultispectralMesh* mesh = nullptr;
   std::vector<StepHalvings> step_halvings;  ///< Per vertex; empty: none are halved.
   BlockBaseline baseline;
 };
@@ -77,7 +77,7 @@ struct ChangedTree {
 /// their names. Must not be called from a job of the pool. `made_share` is told from any thread what share is made.
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
                          std::span<const BlockNumber> removed, std::span<const BlockMesh> added,
-                         const BlockLabels& labels, WorkerPool& pool,
+                         const BlockLabels& labels, jobs::WorkerPool& pool,
                          const std::function<void(double)>& made_share = {});
 
 /// All leaves of a tree, coarse before fine.
@@ -86,4 +86,4 @@ std::vector<std::shared_ptr<const MapNode>> leaves_of(const std::shared_ptr<cons
 /// The lowest node that holds everything: its tile is the first that is seen. Null without a root.
 std::shared_ptr<const MapNode> top_of(const std::shared_ptr<const MapNode>& root);
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-namespace spectra::server {
+namespace spectra::map {
 
-MeshFacts facts_of(const fusion::MultispectralMesh& mesh) {
+MeshFacts facts_of(const mesh::MultispectralMesh& mesh) {
   return {.name = mesh.name,
           .origin = mesh.origin,
           .has_visible = mesh.has_visible,
@@ -17,9 +17,9 @@ MeshFacts facts_of(const fusion::MultispectralMesh& mesh) {
           .triangle_count = mesh.triangle_count()};
 }
 
-fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves,
-                                         const BlockPlaces& blocks, const MeshFacts& facts) {
-  fusion::MultispectralMesh mesh;
+mesh::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves,
+                                       const BlockPlaces& blocks, const MeshFacts& facts) {
+  mesh::MultispectralMesh mesh;
   mesh.name = facts.name;
   mesh.origin = facts.origin;
   mesh.has_visible = facts.has_visible;
@@ -30,8 +30,8 @@ fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const M
   mesh.is_metric = facts.is_metric;
   mesh.resize_vertices(static_cast<std::size_t>(facts.vertex_count));
   mesh.triangles().resize(static_cast<std::size_t>(facts.triangle_count));
-  const std::span<fusion::Vec3f> positions = mesh.positions();
-  const std::span<fusion::Rgb8> visible = mesh.visible();
+  const std::span<base::Vec3f> positions = mesh.positions();
+  const std::span<base::Rgb8> visible = mesh.visible();
   const std::span<float> temperature = mesh.temperature_celsius();
   for (const auto& node : leaves) {
     const bool has_any = std::any_of(node->blocks.begin(), node->blocks.end(),
@@ -50,7 +50,7 @@ fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const M
       // All corners of a triangle are of its block.
       const auto block = blocks.find(block_of(leaf, leaf.triangles[t][0]));
       if (block == blocks.end()) continue;
-      fusion::Triangle& triangle =
+      base::Triangle& triangle =
           mesh.triangles()[static_cast<std::size_t>(block->second.first_triangle + leaf.source_triangle[t])];
       for (unsigned corner = 0; corner < 3; ++corner) {
         triangle[corner] =
@@ -76,4 +76,4 @@ std::vector<float> baseline_of_blocks(std::span<const std::shared_ptr<const MapN
   return result;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

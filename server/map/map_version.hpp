@@ -15,28 +15,28 @@
 #include "server/map/map_tree.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// What a mesh is beside its vertices and triangles.
 struct MeshFacts {
   std::string name;
-  fusion::Vec3d origin;
+  base::Vec3d origin;
   bool has_visible = false, has_temperature = false, double_positions = false;
-  std::vector<fusion::LeftOutVertex> left_out;
-  fusion::UpAxis up = fusion::UpAxis::Z;
+  std::vector<mesh::LeftOutVertex> left_out;
+  base::UpAxis up = base::UpAxis::Z;
   bool is_metric = false;
   std::uint64_t vertex_count = 0, triangle_count = 0;
 };
 
-MeshFacts facts_of(const fusion::MultispectralMesh& mesh);
+MeshFacts facts_of(const mesh::MultispectralMesh& mesh);
 
 /// A block that is part of a map; its mesh is in the leaves.
 struct MapBlock {
   BlockNumber number = 0;
   MeshFacts facts;
-  std::optional<Bounds> core_bounds;
+  std::optional<base::Bounds> core_bounds;
   std::optional<double> observed_at;  ///< Unix seconds.
-  std::vector<fusion::Note> notes;
+  std::vector<files::Note> notes;
 };
 using BlocksByName = std::map<std::string, std::shared_ptr<const MapBlock>, std::less<>>;
 
@@ -48,8 +48,8 @@ struct BlockPlace {
 using BlockPlaces = std::unordered_map<BlockNumber, BlockPlace>;
 
 /// The mesh of some blocks as they were put; the leaves have all of them. `facts` are those of the mesh.
-fusion::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves,
-                                         const BlockPlaces& blocks, const MeshFacts& facts);
+mesh::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves,
+                                       const BlockPlaces& blocks, const MeshFacts& facts);
 
 /// What its vertices are compared with, in the same order.
 std::vector<float> baseline_of_blocks(std::span<const std::shared_ptr<const MapNode>> leaves, const BlockPlaces& blocks,
@@ -64,14 +64,14 @@ inline BlockNumber block_of(const Tile& leaf, std::size_t vertex) {
 struct MapVersion {
   std::uint32_t revision = 0;
   MeshFacts facts;  ///< Of all blocks together.
-  std::vector<fusion::Note> notes;
+  std::vector<files::Note> notes;
   bool is_live = false;
   std::optional<double> oldest_observed_at, newest_observed_at;  ///< Of the blocks that say so, Unix seconds.
   std::optional<std::uint32_t> baseline_mark;                    ///< See SceneSnapshot, as the next.
   std::optional<double> baseline_marked_at;
   /// By block, Unix seconds or NaN: of the baseline of vertices that are compared with themselves.
   std::unordered_map<BlockNumber, double> own_baseline_at;
-  std::optional<Bounds> core_bounds;  ///< Absent: all of it.
+  std::optional<base::Bounds> core_bounds;  ///< Absent: all of it.
   BlocksByName blocks;
   std::vector<std::shared_ptr<const MapNode>> leaves;
   int top_level = 0;                               ///< Of the lowest tile that holds everything.
@@ -84,4 +84,4 @@ struct MapVersion {
 
 std::shared_ptr<const SceneSnapshot> snapshot_of(MapVersion version);
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 int distance(const OctantGroup& a, const OctantGroup& b) {
@@ -71,4 +71,4 @@ std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64
   return groups;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -6,7 +6,7 @@
 
 #include "server/map/cell_content.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 using OctantContents = std::array<CellContent, 8>;
 
@@ -22,4 +22,4 @@ struct OctantGroup {
 std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64_t leaf_vertex_count,
                                        bool has_triangles);
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -11,10 +11,10 @@
 #include "fusion/base/box.hpp"
 #include "fusion/mesh/surface.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 
 /// Half as many to so many vertices are a cell: no more than the smallest patch that is to keep its form.
 constexpr std::uint32_t kCellVertexCount = 44;
@@ -62,11 +62,11 @@ constexpr std::uint8_t kMostHalvings = 24;
 constexpr std::size_t kNegligibleBits = 8 * 4096;
 constexpr int kMostSpareHalvings = 10;
 
-std::array<float, 3> coordinates(const Vec3f& v) {
+std::array<float, 3> coordinates(const base::Vec3f& v) {
   return {v.x, v.y, v.z};
 }
 
-bool is_finite(const Vec3f& v) {
+bool is_finite(const base::Vec3f& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
@@ -81,9 +81,9 @@ std::vector<double> neighbour_distances(const Tile& leaf) {
   if (!leaf.triangles.empty()) {
     const std::size_t stride = leaf.triangles.size() / kSampleCount + 1;
     for (std::size_t t = 0; t < leaf.triangles.size(); t += stride) {
-      const fusion::Triangle& triangle = leaf.triangles[t];
+      const base::Triangle& triangle = leaf.triangles[t];
       for (unsigned corner = 0; corner < 3; ++corner) {
-        keep(squared_distance(leaf.positions[triangle[corner]], leaf.positions[triangle[(corner + 1) % 3]]));
+        keep(mesh::squared_distance(leaf.positions[triangle[corner]], leaf.positions[triangle[(corner + 1) % 3]]));
       }
     }
     return distances;
@@ -91,8 +91,8 @@ std::vector<double> neighbour_distances(const Tile& leaf) {
   const std::size_t stride = leaf.positions.size() / kPointSampleCount + 1;
   for (std::size_t v = 0; v < leaf.positions.size(); v += stride) {
     double nearest = 0;
-    for (const Vec3f& other : leaf.positions) {
-      const double squared = squared_distance(leaf.positions[v], other);
+    for (const base::Vec3f& other : leaf.positions) {
+      const double squared = mesh::squared_distance(leaf.positions[v], other);
       if (squared > 0 && (nearest == 0 || squared < nearest)) nearest = squared;
     }
     keep(nearest);
@@ -101,7 +101,7 @@ std::vector<double> neighbour_distances(const Tile& leaf) {
 }
 
 /// The power of two nearest to a quarter of the median distance between neighbours.
-float usual_step_m(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool) {
+float usual_step_m(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool) {
   std::vector<std::vector<double>> of_leaf(leaves.size());
   pool.for_each(leaves.size(), [&](std::size_t i) { of_leaf[i] = neighbour_distances(*leaves[i]); });
   std::vector<double> distances;
@@ -116,13 +116,13 @@ float usual_step_m(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& po
 /// Vertices that count: in a scene with triangles those of a triangle.
 std::vector<bool> drawn_vertices(const Tile& tile) {
   std::vector<bool> is_drawn(tile.positions.size(), tile.triangles.empty());
-  for (const fusion::Triangle& triangle : tile.triangles) {
+  for (const base::Triangle& triangle : tile.triangles) {
     for (const std::uint32_t v : triangle) is_drawn[v] = true;
   }
   return is_drawn;
 }
 
-double longest_side(const Bounds& box) {
+double longest_side(const base::Bounds& box) {
   return std::max({double{box.max.x} - double{box.min.x}, double{box.max.y} - double{box.min.y},
                    double{box.max.z} - double{box.min.z}});
 }
@@ -135,11 +135,11 @@ std::uint8_t halvings_to(double wanted_m, double step_m) {
 
 /// A box of points and how it wants to be rounded.
 struct Shape {
-  Bounds bounds;
+  base::Bounds bounds;
   std::array<double, 3> side{};
   std::array<double, 3> float_spacing{};  ///< Of coordinates as far out.
 
-  explicit Shape(const Bounds& box) : bounds(box) {
+  explicit Shape(const base::Bounds& box) : bounds(box) {
     const auto low = coordinates(box.min), high = coordinates(box.max);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       side[axis] = double{high[axis]} - double{low[axis]};
@@ -185,7 +185,7 @@ void raise(std::uint8_t& value, std::uint8_t to) {
 }
 
 /// How often `step_m` is halved until all but `may_merge` of these distinct positions stay distinct.
-std::uint8_t halvings_apart(std::span<const Vec3f> positions, std::size_t may_merge, double step_m) {
+std::uint8_t halvings_apart(std::span<const base::Vec3f> positions, std::size_t may_merge, double step_m) {
   std::vector<std::array<double, 3>> rounded(positions.size());
   for (int halvings = 0; halvings < kMostHalvings; ++halvings) {
     const double step = std::ldexp(step_m, -halvings);
@@ -355,9 +355,9 @@ struct PositionSteps::Branch {
 
   /// Splits a range of points in two along its longest side; false where all are in one place. Equal positions stay together.
   static bool split(std::span<Point> points, Node& node, std::size_t& below_count) {
-    Bounds box{points[0].position, points[0].position};
+    base::Bounds box{points[0].position, points[0].position};
     for (const Point& point : points) {
-      const Vec3f& p = point.position;
+      const base::Vec3f& p = point.position;
       box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
       box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
     }
@@ -418,8 +418,8 @@ struct PositionSteps::Branch {
       cell.end = last;
       cell.bounds = {points[0].position, points[0].position};
       for (const Point& point : points) {
-        const Vec3f& p = point.position;
-        Bounds& box = cell.bounds;
+        const base::Vec3f& p = point.position;
+        base::Bounds& box = cell.bounds;
         box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
         box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
       }
@@ -436,7 +436,7 @@ struct PositionSteps::Branch {
   }
 };
 
-PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool,
+PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
                              std::optional<float> largest_step_m) {
   largest_step_m_ = largest_step_m.value_or(usual_step_m(leaves, pool));
   gather(leaves);
@@ -469,7 +469,7 @@ void PositionSteps::gather(std::span<const std::shared_ptr<Tile>> leaves) {
   }
 }
 
-void PositionSteps::cut(WorkerPool& pool) {
+void PositionSteps::cut(jobs::WorkerPool& pool) {
   std::vector<Branch> branches;
   nodes_.resize(1);
   // The top, down to branches that are made in parallel.
@@ -514,11 +514,11 @@ void PositionSteps::cut(WorkerPool& pool) {
   }
 }
 
-void PositionSteps::ask_cells(WorkerPool& pool) {
+void PositionSteps::ask_cells(jobs::WorkerPool& pool) {
   constexpr std::size_t kChunk = 64;
   const auto step_m = static_cast<double>(largest_step_m_);
   pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    std::vector<Vec3f> positions;
+    std::vector<base::Vec3f> positions;
     for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
       Cell& cell = cells_[c];
       positions.clear();
@@ -539,7 +539,7 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
   Pieces pieces(source_count);
   for (const auto& leaf : leaves) {
     has_triangles = has_triangles || !leaf->triangles.empty();
-    for (const fusion::Triangle& t : leaf->triangles) {
+    for (const base::Triangle& t : leaf->triangles) {
       const std::uint32_t first = leaf->source_vertex[t[0]];
       pieces.join(first, leaf->source_vertex[t[1]]);
       pieces.join(first, leaf->source_vertex[t[2]]);
@@ -551,15 +551,15 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
   constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number_of(source_count, kNone);
   struct Piece {
-    Bounds bounds;
+    base::Bounds bounds;
     std::uint32_t count = 0;
     StepHalvings halvings{};
-    std::vector<Vec3f> positions;  ///< Of a small one.
+    std::vector<base::Vec3f> positions;  ///< Of a small one.
   };
   std::vector<Piece> all;
   for (const Cell& cell : cells_) {
     for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-      const Vec3f& p = points_[i].position;
+      const base::Vec3f& p = points_[i].position;
       std::uint32_t& number = number_of[pieces.of(points_[i].source)];
       if (number == kNone) {
         number = static_cast<std::uint32_t>(all.size());
@@ -608,7 +608,7 @@ void PositionSteps::for_each_cell(const std::array<double, 3>& low, const std::a
   }
 }
 
-void PositionSteps::ask_neighbours(WorkerPool& pool) {
+void PositionSteps::ask_neighbours(jobs::WorkerPool& pool) {
   constexpr std::size_t kChunk = 64;
   for (Cell& cell : cells_) cell.halvings = finer(cell.halvings, cell.own);
   pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
@@ -638,7 +638,7 @@ void PositionSteps::ask_neighbours(WorkerPool& pool) {
 }
 
 void PositionSteps::limit_to_one_tile() {
-  std::vector<Vec3f> corners;
+  std::vector<base::Vec3f> corners;
   for (const Cell& cell : cells_) {
     corners.push_back(cell.bounds.min);
     corners.push_back(cell.bounds.max);
@@ -653,7 +653,7 @@ void PositionSteps::limit_to_one_tile() {
   }
 }
 
-void PositionSteps::keep_sides(WorkerPool& pool) {
+void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
   constexpr std::size_t kChunk = 16;
   const auto step_m = static_cast<double>(largest_step_m_);
   halvings_.resize(points_.size());
@@ -779,7 +779,7 @@ void PositionSteps::keep_sides_of(const Neighbourhood& around, std::span<const s
     const float at_low = low[axis] - ends.rounded_low(axis), at_high = ends.rounded_high(axis) - high[axis];
     if (std::abs(at_low + at_high) <= kMost * side) continue;
     const auto absolute = [&](const std::array<float, 3>& p) {
-      return Vec3f{p[0] + around.corner[0], p[1] + around.corner[1], p[2] + around.corner[2]};
+      return base::Vec3f{p[0] + around.corner[0], p[1] + around.corner[1], p[2] + around.corner[2]};
     };
     if (!Shape({absolute(low), absolute(high)}).has_side(axis)) continue;
     // One end where that is enough: the worse one.
@@ -818,7 +818,7 @@ void PositionSteps::keep_end(const Neighbourhood& around, std::span<const std::u
   }
 }
 
-StepHalvings PositionSteps::halvings_at(const Vec3f& position) const {
+StepHalvings PositionSteps::halvings_at(const base::Vec3f& position) const {
   const auto p = coordinates(position);
   const Node* node = &nodes_[0];
   while (node->axis != kNoAxis) node = &nodes_[node->below + (p[node->axis] < node->split ? 0 : 1)];
@@ -842,4 +842,4 @@ void PositionSteps::apply(Tile& tile) const {
   if (is_any) tile.step_halvings = std::move(halvings);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -11,7 +11,7 @@
 #include "server/jobs/worker_pool.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// How finely the positions of a scene are rounded where: a power of two in metres for every place and axis, so that all
 /// lattices are parts of one. A position alone decides its step: whatever tiles and levels hold a vertex, it is rounded to
@@ -29,7 +29,7 @@ class PositionSteps {
  public:
   /// Of the full mesh; the same for any number of threads. `largest_step_m`: that of the map it becomes part of, a power of two.
   /// Must not be called from a job of the pool.
-  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, WorkerPool& pool,
+  PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
                 std::optional<float> largest_step_m = std::nullopt);
 
   /// The coarsest step that any vertex may have; a power of two.
@@ -41,13 +41,13 @@ class PositionSteps {
  private:
   /// A few neighbouring vertices.
   struct Cell {
-    Bounds bounds;
+    base::Bounds bounds;
     std::uint32_t begin = 0, end = 0;  ///< In points_.
     StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood. Of all its vertices.
     bool is_dense = false;             ///< Its vertices would fall together at the usual step.
   };
   struct Point {
-    fusion::Vec3f position;
+    base::Vec3f position;
     std::uint32_t source = 0;
   };
   /// Halves what is left of it: below `split` on `axis` is `below`, the rest `below + 1`; without an axis it is a cell.
@@ -68,12 +68,12 @@ class PositionSteps {
   static constexpr std::uint8_t kNoAxis = 3;
 
   void gather(std::span<const std::shared_ptr<Tile>> leaves);
-  void cut(WorkerPool& pool);
-  void ask_cells(WorkerPool& pool);
+  void cut(jobs::WorkerPool& pool);
+  void ask_cells(jobs::WorkerPool& pool);
   void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
-  void ask_neighbours(WorkerPool& pool);
+  void ask_neighbours(jobs::WorkerPool& pool);
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
-  void keep_sides(WorkerPool& pool);
+  void keep_sides(jobs::WorkerPool& pool);
   void keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round);
   void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
                      std::vector<StepHalvings>& wanted);
@@ -82,7 +82,7 @@ class PositionSteps {
                 int direction, float least, float most, std::vector<StepHalvings>& wanted);
   /// No step is finer than a tile of half the scene can have: neighbours would differ on their border.
   void limit_to_one_tile();
-  StepHalvings halvings_at(const fusion::Vec3f& position) const;
+  StepHalvings halvings_at(const base::Vec3f& position) const;
   /// Calls `visit(cell)` for the cells that reach into a box.
   template <class Visit>
   void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
@@ -96,4 +96,4 @@ class PositionSteps {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident_;  ///< Vertices in the same place.
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -15,10 +15,10 @@
 #include "server/map/living_map.hpp"
 #include "server/map/map_version.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 
 using Leaves = std::vector<std::shared_ptr<const MapNode>>;
 
@@ -72,8 +72,8 @@ class FactSource {
   std::optional<fusion::Hues> hues_;
 };
 
-double triangle_area(Vec3f a, Vec3f b, Vec3f c) {
-  const auto edge = [a](Vec3f to) {
+double triangle_area(base::Vec3f a, base::Vec3f b, base::Vec3f c) {
+  const auto edge = [a](base::Vec3f to) {
     return std::array{double{to.x} - double{a.x}, double{to.y} - double{a.y}, double{to.z} - double{a.z}};
   };
   const auto u = edge(b);
@@ -84,7 +84,7 @@ double triangle_area(Vec3f a, Vec3f b, Vec3f c) {
 /// The surface that each vertex of a leaf stands for: a third of its triangles.
 std::vector<float> vertex_areas(const Tile& leaf) {
   std::vector<float> areas(leaf.positions.size());
-  for (const fusion::Triangle& triangle : leaf.triangles) {
+  for (const base::Triangle& triangle : leaf.triangles) {
     const double area =
         triangle_area(leaf.positions[triangle[0]], leaf.positions[triangle[1]], leaf.positions[triangle[2]]);
     for (const std::uint32_t v : triangle) areas[v] += static_cast<float>(area / 3);
@@ -147,7 +147,7 @@ class TiledSnapshot final : public SceneSnapshot {
       next.first_vertex += block->facts.vertex_count;
       next.first_triangle += block->facts.triangle_count;
     }
-    std::vector<Vec3f> corners;
+    std::vector<base::Vec3f> corners;
     for (const auto& leaf : version_.leaves) {
       corners.push_back(leaf->tile->bounds.min);
       corners.push_back(leaf->tile->bounds.max);
@@ -171,12 +171,12 @@ class TiledSnapshot final : public SceneSnapshot {
   std::uint64_t vertex_count() const override { return version_.facts.vertex_count; }
   std::uint64_t triangle_count() const override { return version_.facts.triangle_count; }
   bool is_point_cloud() const override { return version_.facts.triangle_count == 0; }
-  fusion::Vec3d origin() const override { return version_.facts.origin; }
-  const Bounds& bounds() const override { return bounds_; }
-  const Bounds& core_bounds() const override { return core_bounds_; }
-  fusion::UpAxis up() const override { return version_.facts.up; }
+  base::Vec3d origin() const override { return version_.facts.origin; }
+  const base::Bounds& bounds() const override { return bounds_; }
+  const base::Bounds& core_bounds() const override { return core_bounds_; }
+  base::UpAxis up() const override { return version_.facts.up; }
   bool is_metric() const override { return version_.facts.is_metric; }
-  std::span<const fusion::Note> notes() const override { return version_.notes; }
+  std::span<const files::Note> notes() const override { return version_.notes; }
   bool is_live() const override { return version_.is_live; }
   std::optional<std::pair<double, double>> observed() const override {
     if (!version_.oldest_observed_at) return std::nullopt;
@@ -199,12 +199,12 @@ class TiledSnapshot final : public SceneSnapshot {
     return static_cast<std::uint32_t>(places_.at(block_of(leaf, v)).first_vertex) + leaf.source_vertex[v];
   }
 
-  std::optional<Probe> probe(Vec3f position) const override {
+  std::optional<Probe> probe(base::Vec3f position) const override {
     if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) return {};
     std::vector<std::pair<double, const Tile*>> by_distance;
     by_distance.reserve(version_.leaves.size());
     for (const auto& leaf : version_.leaves) {
-      by_distance.emplace_back(squared_distance_to_box(position, leaf->tile->bounds), leaf->tile.get());
+      by_distance.emplace_back(mesh::squared_distance_to_box(position, leaf->tile->bounds), leaf->tile.get());
     }
     std::sort(by_distance.begin(), by_distance.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     const Tile* best_tile = nullptr;
@@ -213,7 +213,7 @@ class TiledSnapshot final : public SceneSnapshot {
     for (const auto& [box_squared, tile] : by_distance) {
       if (best_tile != nullptr && box_squared > best_squared) break;
       for (std::size_t v = 0; v < tile->owned_count; ++v) {
-        const double squared = squared_distance(position, tile->positions[v]);
+        const double squared = mesh::squared_distance(position, tile->positions[v]);
         if (best_tile == nullptr || squared < best_squared ||
             (squared == best_squared && is_rather_told(*tile, v, *best_tile, best_vertex))) {
           best_tile = tile;
@@ -236,13 +236,13 @@ class TiledSnapshot final : public SceneSnapshot {
     return result;
   }
 
-  std::optional<fusion::MultispectralMesh> block_mesh(std::string_view id) const override {
+  std::optional<mesh::MultispectralMesh> block_mesh(std::string_view id) const override {
     const auto block = version_.blocks.find(id);
     if (block == version_.blocks.end()) return std::nullopt;
     return mesh_of_blocks(version_.leaves, {{block->second->number, BlockPlace{}}}, block->second->facts);
   }
 
-  fusion::MultispectralMesh whole_mesh() const override {
+  mesh::MultispectralMesh whole_mesh() const override {
     return mesh_of_blocks(version_.leaves, places_, version_.facts);
   }
 
@@ -299,7 +299,7 @@ class TiledSnapshot final : public SceneSnapshot {
 
   MapVersion version_;
   BlockPlaces places_;
-  Bounds bounds_, core_bounds_;
+  base::Bounds bounds_, core_bounds_;
   std::shared_ptr<const fusion::SceneTemperature> temperature_;
   std::unique_ptr<SurfaceShare> share_;
   Place hottest_, coldest_, over_range_, under_range_;
@@ -311,13 +311,13 @@ std::shared_ptr<const SceneSnapshot> snapshot_of(MapVersion version) {
   return std::make_shared<TiledSnapshot>(std::move(version));
 }
 
-std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(fusion::LoadedScene scene, std::uint32_t revision,
-                                                          WorkerPool& pool, std::uint32_t leaf_vertex_count,
-                                                          LevelsOfDetail levels, const fusion::Progress& progress) {
+std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(files::LoadedScene scene, std::uint32_t revision,
+                                                          jobs::WorkerPool& pool, std::uint32_t leaf_vertex_count,
+                                                          LevelsOfDetail levels, const base::Progress& progress) {
   LivingMap map({.levels = levels, .leaf_vertex_count = leaf_vertex_count});
   MapChange change;
   change.put.push_back({.id = "scene", .scene = std::move(scene), .observed_at = {}});
   return map.apply(std::move(change), revision, pool, progress);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -21,9 +21,7 @@
 #include "server/jobs/worker_pool.hpp"
 #include "server/map/vertex_times.hpp"
 
-namespace spectra::server {
-
-using fusion::Bounds;
+namespace spectra::map {
 
 /// How many times the position step is halved for a vertex, along each axis.
 using StepHalvings = std::array<std::uint8_t, 3>;
@@ -39,13 +37,13 @@ struct Tile {
   float colour_error_levels = 0;
   float temperature_error_celsius = 0;  ///< The same of the temperature; NaN = none has one.
   float lost_detail_m = 0;              ///< Size of the largest detail that is seen wrong; 0 at leaves.
-  Bounds bounds;
+  base::Bounds bounds;
   /// Of the geometry under this tile in the full mesh; NaN = no temperature, infinite = beyond the sensor's range.
   float lowest_celsius = 0;
   float highest_celsius = 0;
   std::uint32_t owned_count = 0;
-  std::vector<fusion::Vec3f> positions;
-  std::vector<fusion::Rgb8> visible;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Rgb8> visible;
   std::vector<float> temperature_celsius;
   std::uint32_t block = 0;                   ///< The block of the map that it is of, or its first vertex.
   std::vector<std::uint32_t> vertex_block;   ///< Per vertex; empty: all are of `block`.
@@ -57,16 +55,16 @@ struct Tile {
   std::vector<float> baseline_celsius;
   VertexTimes baseline_at;  ///< Of a leaf: the times they are of.
   std::uint32_t baseline_mark = 0;
-  std::vector<fusion::Triangle> triangles;     ///< Indices into this tile; empty for a point cloud.
+  std::vector<base::Triangle> triangles;       ///< Indices into this tile; empty for a point cloud.
   std::vector<std::uint32_t> source_triangle;  ///< Index in its block, per triangle (leaves).
 };
 
 /// The vertex nearest to a place, at full accuracy.
 struct Probe {
   std::uint32_t vertex_index = 0;            ///< In the input's order.
-  fusion::Vec3f position;                    ///< Metres relative to the scene origin.
+  base::Vec3f position;                      ///< Metres relative to the scene origin.
   std::optional<float> temperature_celsius;  ///< Infinite where the sensor was beyond its range.
-  fusion::Rgb8 visible;
+  base::Rgb8 visible;
   double distance_m = 0;
   std::optional<double> observed_at;  ///< Unix seconds.
   /// What the temperature is compared with, and the time that is of: later than that it was another, or has not been looked at.
@@ -76,7 +74,7 @@ struct Probe {
 
 /// Where it is hottest or coldest.
 struct Extreme {
-  fusion::Vec3f position;
+  base::Vec3f position;
   float temperature_celsius = 0;
 };
 
@@ -99,16 +97,17 @@ class SceneSnapshot {
   /// Cuts the mesh into octree leaves of about `leaf_vertex_count` vertices (small ones merged with a neighbour).
   /// Consumes the mesh so that peak memory stays low. `revision` rises with every snapshot of a store. The same tiles
   /// for any number of threads. Must not be called from a job of the pool. `progress` is told of kTilingPhase.
-  static std::shared_ptr<const SceneSnapshot> build(fusion::LoadedScene scene, std::uint32_t revision, WorkerPool& pool,
+  static std::shared_ptr<const SceneSnapshot> build(files::LoadedScene scene, std::uint32_t revision,
+                                                    jobs::WorkerPool& pool,
                                                     std::uint32_t leaf_vertex_count = kLeafVertexCount,
                                                     LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
-                                                    const fusion::Progress& progress = {});
+                                                    const base::Progress& progress = {});
   /// The same for a mesh of which nothing has to be said.
-  static std::shared_ptr<const SceneSnapshot> build(fusion::MultispectralMesh mesh, std::uint32_t revision,
-                                                    WorkerPool& pool,
+  static std::shared_ptr<const SceneSnapshot> build(mesh::MultispectralMesh mesh, std::uint32_t revision,
+                                                    jobs::WorkerPool& pool,
                                                     std::uint32_t leaf_vertex_count = kLeafVertexCount,
                                                     LevelsOfDetail levels = LevelsOfDetail::LeavesOnly) {
-    return build(fusion::LoadedScene{std::move(mesh), {}, {}}, revision, pool, leaf_vertex_count, levels);
+    return build(files::LoadedScene{std::move(mesh), {}, {}}, revision, pool, leaf_vertex_count, levels);
   }
   virtual ~SceneSnapshot() = default;
 
@@ -117,15 +116,15 @@ class SceneSnapshot {
   virtual std::uint64_t vertex_count() const = 0;
   virtual std::uint64_t triangle_count() const = 0;
   virtual bool is_point_cloud() const = 0;
-  virtual fusion::Vec3d origin() const = 0;
-  virtual const Bounds& bounds() const = 0;
+  virtual base::Vec3d origin() const = 0;
+  virtual const base::Bounds& bounds() const = 0;
   /// Of all that is worth a look: bounds() without the few vertices that lie far from everything else.
-  virtual const Bounds& core_bounds() const = 0;
-  virtual fusion::UpAxis up() const = 0;
+  virtual const base::Bounds& core_bounds() const = 0;
+  virtual base::UpAxis up() const = 0;
   /// Somebody has said that positions are in metres; otherwise they are taken for it.
   virtual bool is_metric() const = 0;
   /// What was noticed while the scene was read.
-  virtual std::span<const fusion::Note> notes() const = 0;
+  virtual std::span<const files::Note> notes() const = 0;
   /// A version of a map that began empty and is expected to grow.
   virtual bool is_live() const { return false; }
   /// When the oldest and the newest part was seen, Unix seconds; of the parts of which that is known.
@@ -146,7 +145,7 @@ class SceneSnapshot {
   virtual std::uint32_t vertex_index(const Tile& leaf, std::size_t vertex) const = 0;
   /// Of several equally near vertices the one that was seen last, and of those the first of the input; nothing in an empty scene
   /// or at a position that is not finite.
-  virtual std::optional<Probe> probe(fusion::Vec3f position) const = 0;
+  virtual std::optional<Probe> probe(base::Vec3f position) const = 0;
   /// Of the finite temperatures; of several the first of the input; nothing without thermal data.
   virtual std::optional<Extreme> hottest() const = 0;
   virtual std::optional<Extreme> coldest() const = 0;
@@ -161,9 +160,9 @@ class SceneSnapshot {
   /// area, which share of the vertices. Thread-safe.
   virtual double highlighted_share(const fusion::FusionPlan& plan) const = 0;
   /// A block as it was put, its positions relative to the origin; nothing when there is none of that name.
-  virtual std::optional<fusion::MultispectralMesh> block_mesh(std::string_view id) const = 0;
+  virtual std::optional<mesh::MultispectralMesh> block_mesh(std::string_view id) const = 0;
   /// The scene as it was read, vertices and triangles in the input's order; for exports. Costs a full copy.
-  virtual fusion::MultispectralMesh whole_mesh() const = 0;
+  virtual mesh::MultispectralMesh whole_mesh() const = 0;
   /// What the vertices of whole_mesh() are compared with; empty where baseline_mark() is nothing.
   virtual std::vector<float> whole_baseline() const { return {}; }
 };
@@ -175,4 +174,4 @@ inline std::span<const float> baseline_of(const Tile& tile, std::optional<std::u
   return is_kept ? std::span<const float>(tile.baseline_celsius) : std::span<const float>(tile.temperature_celsius);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 /// A map may double the extent of its first block so often.
@@ -24,9 +24,9 @@ std::shared_ptr<const SceneSnapshot> SceneStore::current() const {
   return current_;
 }
 
-std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene scene, WorkerPool& pool,
+std::shared_ptr<const SceneSnapshot> SceneStore::replace(files::LoadedScene scene, jobs::WorkerPool& pool,
                                                          LevelsOfDetail levels, const Listener& before,
-                                                         const fusion::Progress& progress) {
+                                                         const base::Progress& progress) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   map_ = std::make_shared<LivingMap>(LivingMap::Options{.levels = levels, .first_level = kFirstLevel});
@@ -35,7 +35,7 @@ std::shared_ptr<const SceneSnapshot> SceneStore::replace(fusion::LoadedScene sce
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool, progress), before);
 }
 
-std::shared_ptr<const SceneSnapshot> SceneStore::change(MapChange change, WorkerPool& pool) {
+std::shared_ptr<const SceneSnapshot> SceneStore::change(MapChange change, jobs::WorkerPool& pool) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
   if (!map_) {
@@ -89,14 +89,14 @@ std::shared_ptr<const SceneSnapshot> SceneStore::mark_baseline(double marked_at)
   return publish(map_->mark_baseline(marked_at, previous ? previous->revision() + 1 : 1), {});
 }
 
-BlockBaseline SceneStore::handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+BlockBaseline SceneStore::handed_on(std::string_view id, const mesh::MultispectralMesh& mesh,
                                     std::optional<double> observed_at) const {
   const std::lock_guard replacing(replace_mutex_);
   return map_ ? map_->handed_on(id, mesh, observed_at) : BlockBaseline{};
 }
 
-std::optional<fusion::Error> SceneStore::refusal_of(std::span<const BlockShape> put,
-                                                    std::span<const std::string> removed) const {
+std::optional<base::Error> SceneStore::refusal_of(std::span<const BlockShape> put,
+                                                  std::span<const std::string> removed) const {
   const std::lock_guard replacing(replace_mutex_);
   return map_ ? map_->refusal_of(put, removed) : std::nullopt;
 }
@@ -128,4 +128,4 @@ SceneStore::Subscription SceneStore::subscribe(Listener listener) {
   return Subscription(std::move(shared));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -14,7 +14,7 @@
 #include "server/map/living_map.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// Holds the map that is served, and its version of now. Thread-safe; readers take the pointer and never wait for a build.
 class SceneStore {
@@ -39,18 +39,18 @@ class SceneStore {
   /// Begins another map, of one block named kFileBlock: builds a snapshot with the next revision (from 1), makes it current, then tells the subscribers in this thread. Calls
   /// from several threads are served one after the other, so that revisions only rise. Must not be called from a job of
   /// the pool or from a listener. `before` is called with the snapshot before it becomes current, `progress` as by build().
-  std::shared_ptr<const SceneSnapshot> replace(fusion::LoadedScene scene, WorkerPool& pool,
+  std::shared_ptr<const SceneSnapshot> replace(files::LoadedScene scene, jobs::WorkerPool& pool,
                                                LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
-                                               const Listener& before = {}, const fusion::Progress& progress = {});
+                                               const Listener& before = {}, const base::Progress& progress = {});
   /// The same for a mesh of which nothing has to be said.
-  std::shared_ptr<const SceneSnapshot> replace(fusion::MultispectralMesh mesh, WorkerPool& pool,
+  std::shared_ptr<const SceneSnapshot> replace(mesh::MultispectralMesh mesh, jobs::WorkerPool& pool,
                                                LevelsOfDetail levels = LevelsOfDetail::LeavesOnly,
                                                const Listener& before = {}) {
-    return replace(fusion::LoadedScene{std::move(mesh), {}, {}}, pool, levels, before);
+    return replace(files::LoadedScene{std::move(mesh), {}, {}}, pool, levels, before);
   }
 
   /// Changes the map (an empty one begins with this), in the same way; there is no refusal_of() it.
-  std::shared_ptr<const SceneSnapshot> change(MapChange change, WorkerPool& pool);
+  std::shared_ptr<const SceneSnapshot> change(MapChange change, jobs::WorkerPool& pool);
 
   /// Makes one of the coarse tiles that do not show yet what has changed beneath them, beside all changes, and publishes the map with
   /// it. False when there is none. One thread at a time.
@@ -68,12 +68,12 @@ class SceneStore {
   /// See LivingMap::mark_baseline(). Null where there is no map yet.
   std::shared_ptr<const SceneSnapshot> mark_baseline(double marked_at);
   /// See LivingMap::handed_on().
-  BlockBaseline handed_on(std::string_view id, const fusion::MultispectralMesh& mesh,
+  BlockBaseline handed_on(std::string_view id, const mesh::MultispectralMesh& mesh,
                           std::optional<double> observed_at) const;
   /// Of the map, once it had a block.
   std::optional<MapConstants> constants() const;
   /// See LivingMap::refusal_of().
-  std::optional<fusion::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
+  std::optional<base::Error> refusal_of(std::span<const BlockShape> put, std::span<const std::string> removed) const;
 
   /// The block that a file becomes.
   static constexpr std::string_view kFileBlock = "scene";
@@ -88,4 +88,4 @@ class SceneStore {
   std::vector<std::weak_ptr<Listener>> listeners_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::map

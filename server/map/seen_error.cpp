@@ -9,11 +9,11 @@
 #include "fusion/base/box.hpp"
 #include "fusion/mesh/heat_spots.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
 
 constexpr std::size_t kLeafSamples = 1024;
 constexpr std::size_t kMostSamples = 4096;
@@ -25,7 +25,7 @@ constexpr double kLeastShare = 1.0 / 32;
 /// Cells from a 1024th to an eighth of the tile.
 constexpr int kFinestBits = 10, kCoarsestBits = 3;
 
-std::array<double, 3> channels_of(const fusion::Rgb8& c) {
+std::array<double, 3> channels_of(const base::Rgb8& c) {
   return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)};
 }
 
@@ -33,10 +33,10 @@ Shown shown_at_vertex(const Tile& tile, std::uint32_t v) {
   return {channels_of(tile.visible[v]), static_cast<double>(tile.temperature_celsius[v])};
 }
 
-Shown shown_at(const Tile& tile, const Surface& surface, const Vec3f& p, std::uint32_t start) {
+Shown shown_at(const Tile& tile, const mesh::Surface& surface, const base::Vec3f& p, std::uint32_t start) {
   if (surface.triangles().empty() || surface.triangles_around(start).empty()) return shown_at_vertex(tile, start);
-  const Triangle& t = surface.triangles()[surface.triangle_near(p, start, 0).triangle];
-  const auto weights = nearest_weights(p, tile.positions[t[0]], tile.positions[t[1]], tile.positions[t[2]]);
+  const base::Triangle& t = surface.triangles()[surface.triangle_near(p, start, 0).triangle];
+  const auto weights = mesh::nearest_weights(p, tile.positions[t[0]], tile.positions[t[1]], tile.positions[t[2]]);
   Shown shown;
   double celsius_weight = 0;
   for (unsigned i = 0; i < 3; ++i) {
@@ -98,7 +98,7 @@ double largest_percentile(const Parts& parts) {
   return largest;
 }
 
-std::size_t part_of(const Vec3f& p, const Bounds& bounds) {
+std::size_t part_of(const base::Vec3f& p, const base::Bounds& bounds) {
   const auto along = [](float at, float low, float high) {
     const double share = high > low ? (static_cast<double>(at) - static_cast<double>(low)) /
                                           (static_cast<double>(high) - static_cast<double>(low))
@@ -116,8 +116,8 @@ std::vector<FullSample> leaf_samples(const Tile& leaf) {
   double area = 0;
   std::vector<double> areas;
   areas.reserve(leaf.triangles.size());
-  for (const Triangle& t : leaf.triangles) {
-    areas.push_back(triangle_area(leaf.positions[t[0]], leaf.positions[t[1]], leaf.positions[t[2]]));
+  for (const base::Triangle& t : leaf.triangles) {
+    areas.push_back(mesh::triangle_area(leaf.positions[t[0]], leaf.positions[t[1]], leaf.positions[t[2]]));
     area += areas.back();
   }
   const std::size_t elements = leaf.triangles.empty() ? leaf.positions.size() : leaf.triangles.size();
@@ -145,7 +145,7 @@ std::vector<FullSample> leaf_samples(const Tile& leaf) {
         u = 1 - u;
         w = 1 - w;
       }
-      const Triangle& t = leaf.triangles[i];
+      const base::Triangle& t = leaf.triangles[i];
       const auto mix = [&](auto value) {
         return static_cast<float>((1 - u - w) * static_cast<double>(value(t[0])) +
                                   u * static_cast<double>(value(t[1])) + w * static_cast<double>(value(t[2])));
@@ -175,7 +175,7 @@ void thin_out(std::vector<FullSample>& samples) {
   samples.resize(kept);
 }
 
-void measure_seen_error(Tile& tile, const Surface& surface, std::span<const FullSample> samples) {
+void measure_seen_error(Tile& tile, const mesh::Surface& surface, std::span<const FullSample> samples) {
   Parts colour, temperature;
   for (const FullSample& sample : samples) {
     const std::size_t part = part_of(sample.position, tile.bounds);
@@ -192,14 +192,14 @@ void measure_seen_error(Tile& tile, const Surface& surface, std::span<const Full
   if (!std::isnan(tile.lowest_celsius)) raise(tile.temperature_error_celsius, largest_percentile(temperature));
 }
 
-double lost_detail_m(const Tile& tile, const Surface& surface, const MergedTiles& mesh, const Surface& fine,
+double lost_detail_m(const Tile& tile, const mesh::Surface& surface, const MergedTiles& mesh, const mesh::Surface& fine,
                      const Thinning& thinning, const SeenContrast& contrast) {
   struct Excess {
     std::uint64_t cell;
     std::array<double, 4> sum;  // In contrasts times square metres.
   };
-  const std::vector<double> areas = vertex_areas(fine);
-  const Bounds& bounds = tile.bounds;
+  const std::vector<double> areas = mesh::vertex_areas(fine);
+  const base::Bounds& bounds = tile.bounds;
   const auto extent = static_cast<double>(
       std::max({bounds.max.x - bounds.min.x, bounds.max.y - bounds.min.y, bounds.max.z - bounds.min.z}));
   if (!(extent > 0) || !std::isfinite(extent)) return 0;
@@ -208,7 +208,7 @@ double lost_detail_m(const Tile& tile, const Surface& surface, const MergedTiles
   for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
     if (!(areas[v] > 0)) continue;
     const std::uint32_t k = thinning.kept_of_merged[v];
-    const Vec3f& p = mesh.positions[v];
+    const base::Vec3f& p = mesh.positions[v];
     const Shown shown = thinning.kept[k] == v ? shown_at_vertex(tile, k) : shown_at(tile, surface, p, k);
     const auto channels = channels_of(mesh.visible[v]);
     Excess excess{};
@@ -219,7 +219,7 @@ double lost_detail_m(const Tile& tile, const Surface& surface, const MergedTiles
       const double share = (static_cast<double>(c) - static_cast<double>(low)) / extent;
       return static_cast<std::uint32_t>(std::clamp(share * (1 << kFinestBits), 0.0, (1 << kFinestBits) - 1.0));
     };
-    excess.cell = morton_code(cell(p.x, bounds.min.x), cell(p.y, bounds.min.y), cell(p.z, bounds.min.z));
+    excess.cell = base::morton_code(cell(p.x, bounds.min.x), cell(p.y, bounds.min.y), cell(p.z, bounds.min.z));
     excesses.push_back(excess);
   }
   std::sort(excesses.begin(), excesses.end(), [](const Excess& a, const Excess& b) { return a.cell < b.cell; });
@@ -247,4 +247,4 @@ double lost_detail_m(const Tile& tile, const Surface& surface, const MergedTiles
   return std::sqrt(largest_squared);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -9,14 +9,14 @@
 #include "fusion/mesh/point_groups.hpp"
 #include "fusion/mesh/simplify.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Rgb8;
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Rgb8;
+using base::Triangle;
+using base::Vec3f;
 
-constexpr std::uint32_t kNone = Surface::kNone;
+constexpr std::uint32_t kNone = mesh::Surface::kNone;
 
 /// What is between the measured samples may be farther away than they are.
 constexpr double kErrorMargin = 1.1;
@@ -24,18 +24,19 @@ constexpr double kErrorMargin = 1.1;
 constexpr double kMostOutliers = 1.0 / 8;
 
 /// The triangles with each vertex replaced by what stands for it, without those that become degenerate.
-std::vector<Triangle> mapped(const std::vector<Triangle>& triangles, std::span<const std::uint32_t> standing) {
-  std::vector<Triangle> result;
-  for (const Triangle& t : triangles) {
-    const Triangle image{standing[t[0]], standing[t[1]], standing[t[2]]};
+std::vector<base::Triangle> mapped(const std::vector<base::Triangle>& triangles,
+                                   std::span<const std::uint32_t> standing) {
+  std::vector<base::Triangle> result;
+  for (const base::Triangle& t : triangles) {
+    const base::Triangle image{standing[t[0]], standing[t[1]], standing[t[2]]};
     if (image[0] != image[1] && image[1] != image[2] && image[2] != image[0]) result.push_back(image);
   }
   return result;
 }
 
-std::vector<bool> are_used(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+std::vector<bool> are_used(const std::vector<base::Triangle>& triangles, std::size_t vertex_count) {
   std::vector<bool> is_used(vertex_count);
-  for (const Triangle& t : triangles) {
+  for (const base::Triangle& t : triangles) {
     for (const std::uint32_t v : t) is_used[v] = true;
   }
   return is_used;
@@ -45,7 +46,7 @@ std::vector<bool> are_used(const std::vector<Triangle>& triangles, std::size_t v
 class GroupMeans {
  public:
   GroupMeans(std::span<const std::uint32_t> members, std::span<const std::uint32_t> standing,
-             std::span<const Rgb8> visible, std::span<const float> celsius, std::span<const std::uint32_t> weight)
+             std::span<const base::Rgb8> visible, std::span<const float> celsius, std::span<const std::uint32_t> weight)
       : means_(standing.size()) {
     for (const std::uint32_t v : members) {
       Mean& mean = means_[standing[v]];
@@ -67,7 +68,7 @@ class GroupMeans {
     }
   }
 
-  Rgb8 colour(std::uint32_t group) const {
+  base::Rgb8 colour(std::uint32_t group) const {
     const Mean& mean = means_[group];
     const auto channel = [&](double sum) { return static_cast<std::uint8_t>(std::lround(sum / mean.weight)); };
     return {channel(mean.r), channel(mean.g), channel(mean.b)};
@@ -104,14 +105,14 @@ class GroupMeans {
 /// The nearest of some points, for the few vertices that no edge connects to one.
 class NearestPoint {
  public:
-  NearestPoint(std::span<const Vec3f> positions, std::vector<std::uint32_t> points)
+  NearestPoint(std::span<const base::Vec3f> positions, std::vector<std::uint32_t> points)
       : positions_(positions), points_(std::move(points)) {
     std::sort(points_.begin(), points_.end(), [&](std::uint32_t a, std::uint32_t b) {
       return std::pair(positions[a].x, a) < std::pair(positions[b].x, b);
     });
   }
 
-  std::uint32_t operator()(const Vec3f& p) const {
+  std::uint32_t operator()(const base::Vec3f& p) const {
     const auto middle = std::lower_bound(points_.begin(), points_.end(), p.x,
                                          [&](std::uint32_t v, float x) { return positions_[v].x < x; });
     std::uint32_t best = points_.front();
@@ -119,7 +120,7 @@ class NearestPoint {
     const auto is_beyond = [&](std::uint32_t v) {
       const double dx = static_cast<double>(positions_[v].x) - static_cast<double>(p.x);
       if (dx * dx > best_squared) return true;
-      const double squared = squared_distance(p, positions_[v]);
+      const double squared = mesh::squared_distance(p, positions_[v]);
       if (squared < best_squared || (squared == best_squared && v < best)) {
         best_squared = squared;
         best = v;
@@ -134,12 +135,12 @@ class NearestPoint {
   }
 
  private:
-  std::span<const Vec3f> positions_;
+  std::span<const base::Vec3f> positions_;
   std::vector<std::uint32_t> points_;
 };
 
 /// Joins vertices near each other until few enough are left. What differs much from its group decides for it: it must not be lost.
-void join_near_vertices(Simplified& mesh, const MergedTiles& merged, const std::vector<bool>& is_locked,
+void join_near_vertices(mesh::Simplified& mesh, const MergedTiles& merged, const std::vector<bool>& is_locked,
                         const ThinningOptions& options) {
   const std::vector<bool> is_used = are_used(mesh.triangles, merged.positions.size());
   std::vector<std::uint32_t> free;
@@ -154,7 +155,7 @@ void join_near_vertices(Simplified& mesh, const MergedTiles& merged, const std::
   }
   if (4 * (free.size() + locked_count) <= 5 * options.wanted_count) return;
   const std::size_t group_count = options.wanted_count > locked_count ? options.wanted_count - locked_count : 1;
-  const std::vector<std::uint32_t> standing = group_representatives(merged.positions, free, group_count);
+  const std::vector<std::uint32_t> standing = mesh::group_representatives(merged.positions, free, group_count);
   mesh.triangles = mapped(mesh.triangles, standing);
   const GroupMeans means(free, standing, mesh.visible, mesh.temperature_celsius, merged.weight);
   const std::vector<float> before = mesh.temperature_celsius;
@@ -168,14 +169,14 @@ void join_near_vertices(Simplified& mesh, const MergedTiles& merged, const std::
 
 }  // namespace
 
-Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std::vector<bool>& is_locked,
-                         const ThinningOptions& options, SimplifyMemory& memory) {
-  Simplified simple = simplified({.surface = fine,
-                                  .visible = mesh.visible,
-                                  .temperature_celsius = mesh.temperature_celsius,
-                                  .is_locked = is_locked,
-                                  .span_celsius = options.span_celsius},
-                                 options.wanted_count, memory);
+Thinning thinned_surface(const MergedTiles& mesh, const mesh::Surface& fine, const std::vector<bool>& is_locked,
+                         const ThinningOptions& options, mesh::SimplifyMemory& memory) {
+  mesh::Simplified simple = mesh::simplified({.surface = fine,
+                                              .visible = mesh.visible,
+                                              .temperature_celsius = mesh.temperature_celsius,
+                                              .is_locked = is_locked,
+                                              .span_celsius = options.span_celsius},
+                                             options.wanted_count, memory);
   join_near_vertices(simple, mesh, is_locked, options);
   if (simple.triangles.empty()) simple.triangles.push_back(mesh.any_triangle);
 
@@ -183,7 +184,7 @@ Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std
   result.triangles = std::move(simple.triangles);
   const std::vector<bool> is_kept = are_used(result.triangles, mesh.positions.size());
   std::vector<std::uint32_t> index_of(mesh.positions.size(), kNone);
-  std::vector<Vec3f> positions;
+  std::vector<base::Vec3f> positions;
   for (std::uint32_t v = 0; v < is_kept.size(); ++v) {
     if (!is_kept[v]) continue;
     index_of[v] = static_cast<std::uint32_t>(result.kept.size());
@@ -192,7 +193,7 @@ Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std
     result.visible.push_back(simple.visible[v]);
     result.temperature_celsius.push_back(simple.temperature_celsius[v]);
   }
-  for (Triangle& t : result.triangles) t = {index_of[t[0]], index_of[t[1]], index_of[t[2]]};
+  for (base::Triangle& t : result.triangles) t = {index_of[t[0]], index_of[t[1]], index_of[t[2]]};
 
   const std::vector<std::uint32_t> seeds = fine.nearest_seeds(is_kept);
   const NearestPoint nearest(mesh.positions, result.kept);
@@ -203,8 +204,8 @@ Thinning thinned_surface(const MergedTiles& mesh, const Surface& fine, const std
     result.kept_of_merged[v] = k;
     result.weight[k] += std::min(mesh.weight[v], 0xffffffffu - result.weight[k]);
   }
-  result.distance_m =
-      kErrorMargin * two_sided_distance(fine, Surface(positions, result.triangles), result.kept_of_merged, result.kept);
+  result.distance_m = kErrorMargin * two_sided_distance(fine, mesh::Surface(positions, result.triangles),
+                                                        result.kept_of_merged, result.kept);
   return result;
 }
 
@@ -217,10 +218,10 @@ Thinning thinned_points(const MergedTiles& cloud, const std::vector<bool>& is_lo
   const auto most_outliers = static_cast<std::size_t>(kMostOutliers * static_cast<double>(options.wanted_count));
   const std::size_t others = locked_count + most_outliers;
   const std::size_t group_count = options.wanted_count > others ? options.wanted_count - others : 1;
-  std::vector<std::uint32_t> standing = group_representatives(cloud.positions, members, group_count);
+  std::vector<std::uint32_t> standing = mesh::group_representatives(cloud.positions, members, group_count);
   const GroupMeans means(members, standing, cloud.visible, cloud.temperature_celsius, cloud.weight);
 
-  std::vector<Rgb8> visible = cloud.visible;
+  std::vector<base::Rgb8> visible = cloud.visible;
   std::vector<float> celsius = cloud.temperature_celsius;
   std::vector<std::pair<double, std::uint32_t>> outliers;
   for (const std::uint32_t v : members) {
@@ -256,10 +257,11 @@ Thinning thinned_points(const MergedTiles& cloud, const std::vector<bool>& is_lo
     const std::uint32_t k = index_of[standing[v]];
     result.kept_of_merged.push_back(k);
     result.weight[k] += std::min(cloud.weight[v], 0xffffffffu - result.weight[k]);
-    largest_squared = std::max(largest_squared, squared_distance(cloud.positions[v], cloud.positions[standing[v]]));
+    largest_squared =
+        std::max(largest_squared, mesh::squared_distance(cloud.positions[v], cloud.positions[standing[v]]));
   }
   result.distance_m = std::sqrt(largest_squared);
   return result;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -4,7 +4,7 @@
 
 #include "protocol/tile_frame.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 
 /// The tile that holds a tile of a level above 0.
 inline protocol::TileId parent_of(const protocol::TileId& id) {
@@ -42,4 +42,4 @@ inline bool is_before(const protocol::TileId& a, const protocol::TileId& b) {
   return is_lower(y, x) ? a.x < b.x : a.y < b.y;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace spectra::server {
+namespace spectra::map {
 
 VertexTimes VertexTimes::of(std::span<const double> times) {
   VertexTimes made;
@@ -25,4 +25,4 @@ VertexTimes VertexTimes::of(std::span<const double> times) {
   return made;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::map {
 
 inline constexpr double kUnknownTime = std::numeric_limits<double>::quiet_NaN();
 
@@ -29,4 +29,4 @@ inline double later(double a, double b) {
   return a >= b || b != b ? a : b;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::map

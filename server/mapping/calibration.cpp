@@ -9,8 +9,8 @@
 namespace spectra::mapping {
 namespace {
 
-using fusion::ErrorCode;
-using fusion::Result;
+using base::ErrorCode;
+using base::Result;
 using nlohmann::json;
 
 constexpr std::size_t kMostBytes = 1 << 20;
@@ -149,8 +149,8 @@ void read_poses(const Reader& reader, Calibration& calibration) {
 
 Result<Calibration> calibration_from_text(const std::string& text, const std::string& name) {
   const auto failed = [&](const std::string& what) {
-    return fusion::failure(ErrorCode::BadValue,
-                           name + ": " + what + "; it describes the cameras as docs/mapping.md says", "calibration");
+    return base::failure(ErrorCode::BadValue, name + ": " + what + "; it describes the cameras as docs/mapping.md says",
+                         "calibration");
   };
   const json document = json::parse(text, nullptr, false);
   if (!document.is_object()) return failed("this is no JSON object");
@@ -183,7 +183,7 @@ Result<Calibration> calibration_from_text(const std::string& text, const std::st
 Result<Calibration> read_calibration(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in)
-    return fusion::failure(ErrorCode::FileNotFound, file.string() + ": the calibration of the cameras cannot be read");
+    return base::failure(ErrorCode::FileNotFound, file.string() + ": the calibration of the cameras cannot be read");
   std::string text;
   text.resize(kMostBytes);
   in.read(text.data(), static_cast<std::streamsize>(text.size()));

@@ -59,7 +59,7 @@ struct Calibration {
 };
 
 /// Reads calibration.json. Errors name the key: what is missing, no number, not finite, no rotation, or absurd. Safe on untrusted input.
-fusion::Result<Calibration> read_calibration(const std::filesystem::path& file);
-fusion::Result<Calibration> calibration_from_text(const std::string& text, const std::string& name);
+base::Result<Calibration> read_calibration(const std::filesystem::path& file);
+base::Result<Calibration> calibration_from_text(const std::string& text, const std::string& name);
 
 }  // namespace spectra::mapping

@@ -106,7 +106,7 @@ RayTable::RayTable(const CameraModel& camera) : width(camera.width), height(came
 }
 
 DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& calibration, const RayTable& rays,
-                          double truncation_m, server::WorkerPool& pool) {
+                          double truncation_m, jobs::WorkerPool& pool) {
   DepthFrame frame;
   frame.width = picture.width;
   frame.height = picture.height;

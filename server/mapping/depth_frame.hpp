@@ -34,6 +34,6 @@ struct RayTable {
 /// out are pixels within 2 of a jump of depth and those beside nothing (what a sensor says there lies between near and far), those seen
 /// at more than 80 degrees, and those whose noise is more than `truncation_m`.
 DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& calibration, const RayTable& rays,
-                          double truncation_m, server::WorkerPool& pool);
+                          double truncation_m, jobs::WorkerPool& pool);
 
 }  // namespace spectra::mapping

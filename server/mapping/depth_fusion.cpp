@@ -161,7 +161,7 @@ float fuse_colours(const ColourLook& look, const KernelCamera& camera, bool is_d
       const float w = std::max(1.0F, std::round(16 * trust));
       const float old_weight = block.colour_weight[voxel];
       const float share = w / (old_weight + w);
-      const fusion::Rgb8& seen = look.picture.pixels[static_cast<std::size_t>(pixel[i])];
+      const base::Rgb8& seen = look.picture.pixels[static_cast<std::size_t>(pixel[i])];
       recoloured =
           std::max({recoloured, fuse_channel(block.red[voxel], seen.r, share),
                     fuse_channel(block.green[voxel], seen.g, share), fuse_channel(block.blue[voxel], seen.b, share)});
@@ -172,7 +172,7 @@ float fuse_colours(const ColourLook& look, const KernelCamera& camera, bool is_d
 }
 
 /// The blocks that lie within the truncation of what is seen, in the order of their places.
-std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m, server::WorkerPool& pool) {
+std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m, jobs::WorkerPool& pool) {
   constexpr int kBand = 32, kStride = 2;
   const auto before = static_cast<float>(kTruncationVoxels * voxel_m),
              behind = static_cast<float>(kBehindVoxels * voxel_m);
@@ -256,7 +256,7 @@ bool may_be_seen(const DepthLook& look, const KernelCamera& camera, GridPlace at
 
 }  // namespace
 
-void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, server::WorkerPool& pool) {
+void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool) {
   const double voxel_m = map.voxel_m();
   const Kernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
                       depth.frame.depth_m.data(),
@@ -324,7 +324,7 @@ void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
   }
 }
 
-FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, server::WorkerPool& pool) {
+FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, jobs::WorkerPool& pool) {
   constexpr int kStride = 4;
   const SurfaceView view = draw_surfaces(map, depth.camera, depth.world_from_camera, pool);
   const auto truncation = static_cast<float>(kTruncationVoxels * map.voxel_m());

@@ -33,13 +33,13 @@ struct ColourLook {
 ///
 /// A mean is kept as distance += (new - distance) w / (W + w), rounded to the nearest whole number but at least by one step towards the
 /// new value, so that it never stalls however heavy W is; W is at most kWeightMost.
-void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, server::WorkerPool& pool);
+void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool);
 
 /// How well a depth picture fits the map where a pose puts it: pixels of a grid where both have something.
 struct FitOfDepth {
   std::size_t matching = 0;  ///< At the same distance, within the truncation.
   std::size_t other = 0;
 };
-FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, server::WorkerPool& pool);
+FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, jobs::WorkerPool& pool);
 
 }  // namespace spectra::mapping

@@ -11,8 +11,8 @@ namespace spectra::mapping {
 namespace {
 
 namespace fs = std::filesystem;
-using fusion::ErrorCode;
-using fusion::Result;
+using base::ErrorCode;
+using base::Result;
 
 /// A path inside the folder, or nothing for what leads out of it.
 std::optional<fs::path> inside(const std::string& word) {
@@ -39,14 +39,14 @@ void FaultLog::add(const FaultLog& other) {
 Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optional<fs::path>& poses) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    return fusion::failure(ErrorCode::FileNotFound,
-                           folder.string() + ": is no folder of frames (frames.txt, poses.txt, calibration.json)");
+    return base::failure(ErrorCode::FileNotFound,
+                         folder.string() + ": is no folder of frames (frames.txt, poses.txt, calibration.json)");
   }
   BOOST_OUTCOME_TRY(auto calibration, read_calibration(folder / "calibration.json"));
   const fs::path pose_file = poses.value_or(folder / "poses.txt");
   BOOST_OUTCOME_TRY(auto trajectory, Trajectory::read(pose_file));
   std::ifstream in(folder / "frames.txt", std::ios::binary);
-  if (!in) return fusion::failure(ErrorCode::FileNotFound, (folder / "frames.txt").string() + ": cannot be read");
+  if (!in) return base::failure(ErrorCode::FileNotFound, (folder / "frames.txt").string() + ": cannot be read");
   const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   trajectory.change_to(calibration.is_world_to_camera, calibration.depth_from_pose);
   FrameFolder frames(folder, std::move(calibration), std::move(trajectory));
@@ -61,7 +61,7 @@ Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optiona
   }
   frames.read_rows(text);
   if (frames.rows_.empty()) {
-    return fusion::failure(
+    return base::failure(
         ErrorCode::BadValue,
         (folder / "frames.txt").string() +
             ": there is no frame in it; lines of timestamp, depth, color and thermal picture are wanted");
@@ -127,8 +127,8 @@ Frame FrameFolder::load(std::size_t row, FaultLog& faults) const {
   Frame frame;
   frame.time_s = from.time_s;
   frame.depth = load_picture<std::uint16_t>(from.depth, &calibration_.depth.camera, read_png16, "depth", faults);
-  frame.colour = load_picture<fusion::Rgb8>(from.colour, calibration_.colour ? &calibration_.colour->camera : nullptr,
-                                            read_colour, "color", faults);
+  frame.colour = load_picture<base::Rgb8>(from.colour, calibration_.colour ? &calibration_.colour->camera : nullptr,
+                                          read_colour, "color", faults);
   frame.thermal = load_picture<std::uint16_t>(
       from.thermal, calibration_.thermal ? &calibration_.thermal->camera : nullptr, read_png16, "thermal", faults);
   return frame;

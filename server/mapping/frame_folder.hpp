@@ -67,8 +67,8 @@ class FrameFolder {
  public:
   /// Fails when the folder, its calibration or its poses cannot be read, or no line of frames.txt can; single lines that are wrong are in
   /// faults(). `poses`: another file than the folder's.
-  static fusion::Result<FrameFolder> open(const std::filesystem::path& folder,
-                                          const std::optional<std::filesystem::path>& poses = std::nullopt);
+  static base::Result<FrameFolder> open(const std::filesystem::path& folder,
+                                        const std::optional<std::filesystem::path>& poses = std::nullopt);
 
   const Calibration& calibration() const { return calibration_; }
   /// Of the depth camera, whatever camera the poses were given for.

@@ -15,11 +15,11 @@ namespace spectra::mapping {
 namespace {
 
 namespace fs = std::filesystem;
-using fusion::Result;
+using base::Result;
 using nlohmann::json;
 
 Result<void> write_text(const fs::path& file, const std::string& text) {
-  BOOST_OUTCOME_TRY(auto out, fusion::OutputFile::create(file));
+  BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
   BOOST_OUTCOME_TRYV(out.write(std::as_bytes(std::span(text))));
   return out.commit();
 }
@@ -86,17 +86,16 @@ Result<void> write_frame(const fs::path& folder, const SimulatedDrive& drive, st
 
 }  // namespace
 
-Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, server::WorkerPool& pool,
-                         const fusion::Progress& progress) {
+Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, jobs::WorkerPool& pool,
+                         const base::Progress& progress) {
   std::error_code error;
   if (fs::exists(folder / "frames.txt", error)) {
-    return fusion::failure(fusion::ErrorCode::FileUnwritable,
-                           folder.string() + ": holds frames already; name another folder");
+    return base::failure(base::ErrorCode::FileUnwritable,
+                         folder.string() + ": holds frames already; name another folder");
   }
   for (const char* part : {"depth", "color", "thermal"}) {
     fs::create_directories(folder / part, error);
-    if (error)
-      return fusion::failure(fusion::ErrorCode::FileUnwritable, (folder / part).string() + ": " + error.message());
+    if (error) return base::failure(base::ErrorCode::FileUnwritable, (folder / part).string() + ": " + error.message());
   }
   BOOST_OUTCOME_TRYV(write_text(folder / "calibration.json", calibration_text(drive.calibration())));
   const std::string head = "# timestamp tx ty tz qx qy qz qw  (depth camera to world, Hamilton, w last)\n";
@@ -109,11 +108,11 @@ Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, se
   BOOST_OUTCOME_TRYV(write_text(folder / "poses.txt", told));
   BOOST_OUTCOME_TRYV(write_text(folder / "true_poses.txt", truth));
   BOOST_OUTCOME_TRYV(
-      fusion::write_ply(folder / "truth.ply", drive.truth(), drive.truth().visible(), "up y; positions in metres"));
+      files::write_ply(folder / "truth.ply", drive.truth(), drive.truth().visible(), "up y; positions in metres"));
 
   std::atomic<std::size_t> done{0};
   std::mutex mutex;
-  std::optional<fusion::Error> problem;
+  std::optional<base::Error> problem;
   pool.for_each(drive.frame_count(), [&](std::size_t index) {
     {
       const std::lock_guard lock(mutex);
@@ -124,8 +123,7 @@ Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, se
       const std::lock_guard lock(mutex);
       if (!problem) problem = written.error();
     }
-    fusion::report(progress, fusion::kWritingPhase,
-                   static_cast<double>(++done) / static_cast<double>(drive.frame_count()));
+    base::report(progress, base::kWritingPhase, static_cast<double>(++done) / static_cast<double>(drive.frame_count()));
   });
   if (problem) return BOOST_OUTCOME_V2_NAMESPACE::failure(*problem);
   for (std::size_t i = 0; i < drive.frame_count(); ++i) {

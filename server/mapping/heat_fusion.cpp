@@ -64,7 +64,7 @@ class Differences {
 
 /// The largest value within kSpread pixels, along both axes.
 std::vector<float> largest_around(const std::vector<float>& values, std::size_t width, std::size_t height,
-                                  server::WorkerPool& pool) {
+                                  jobs::WorkerPool& pool) {
   std::vector<float> across(values.size()), both(values.size());
   pool.for_each(height, [&](std::size_t y) {
     const float* row = &values[y * width];
@@ -106,7 +106,7 @@ bool HeatFusion::is_frozen(const Picture16& picture) {
   return false;
 }
 
-HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, server::WorkerPool& pool) const {
+HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerPool& pool) const {
   Prepared prepared;
   const std::size_t count = picture.pixels.size();
   const auto width = static_cast<std::size_t>(picture.width), height = static_cast<std::size_t>(picture.height);
@@ -187,7 +187,7 @@ void HeatFusion::find_offset(const VoxelMap& map, const std::vector<std::vector<
 }
 
 HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseAnswer& camera, double moment_s,
-                            server::WorkerPool& pool) {
+                            jobs::WorkerPool& pool) {
   HeatReport report;
   if (rules_.shutter && is_frozen(picture)) {
     last_frozen_s_ = moment_s;

@@ -49,13 +49,13 @@ class HeatFusion {
   /// `moment_s`: when the picture was taken, after the map's first moment; later than the one before. `camera`: where it was and how it
   /// moved. Only voxels beside surfaces get temperatures. The same bytes for any number of threads.
   HeatReport fuse(VoxelMap& map, const Picture16& picture, const PoseAnswer& camera, double moment_s,
-                  server::WorkerPool& pool);
+                  jobs::WorkerPool& pool);
 
  private:
   struct Look;
   struct Prepared;
 
-  Prepared prepare(const Picture16& picture, server::WorkerPool& pool) const;
+  Prepared prepare(const Picture16& picture, jobs::WorkerPool& pool) const;
   bool is_frozen(const Picture16& picture);
   void find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
                    HeatReport& report);

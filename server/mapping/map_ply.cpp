@@ -11,8 +11,8 @@
 namespace spectra::mapping {
 namespace {
 
-fusion::PlyLayout layout_of(const UnitMesh& mesh) {
-  fusion::PlyLayout layout;
+files::PlyLayout layout_of(const UnitMesh& mesh) {
+  files::PlyLayout layout;
   layout.vertex_count = mesh.positions.size();
   layout.triangle_count = mesh.triangles.size();
   layout.has_temperature =
@@ -22,13 +22,13 @@ fusion::PlyLayout layout_of(const UnitMesh& mesh) {
 
 }  // namespace
 
-fusion::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
-                                   const fusion::Progress& progress) {
-  fusion::PlyLayout layout = layout_of(mesh);
+base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
+                                 const base::Progress& progress) {
+  files::PlyLayout layout = layout_of(mesh);
   layout.has_confidence = layout.has_temperature;
   layout.comment = "positions in metres";
-  BOOST_OUTCOME_TRY(auto out, fusion::OutputFile::create(file));
-  fusion::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
+  BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
+  files::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
   constexpr std::size_t kStep = 65'536;
   const std::size_t vertices = mesh.positions.size();
   std::vector<double> seen;
@@ -39,7 +39,7 @@ fusion::Result<void> write_map_ply(const std::filesystem::path& file, const Unit
     for (const float s : part(mesh.seen_s)) seen.push_back(begin_s + static_cast<double>(s));
     BOOST_OUTCOME_TRYV(encoder.vertices(part(mesh.positions), part(mesh.colours), part(mesh.celsius),
                                         {part(mesh.sigma_kelvin), seen}));
-    fusion::report(progress, fusion::kWritingPhase, 0.6 * static_cast<double>(first) / static_cast<double>(vertices));
+    base::report(progress, base::kWritingPhase, 0.6 * static_cast<double>(first) / static_cast<double>(vertices));
   }
   BOOST_OUTCOME_TRYV(encoder.triangles(mesh.triangles));
   BOOST_OUTCOME_TRYV(encoder.finish());
@@ -48,9 +48,9 @@ fusion::Result<void> write_map_ply(const std::filesystem::path& file, const Unit
 
 std::string block_ply(const UnitMesh& mesh) {
   std::string text;
-  fusion::PlyEncoder encoder(layout_of(mesh), [&text](std::span<const std::byte> bytes) -> fusion::Result<void> {
+  files::PlyEncoder encoder(layout_of(mesh), [&text](std::span<const std::byte> bytes) -> base::Result<void> {
     text.append(std::bit_cast<const char*>(bytes.data()), bytes.size());
-    return fusion::success();
+    return base::success();
   });
   const bool is_whole = encoder.vertices(mesh.positions, mesh.colours, mesh.celsius) &&
                         encoder.triangles(mesh.triangles) && encoder.finish();

@@ -12,8 +12,8 @@ namespace spectra::mapping {
 /// Writes a mesh as PLY: x, y, z, red, green, blue, and where it has any temperature also temperature (degC), temperature_sigma (kelvin)
 /// and seen (seconds of the source's clock, which showed `begin_s` at the map's first moment; NaN where nothing was seen). The file appears
 /// whole or not at all. `progress` is told of kWritingPhase.
-fusion::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
-                                   const fusion::Progress& progress = {});
+base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
+                                 const base::Progress& progress = {});
 
 /// The same without temperature_sigma and seen, in memory: what a server takes as a block.
 std::string block_ply(const UnitMesh& mesh);

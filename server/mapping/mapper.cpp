@@ -30,7 +30,7 @@ PoseAnswer beside(const PoseAnswer& depth, const Eigen::Isometry3d& from_depth) 
 
 }  // namespace
 
-Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, server::WorkerPool& pool)
+Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, jobs::WorkerPool& pool)
     : calibration_(calibration),
       settings_(settings),
       pool_(pool),
@@ -39,14 +39,14 @@ Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, s
   if (calibration.thermal && settings.use_thermal) heat_.emplace(*calibration.thermal, settings.heat);
 }
 
-fusion::Result<void> Mapper::set_vignetting(PictureFloat picture) {
+base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
   const CameraModel* camera = calibration_.thermal ? &calibration_.thermal->camera : nullptr;
   if (camera == nullptr || picture.width != camera->width || picture.height != camera->height) {
-    return fusion::failure(fusion::ErrorCode::Inconsistent,
-                           "the vignetting picture is not of the size of the thermal camera in calibration.json");
+    return base::failure(base::ErrorCode::Inconsistent,
+                         "the vignetting picture is not of the size of the thermal camera in calibration.json");
   }
   if (heat_) heat_->set_vignetting(std::move(picture));
-  return fusion::success();
+  return base::success();
 }
 
 void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
@@ -128,11 +128,11 @@ MeshRules Mapper::mesh_rules() const {
 }
 
 std::vector<PublishedUnit> Mapper::changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
-                                                 server::WorkerPool& pool) {
+                                                 jobs::WorkerPool& pool) {
   return publisher.take(map_, mesh_rules(), eye, pool);
 }
 
-UnitMesh Mapper::whole_mesh(const fusion::Progress& progress) const {
+UnitMesh Mapper::whole_mesh(const base::Progress& progress) const {
   std::vector<UnitMesh> units(map_.units().size());
   const MeshRules rules = mesh_rules();
   std::size_t done = 0;
@@ -143,7 +143,7 @@ UnitMesh Mapper::whole_mesh(const fusion::Progress& progress) const {
       units[done + i] = mesh_of_unit(map_, static_cast<std::int32_t>(done + i), rules);
     });
     done += count;
-    fusion::report(progress, kMeshingPhase, static_cast<double>(done) / static_cast<double>(units.size()));
+    base::report(progress, kMeshingPhase, static_cast<double>(done) / static_cast<double>(units.size()));
   }
   return joined(units);
 }

@@ -35,23 +35,23 @@ struct MapperFigures {
 /// Makes a map of frames whose poses are known. For one thread; uses a pool inside.
 class Mapper {
  public:
-  Mapper(const Calibration& calibration, const MapperSettings& settings, server::WorkerPool& pool);
+  Mapper(const Calibration& calibration, const MapperSettings& settings, jobs::WorkerPool& pool);
 
   /// Kelvin to subtract from each thermal pixel. Inconsistent when it is not of the camera's size.
-  fusion::Result<void> set_vignetting(PictureFloat picture);
+  base::Result<void> set_vignetting(PictureFloat picture);
 
   /// Fuses what of a frame has a pose; frames in order of their time. What cannot be fused is left out and stands in `faults`.
   void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
 
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
   /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
-  UnitMesh whole_mesh(const fusion::Progress& progress = {}) const;
+  UnitMesh whole_mesh(const base::Progress& progress = {}) const;
   static constexpr double kSystematic = 0.5;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
   /// What has changed since the last call with this publisher.
   std::vector<PublishedUnit> changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
-                                           server::WorkerPool& pool);
+                                           jobs::WorkerPool& pool);
 
   const VoxelMap& map() const { return map_; }
   const MapperFigures& figures() const { return figures_; }
@@ -67,7 +67,7 @@ class Mapper {
 
   const Calibration calibration_;
   const MapperSettings settings_;
-  server::WorkerPool& pool_;
+  jobs::WorkerPool& pool_;
   const RayTable rays_;
   VoxelMap map_;
   std::optional<HeatFusion> heat_;

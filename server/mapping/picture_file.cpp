@@ -15,21 +15,21 @@
 namespace spectra::mapping {
 namespace {
 
-using fusion::ErrorCode;
-using fusion::Result;
+using base::ErrorCode;
+using base::Result;
 
 constexpr int kMostPixels = 8192;
 constexpr std::uint64_t kMostBytes = std::uint64_t{512} << 20;
 
 auto failed(const std::filesystem::path& file, const std::string& what) {
-  return fusion::failure(ErrorCode::FileUnreadable, file.string() + ": " + what);
+  return base::failure(ErrorCode::FileUnreadable, file.string() + ": " + what);
 }
 
 Result<std::vector<unsigned char>> bytes_of(const std::filesystem::path& file) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   std::ifstream in(file, std::ios::binary);
-  if (error || !in) return fusion::failure(ErrorCode::FileNotFound, file.string() + ": cannot be read");
+  if (error || !in) return base::failure(ErrorCode::FileNotFound, file.string() + ": cannot be read");
   if (size > kMostBytes) return failed(file, "is larger than any picture");
   std::vector<unsigned char> bytes(static_cast<std::size_t>(size));
   in.read(std::bit_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -161,8 +161,8 @@ Result<void> write_bytes(const std::filesystem::path& file, std::span<const unsi
   std::ofstream out(file, std::ios::binary);
   out.write(std::bit_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) return fusion::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be written");
-  return fusion::success();
+  if (!out) return base::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be written");
+  return base::success();
 }
 
 }  // namespace
@@ -182,7 +182,7 @@ Result<PictureRgb> read_colour(const std::filesystem::path& file) {
   if (!is_png(bytes)) return read_jpeg(file, bytes);
   BOOST_OUTCOME_TRY(const auto rows, read_png(file, bytes));
   if (rows.is_wide_grey) return failed(file, "is a PNG of 16-bit grey, no colour picture");
-  PictureRgb picture{rows.width, rows.height, std::vector<fusion::Rgb8>(rows.bytes.size() / 3)};
+  PictureRgb picture{rows.width, rows.height, std::vector<base::Rgb8>(rows.bytes.size() / 3)};
   std::memcpy(&picture.pixels.front().r, rows.bytes.data(), rows.bytes.size());
   return picture;
 }
@@ -223,9 +223,9 @@ Result<void> write_png16(const std::filesystem::path& file, const Picture16& pic
   image.format = PNG_FORMAT_LINEAR_Y;
   image.flags = PNG_IMAGE_FLAG_FAST;
   if (png_image_write_to_file(&image, file.c_str(), 0, picture.pixels.data(), 0, nullptr) == 0) {
-    return fusion::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be written: " + image.message);
+    return base::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be written: " + image.message);
   }
-  return fusion::success();
+  return base::success();
 }
 
 Result<void> write_jpeg(const std::filesystem::path& file, const PictureRgb& picture, int quality) {
@@ -237,7 +237,7 @@ Result<void> write_jpeg(const std::filesystem::path& file, const PictureRgb& pic
                          : tjCompress2(jpeg.handle, &picture.pixels.front().r, picture.width, 0, picture.height,
                                        TJPF_RGB, &bytes, &size, TJSAMP_444, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, void (*)(unsigned char*)> owned(bytes, tjFree);
-  if (status != 0) return fusion::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be packed");
+  if (status != 0) return base::failure(ErrorCode::FileUnwritable, file.string() + ": cannot be packed");
   return write_bytes(file, {bytes, size});
 }
 

@@ -24,18 +24,18 @@ struct Picture {
 };
 
 using Picture16 = Picture<std::uint16_t>;
-using PictureRgb = Picture<fusion::Rgb8>;
+using PictureRgb = Picture<base::Rgb8>;
 using PictureFloat = Picture<float>;
 
 /// Pictures of at most 8192 x 8192 pixels. All are safe on untrusted input: what is truncated, damaged or of another kind is an error
 /// that names the file, and no more memory is taken than the head of the file justifies.
-fusion::Result<Picture16> read_png16(const std::filesystem::path& file);    ///< Grey, 16 bits.
-fusion::Result<PictureRgb> read_colour(const std::filesystem::path& file);  ///< JPEG, or PNG of 8 bits a channel.
-fusion::Result<PictureFloat> read_pfm(
+base::Result<Picture16> read_png16(const std::filesystem::path& file);    ///< Grey, 16 bits.
+base::Result<PictureRgb> read_colour(const std::filesystem::path& file);  ///< JPEG, or PNG of 8 bits a channel.
+base::Result<PictureFloat> read_pfm(
     const std::filesystem::path& file);  ///< One channel; rows from the bottom in the file.
 
-fusion::Result<void> write_png16(const std::filesystem::path& file, const Picture16& picture);
-fusion::Result<void> write_jpeg(const std::filesystem::path& file, const PictureRgb& picture, int quality);
-fusion::Result<void> write_pfm(const std::filesystem::path& file, const PictureFloat& picture);
+base::Result<void> write_png16(const std::filesystem::path& file, const Picture16& picture);
+base::Result<void> write_jpeg(const std::filesystem::path& file, const PictureRgb& picture, int quality);
+base::Result<void> write_pfm(const std::filesystem::path& file, const PictureFloat& picture);
 
 }  // namespace spectra::mapping

@@ -13,7 +13,7 @@ struct Corner {
   float u = 0, v = 0, nearness = 0;  ///< 1 / z; 0: too near or behind.
 };
 
-void shade(const fusion::MultispectralMesh& mesh, const std::vector<Corner>& corners, const CameraModel& camera,
+void shade(const mesh::MultispectralMesh& mesh, const std::vector<Corner>& corners, const CameraModel& camera,
            const Eigen::Matrix3f& turn, RenderedPicture& picture) {
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
@@ -21,7 +21,7 @@ void shade(const fusion::MultispectralMesh& mesh, const std::vector<Corner>& cor
           static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) + static_cast<std::size_t>(x);
       const std::uint32_t triangle = picture.triangle[pixel];
       if (triangle == RenderedPicture::kNothing) continue;
-      const fusion::Triangle& t = mesh.triangles()[triangle];
+      const base::Triangle& t = mesh.triangles()[triangle];
       const Corner &a = corners[t[0]], &b = corners[t[1]], &c = corners[t[2]];
       const float area = (b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v);
       const auto px = static_cast<float>(x), py = static_cast<float>(y);
@@ -31,7 +31,7 @@ void shade(const fusion::MultispectralMesh& mesh, const std::vector<Corner>& cor
       picture.share_b[pixel] = of_b * b.nearness * z;
       picture.share_c[pixel] = of_c * c.nearness * z;
       const auto at = [&](std::size_t i) {
-        const fusion::Vec3f& p = mesh.positions()[t[i]];
+        const base::Vec3f& p = mesh.positions()[t[i]];
         return Eigen::Vector3f(p.x, p.y, p.z);
       };
       const Eigen::Vector3f normal = (at(1) - at(0)).cross(at(2) - at(0));
@@ -45,7 +45,7 @@ void shade(const fusion::MultispectralMesh& mesh, const std::vector<Corner>& cor
 
 }  // namespace
 
-RenderedPicture render(const fusion::MultispectralMesh& mesh, const CameraModel& camera,
+RenderedPicture render(const mesh::MultispectralMesh& mesh, const CameraModel& camera,
                        const Eigen::Isometry3d& world_from_camera) {
   RenderedPicture picture;
   picture.width = camera.width;
@@ -61,14 +61,14 @@ RenderedPicture render(const fusion::MultispectralMesh& mesh, const CameraModel&
   const Lens lens(camera);
   std::vector<Corner> corners(mesh.vertex_count());
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const fusion::Vec3f& p = mesh.positions()[i];
+    const base::Vec3f& p = mesh.positions()[i];
     const Eigen::Vector3f seen = camera_from_world * Eigen::Vector3f(p.x, p.y, p.z);
     if (seen.z() < kNearest) continue;
     corners[i] = {lens.fx * seen.x() / seen.z() + lens.cx, lens.fy * seen.y() / seen.z() + lens.cy, 1 / seen.z()};
   }
   const auto right = static_cast<float>(camera.width - 1), bottom = static_cast<float>(camera.height - 1);
   for (std::size_t triangle = 0; triangle < mesh.triangle_count(); ++triangle) {
-    const fusion::Triangle& t = mesh.triangles()[triangle];
+    const base::Triangle& t = mesh.triangles()[triangle];
     const Corner &a = corners[t[0]], &b = corners[t[1]], &c = corners[t[2]];
     if (a.nearness == 0 || b.nearness == 0 || c.nearness == 0) continue;
     const float low_u = std::ceil(std::max(0.0F, std::min({a.u, b.u, c.u}))),

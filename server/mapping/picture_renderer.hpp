@@ -20,7 +20,7 @@ struct RenderedPicture {
 };
 
 /// Draws a mesh of small triangles with a depth buffer; triangles that come nearer than 5 cm are left out. No distortion.
-RenderedPicture render(const fusion::MultispectralMesh& mesh, const CameraModel& camera,
+RenderedPicture render(const mesh::MultispectralMesh& mesh, const CameraModel& camera,
                        const Eigen::Isometry3d& world_from_camera);
 
 }  // namespace spectra::mapping

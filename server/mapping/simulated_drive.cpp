@@ -12,7 +12,7 @@
 namespace spectra::mapping {
 namespace {
 
-using fusion::demo::Random;
+using demo::Random;
 
 // Depth: structured light with a base line of 75 mm.
 constexpr double kDisparityMetres = 585 * 0.075;  ///< Disparity in pixels = this / z.
@@ -107,15 +107,15 @@ void blur(std::vector<float>& picture, int width, int height, double sigma) {
 }
 
 template <class Value>
-auto mixed(const RenderedPicture& picture, std::size_t pixel, const fusion::Triangle& t, Value value) {
+auto mixed(const RenderedPicture& picture, std::size_t pixel, const base::Triangle& t, Value value) {
   const float b = picture.share_b[pixel], c = picture.share_c[pixel];
   return (1 - b - c) * value(t[0]) + b * value(t[1]) + c * value(t[2]);
 }
 
 }  // namespace
 
-SimulatedDrive::SimulatedDrive(const DriveOptions& options, const fusion::Progress& progress)
-    : options_(options), truth_(fusion::true_demo_scene({options.vertex_count, options.seed}, progress)) {
+SimulatedDrive::SimulatedDrive(const DriveOptions& options, const base::Progress& progress)
+    : options_(options), truth_(demo::true_demo_scene({options.vertex_count, options.seed}, progress)) {
   const int n = options.finer_than;
   calibration_.depth.camera = pinhole(640 / n, 480 / n, 585.0 / n);
   auto& colour = calibration_.colour.emplace();
@@ -268,17 +268,17 @@ void SimulatedDrive::take_depth(const Row& row, std::size_t index, Frame& frame)
   const CameraModel& colour_camera = calibration_.colour->camera;
   const RenderedPicture look = render(truth_, colour_camera, pose * calibration_.colour->from_depth.inverse());
   frame.colour = {colour_camera.width, colour_camera.height,
-                  std::vector<fusion::Rgb8>(look.depth_m.size(), {200, 205, 210})};
+                  std::vector<base::Rgb8>(look.depth_m.size(), {200, 205, 210})};
   for (std::size_t pixel = 0; pixel < look.triangle.size(); ++pixel) {
     if (look.triangle[pixel] == RenderedPicture::kNothing) continue;
-    const fusion::Triangle& t = truth_.triangles()[look.triangle[pixel]];
+    const base::Triangle& t = truth_.triangles()[look.triangle[pixel]];
     const auto level = [&](auto channel) {
       const float value =
           mixed(look, pixel, t, [&](std::uint32_t v) { return static_cast<float>(truth_.visible()[v].*channel); });
       return static_cast<std::uint8_t>(
           std::clamp(value + static_cast<float>(2 * random.normal()) + 0.5F, 0.0F, 255.0F));
     };
-    frame.colour.pixels[pixel] = {level(&fusion::Rgb8::r), level(&fusion::Rgb8::g), level(&fusion::Rgb8::b)};
+    frame.colour.pixels[pixel] = {level(&base::Rgb8::r), level(&base::Rgb8::g), level(&base::Rgb8::b)};
   }
 }
 
@@ -294,7 +294,7 @@ void SimulatedDrive::take_thermal(const Row& row, std::size_t index, Frame& fram
     for (std::size_t pixel = 0; pixel < celsius.size(); ++pixel) {
       double value = kOutsideCelsius;
       if (seen.triangle[pixel] != RenderedPicture::kNothing) {
-        const fusion::Triangle& t = truth_.triangles()[seen.triangle[pixel]];
+        const base::Triangle& t = truth_.triangles()[seen.triangle[pixel]];
         const float own = mixed(seen, pixel, t, [&](std::uint32_t v) { return truth_.temperature_celsius()[v]; });
         value = apparent_celsius(static_cast<double>(own), static_cast<double>(seen.cosine[pixel]));
       }

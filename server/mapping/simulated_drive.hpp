@@ -28,7 +28,7 @@ struct DriveOptions {
 /// their noise. The same options give the same frames; frames may be asked for in any order, from any thread.
 class SimulatedDrive {
  public:
-  explicit SimulatedDrive(const DriveOptions& options, const fusion::Progress& progress = {});
+  explicit SimulatedDrive(const DriveOptions& options, const base::Progress& progress = {});
   ~SimulatedDrive();
 
   const Calibration& calibration() const { return calibration_; }
@@ -36,7 +36,7 @@ class SimulatedDrive {
   const Trajectory& trajectory() const { return told_; }
   /// As it is: pose of the depth camera.
   Eigen::Isometry3d true_pose(double time_s) const;
-  const fusion::MultispectralMesh& truth() const { return truth_; }
+  const mesh::MultispectralMesh& truth() const { return truth_; }
 
   std::size_t frame_count() const { return rows_.size(); }
   /// The stamp of a frame.
@@ -61,7 +61,7 @@ class SimulatedDrive {
   const DriveOptions options_;
   Calibration calibration_;
   Trajectory told_;
-  fusion::MultispectralMesh truth_;
+  mesh::MultispectralMesh truth_;
   std::vector<Row> rows_;
   std::vector<float> pattern_;  ///< Of the thermal sensor, without unit.
 };

@@ -13,7 +13,7 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kEdge = kBlockEdge + 1;  ///< Voxels that the cells of a block need, each way.
 constexpr std::size_t kCells = std::size_t{kEdge} * kEdge * kEdge;
-constexpr fusion::Rgb8 kNoColour{128, 128, 128};
+constexpr base::Rgb8 kNoColour{128, 128, 128};
 
 /// The voxels of a block and those of its neighbours that its cells need.
 struct Neighbourhood {
@@ -80,7 +80,7 @@ class Mesher {
       inside |= around_.distance[at] < 0 ? 1U << corner : 0U;
     }
     for (const auto& triangle : cube_triangles(static_cast<std::uint8_t>(inside))) {
-      fusion::Triangle corners{};
+      base::Triangle corners{};
       for (std::size_t i = 0; i < 3; ++i) corners[i] = vertex(x, y, z, cube_edges()[triangle[i]]);
       // A surface through a voxel itself draws edges together.
       if (mesh_.positions[corners[0]] == mesh_.positions[corners[1]] ||
@@ -188,7 +188,7 @@ namespace {
 /// Leaves out vertices that no triangle has: those of triangles without area.
 void drop_unused(UnitMesh& mesh) {
   std::vector<std::uint32_t> place(mesh.positions.size(), 0);
-  for (const fusion::Triangle& t : mesh.triangles) {
+  for (const base::Triangle& t : mesh.triangles) {
     for (const std::uint32_t v : t) place[v] = 1;
   }
   std::uint32_t next = 0;
@@ -208,7 +208,7 @@ void drop_unused(UnitMesh& mesh) {
   mesh.sigma_kelvin.resize(next);
   mesh.seen_s.resize(next);
   mesh.edges.resize(next);
-  for (fusion::Triangle& t : mesh.triangles) {
+  for (base::Triangle& t : mesh.triangles) {
     for (std::uint32_t& v : t) v = place[v];
   }
 }
@@ -243,7 +243,7 @@ UnitMesh joined(const std::vector<UnitMesh>& units) {
       all.seen_s.push_back(unit.seen_s[i]);
       all.edges.push_back(unit.edges[i]);
     }
-    for (const fusion::Triangle& t : unit.triangles) all.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+    for (const base::Triangle& t : unit.triangles) all.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
   }
   return all;
 }

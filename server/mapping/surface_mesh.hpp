@@ -11,14 +11,14 @@ namespace spectra::mapping {
 
 /// The surface within a unit of a map. One entry a vertex in each array.
 struct UnitMesh {
-  std::vector<fusion::Vec3f> positions;  ///< Metres, in the axes of the poses.
-  std::vector<fusion::Rgb8> colours;
+  std::vector<base::Vec3f> positions;  ///< Metres, in the axes of the poses.
+  std::vector<base::Rgb8> colours;
   std::vector<float> celsius;       ///< NaN: none.
   std::vector<float> sigma_kelvin;  ///< NaN: none.
   std::vector<float> seen_s;  ///< Of the last look with the thermal camera, after the map's first moment; NaN: none.
   /// Which edge of the grid of voxels each vertex lies on: the same for the same vertex of neighbouring units.
   std::vector<std::uint64_t> edges;
-  std::vector<fusion::Triangle> triangles;
+  std::vector<base::Triangle> triangles;
 };
 
 struct MeshRules {

@@ -166,7 +166,7 @@ struct Drawing {
 }  // namespace
 
 SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const Eigen::Isometry3d& world_from_camera,
-                          server::WorkerPool& pool) {
+                          jobs::WorkerPool& pool) {
   SurfaceView drawn;
   const BlockView view(world_from_camera, map.voxel_m());
   const Lens lens(camera);

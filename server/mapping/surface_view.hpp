@@ -35,6 +35,6 @@ struct SurfaceView {
 
 /// Draws the map at a pose. The same for any number of threads.
 SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const Eigen::Isometry3d& world_from_camera,
-                          server::WorkerPool& pool);
+                          jobs::WorkerPool& pool);
 
 }  // namespace spectra::mapping

@@ -27,14 +27,14 @@ bool parse_line(const std::string& line, std::array<double, 8>& values) {
 
 }  // namespace
 
-fusion::Result<Trajectory> Trajectory::read(const std::filesystem::path& file) {
+base::Result<Trajectory> Trajectory::read(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) return fusion::failure(fusion::ErrorCode::FileNotFound, file.string() + ": the poses cannot be read");
+  if (!in) return base::failure(base::ErrorCode::FileNotFound, file.string() + ": the poses cannot be read");
   const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   Trajectory trajectory = from_text(text);
   if (trajectory.size() == 0) {
-    return fusion::failure(
-        fusion::ErrorCode::BadValue,
+    return base::failure(
+        base::ErrorCode::BadValue,
         file.string() + ": there is no pose in it; lines of timestamp tx ty tz qx qy qz qw are wanted");
   }
   return trajectory;

@@ -42,7 +42,7 @@ class Trajectory {
 
   /// Lines of `timestamp tx ty tz qx qy qz qw`, as the RGB-D benchmark of TUM has them (Sturm et al., IROS 2012); # begins a comment.
   /// What is no pose is left out and counted. Fails when nothing is left.
-  static fusion::Result<Trajectory> read(const std::filesystem::path& file);
+  static base::Result<Trajectory> read(const std::filesystem::path& file);
   static Trajectory from_text(const std::string& text);
 
   void add(double time_s, const Eigen::Isometry3d& pose);

@@ -56,11 +56,11 @@ bool UnitPublisher::has_changed(const Told& told, const UnitMesh& mesh, float vo
     const auto found = told.index_by_edge.find(mesh.edges[i]);
     if (found == told.index_by_edge.end()) return true;
     const std::size_t k = found->second;
-    const fusion::Vec3f &a = told.positions[k], &b = mesh.positions[i];
+    const base::Vec3f &a = told.positions[k], &b = mesh.positions[i];
     if (std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z)}) > most) return true;
     if (std::isnan(told.celsius[k]) != std::isnan(mesh.celsius[i])) return true;
     if (std::abs(told.celsius[k] - mesh.celsius[i]) > kWarmedKelvin) return true;
-    const fusion::Rgb8 &c = told.colours[k], &d = mesh.colours[i];
+    const base::Rgb8 &c = told.colours[k], &d = mesh.colours[i];
     if (std::max({std::abs(c.r - d.r), std::abs(c.g - d.g), std::abs(c.b - d.b)}) > static_cast<int>(kRecolouredLevels))
       return true;
   }
@@ -96,7 +96,7 @@ double UnitPublisher::median_celsius() const {
 }
 
 std::vector<PublishedUnit> UnitPublisher::take(VoxelMap& map, const MeshRules& rules, const Eigen::Vector3d& eye,
-                                               server::WorkerPool& pool) {
+                                               jobs::WorkerPool& pool) {
   std::vector<std::int32_t> looked_at;
   std::vector<std::uint8_t> is_noted(map.units().size(), 0);
   for (std::size_t i = 0; i < is_noted.size(); ++i) is_noted[i] = take_notes(map, map.unit(i)) ? 1 : 0;

@@ -28,7 +28,7 @@ class UnitPublisher {
   /// Units to tell now: hot ones first (5 K above the middle of all that was told), then those near to `eye`. Takes back what the map has noted of
   /// changes; not while it is changed.
   std::vector<PublishedUnit> take(VoxelMap& map, const MeshRules& rules, const Eigen::Vector3d& eye,
-                                  server::WorkerPool& pool);
+                                  jobs::WorkerPool& pool);
 
   std::size_t told_count() const { return told_.size(); }
 
@@ -36,8 +36,8 @@ class UnitPublisher {
   /// What was told of a unit.
   struct Told {
     boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_by_edge;
-    std::vector<fusion::Vec3f> positions;
-    std::vector<fusion::Rgb8> colours;
+    std::vector<base::Vec3f> positions;
+    std::vector<base::Rgb8> colours;
     std::vector<float> celsius;
     std::size_t triangle_count = 0;
   };

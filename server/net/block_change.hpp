@@ -11,7 +11,7 @@
 #include "fusion/files/ply_reader.hpp"
 #include "server/net/block_refusal.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A block that is to become part of the map, or to be taken out of it.
 struct BlockChange {
@@ -23,7 +23,7 @@ struct BlockChange {
 /// The change is made, and durable where there is a store.
 struct BlockTaken {
   std::uint64_t revision = 0;
-  std::vector<fusion::Note> notes;  ///< Of a block that was put.
+  std::vector<files::Note> notes;  ///< Of a block that was put.
 };
 
 using BlockOutcome = std::variant<BlockTaken, BlockRefusal>;
@@ -32,4 +32,4 @@ using BlockOutcome = std::variant<BlockTaken, BlockRefusal>;
 /// in the order of the calls. Never refuses because too much waits: the caller bounds what it hands over.
 using BlockHandler = std::function<void(BlockChange change, std::function<void(BlockOutcome)> done)>;
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace spectra::server {
+namespace spectra::net {
 
 HttpReply refused(const BlockRefusal& refusal) {
   nlohmann::json error{{"code", refusal.code}, {"field", refusal.field}, {"reason", refusal.reason}};
@@ -15,4 +15,4 @@ HttpReply refused(const BlockRefusal& refusal) {
   return reply;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

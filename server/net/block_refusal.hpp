@@ -4,7 +4,7 @@
 
 #include "server/net/http_types.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Why a block, or taking one out, was refused; nothing has changed then.
 struct BlockRefusal {
@@ -18,4 +18,4 @@ struct BlockRefusal {
 /// As docs/protocol.md, "Blocks of the map", says; with Retry-After where it may be tried again soon.
 HttpReply refused(const BlockRefusal& refusal);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -4,7 +4,7 @@
 
 #include "server/net/server_context.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Room for the body of a block, as long as it is in memory here.
 class BlockRoom {
@@ -30,4 +30,4 @@ class BlockRoom {
   const bool is_there_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

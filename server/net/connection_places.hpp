@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Counts the connections of each address. Thread-safe; outlives its places.
 class ConnectionPlaces {
@@ -52,4 +52,4 @@ class ConnectionPlaces {
   std::map<std::string, std::size_t> counts_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Counts what a stream has moved and limits nothing: the one way to see progress inside a single long write.
 class CountingPolicy {
@@ -35,4 +35,4 @@ using ConnectionStream = boost::beast::basic_stream<boost::asio::ip::tcp, boost:
 /// Completes with (error_code, result) instead of throwing.
 inline constexpr auto kAwait = boost::asio::as_tuple(boost::asio::use_awaitable);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -4,7 +4,7 @@
 #include <boost/asio/ip/address.hpp>
 #include <cctype>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 bool is_port(std::string_view text) {
@@ -91,4 +91,4 @@ bool HostList::allows_origin(std::string_view origin, std::string_view local_add
   return allows_name(origin_host_name(origin), local_address);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

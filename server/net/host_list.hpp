@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// The name part of a `Host` value ("localhost:8080", "[::1]:80", "10.0.0.7"): lower case, IPv6 without brackets, no
 /// port, no dot at the end. Nothing when the text is no host with an optional port. Safe on untrusted input.
@@ -40,4 +40,4 @@ class HostList {
   std::set<std::string, std::less<>> names_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -30,7 +30,7 @@
 #include "server/net/tls_identity.hpp"
 #include "server/net/websocket_session.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = boost::beast::http;
@@ -412,13 +412,14 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) {
   who_ =
       context_.options.access->identify(view(request[http::field::authorization]), joined(request, http::field::cookie),
                                         peer_address_, is_from_here_, steady_seconds());
-  if (target->path == "/" && (!who_.identity || !may(who_.identity->role, Right::Watch))) {
+  if (target->path == "/" && (!who_.identity || !access::may(who_.identity->role, access::Right::Watch))) {
     auto reply = text_reply(303, "log in at /login\n");
     reply.headers.emplace_back("Location", "/login");
     return reply;
   }
-  const Right right = right_of(target->path, is_change);
-  if (right != Right::Nothing && (!who_.identity || !may(who_.identity->role, right))) return access_refusal(who_);
+  const access::Right right = right_of(target->path, is_change);
+  if (right != access::Right::Nothing && (!who_.identity || !access::may(who_.identity->role, right)))
+    return access_refusal(who_);
   return std::nullopt;
 }
 
@@ -542,4 +543,4 @@ void HttpConnection::cut() {
   });
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -15,7 +15,7 @@
 #include "server/net/server_context.hpp"
 #include "server/net/transport.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// One TCP connection from its first byte: checks every request, answers HTTP, and hands an upgrade over to a
 /// WebSocketSession (/ws) or an IngestSession (/ingest). Runs on its strand.
@@ -60,12 +60,12 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::beast::flat_buffer buffer_;
   std::string local_address_;
   std::string peer_address_;
-  AccessControl::Outcome who_;   ///< Asks now.
-  bool is_from_here_ = false;    ///< The peer is on this machine.
-  bool is_bare_ = false;         ///< Not encrypted where connections are to be.
-  bool is_handed_over_ = false;  ///< The stream is a session's.
+  access::AccessControl::Outcome who_;  ///< Asks now.
+  bool is_from_here_ = false;           ///< The peer is on this machine.
+  bool is_bare_ = false;                ///< Not encrypted where connections are to be.
+  bool is_handed_over_ = false;         ///< The stream is a session's.
   bool is_stopping_ = false;
   bool is_waiting_for_request_ = false;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -29,7 +29,7 @@
 #include "server/net/server_context.hpp"
 #include "server/net/static_files.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
@@ -190,7 +190,7 @@ asio::awaitable<void> HttpServer::State::accept_connections() {
     try {
       error_code unknown;
       const auto address = socket.remote_endpoint(unknown).address().to_string();
-      auto place = context.places.take(who_counts(address), limits.connections_per_address);
+      auto place = context.places.take(access::who_counts(address), limits.connections_per_address);
       if (!place) {
         refuse(socket, "too many connections from your address");
         continue;
@@ -303,4 +303,4 @@ const NetMetrics& HttpServer::metrics() const {
   return state_->metrics;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

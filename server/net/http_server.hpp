@@ -12,7 +12,7 @@
 #include "server/net/net_options.hpp"
 #include "server/net/viewer_link.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// An address to listen on as people write it: "127.0.0.1:8080", "[::1]:0", "localhost:8080".
 struct ListenAddress {
@@ -56,4 +56,4 @@ class HttpServer {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

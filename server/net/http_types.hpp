@@ -9,7 +9,7 @@
 
 #include "server/net/request_target.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// The blocks of the map, below which they can be put and deleted.
 inline constexpr std::string_view kBlocksPath = "/api/v1/blocks";
@@ -43,4 +43,4 @@ inline HttpReply text_reply(unsigned status, std::string text, std::string conte
 /// takes time goes to the worker pool. Dropping `reply` uncalled answers 503.
 using HttpHandler = std::function<void(const HttpRequest& request, std::function<void(HttpReply)> reply)>;
 
-}  // namespace spectra::server
+}  // namespace spectra::net

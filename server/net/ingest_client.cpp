@@ -25,7 +25,7 @@
 #include "protocol/jsonrpc.hpp"
 #include "server/net/transport.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace ssl = boost::asio::ssl;
@@ -408,4 +408,4 @@ std::optional<std::string> send_blocks(const IngestAddress& to, const BlocksToSe
   return Sending(to, blocks, limits).run();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -11,7 +11,7 @@
 
 #include "protocol/messages/ingest_messages.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Where blocks are sent to.
 struct IngestAddress {
@@ -60,4 +60,4 @@ struct SendingLimits {
 std::optional<std::string> send_blocks(const IngestAddress& to, const BlocksToSend& blocks,
                                        const SendingLimits& limits);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -20,7 +20,7 @@
 #include "server/net/request_target.hpp"
 #include "server/net/websocket_setup.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
@@ -38,7 +38,7 @@ BlockRefusal bad_request(std::string field, std::string reason, std::string limi
 
 }  // namespace
 
-IngestSession::IngestSession(Transport stream, ServerContext& context, AccessControl::Identity who)
+IngestSession::IngestSession(Transport stream, ServerContext& context, access::AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),
       who_(std::move(who)),
@@ -232,7 +232,7 @@ std::string IngestSession::text_of(const Answer& answer) {
   }
   const auto& taken = std::get<BlockTaken>(answer.outcome);
   protocol::IngestAcknowledged acknowledged{answer.sequence, taken.revision, {}, credit()};
-  for (const fusion::Note& note : taken.notes) acknowledged.notes.push_back({note.id, note.count, note.message});
+  for (const files::Note& note : taken.notes) acknowledged.notes.push_back({note.id, note.count, note.message});
   return protocol::notification_text("ingest.acknowledged", protocol::to_json(acknowledged));
 }
 
@@ -341,4 +341,4 @@ void IngestSession::cut() {
   asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end(true, "the server stops"); });
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

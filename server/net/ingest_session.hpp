@@ -18,7 +18,7 @@
 #include "server/net/server_context.hpp"
 #include "server/net/transport.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// The WebSocket of one sender of blocks (docs/protocol.md, "A stream of blocks"): a reader, a writer and a minder of deadlines as
 /// coroutines on one strand. A message is read when there is room for it, whole or not at all, and every one is answered. What is
@@ -28,7 +28,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  IngestSession(Transport stream, ServerContext& context, AccessControl::Identity who);
+  IngestSession(Transport stream, ServerContext& context, access::AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -75,7 +75,7 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
 
   boost::beast::websocket::stream<Transport> ws_;
   ServerContext& context_;
-  const AccessControl::Identity who_;
+  const access::AccessControl::Identity who_;
   boost::asio::steady_timer writer_signal_;
   boost::asio::steady_timer minder_timer_;
   boost::asio::steady_timer reader_timer_;
@@ -96,4 +96,4 @@ class IngestSession final : public Stoppable, public std::enable_shared_from_thi
   Clock::time_point close_deadline_ = Clock::time_point::max();
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

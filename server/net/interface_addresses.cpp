@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 
 std::vector<asio::ip::address> interface_addresses(bool with_v6) {
@@ -35,4 +35,4 @@ std::vector<asio::ip::address> interface_addresses(bool with_v6) {
   return addresses;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <variant>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 enum class Unit { Count, Bytes, Seconds, PerSecond, BytesPerSecond };
@@ -158,4 +158,4 @@ std::optional<std::string> set_limit(NetLimits& limits, std::string_view text) {
   return fmt::format("{}: there is no such limit; there are {}", text, names);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

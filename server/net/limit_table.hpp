@@ -7,7 +7,7 @@
 
 #include "server/net/net_options.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A bound that can be set from outside, as people see it.
 struct LimitLine {
@@ -23,4 +23,4 @@ std::vector<LimitLine> limit_lines(const NetLimits& limits);
 /// names what there is or between which values it may be.
 std::optional<std::string> set_limit(NetLimits& limits, std::string_view text);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

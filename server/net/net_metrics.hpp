@@ -7,7 +7,7 @@
 
 #include "server/access/role.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// What the network side counts, for /metrics. Written from the I/O threads, read from anywhere.
 struct NetMetrics {
@@ -38,11 +38,11 @@ struct NetMetrics {
     std::atomic<std::uint64_t> frame_bytes_sent{0};
     std::atomic<std::int64_t> queued_bytes{0};  ///< Messages that wait now.
   };
-  OfRole& of(AccessRole role) { return of_role_[static_cast<std::size_t>(role)]; }
-  const OfRole& of(AccessRole role) const { return of_role_[static_cast<std::size_t>(role)]; }
+  OfRole& of(access::AccessRole role) { return of_role_[static_cast<std::size_t>(role)]; }
+  const OfRole& of(access::AccessRole role) const { return of_role_[static_cast<std::size_t>(role)]; }
 
  private:
-  std::array<OfRole, kRoles.size()> of_role_;
+  std::array<OfRole, access::kRoles.size()> of_role_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -10,7 +10,7 @@
 
 #include "server/access/access_control.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 class TlsIdentity;
 
@@ -55,7 +55,7 @@ struct NetOptions {
   std::string address = "127.0.0.1";       ///< An IPv4 or IPv6 address.
   std::uint16_t port = 8080;               ///< 0 picks a free one.
   std::vector<std::string> allowed_hosts;  ///< Host names beside loopback and the addresses listened on.
-  std::shared_ptr<AccessControl> access = std::make_shared<AccessControl>();
+  std::shared_ptr<access::AccessControl> access = std::make_shared<access::AccessControl>();
   std::shared_ptr<TlsIdentity> tls;  ///< Loaded; every connection is encrypted. Null: none is.
   unsigned io_thread_count = 1;
   bool stop_on_signals = false;       ///< SIGINT and SIGTERM begin stop().
@@ -63,4 +63,4 @@ struct NetOptions {
   NetLimits limits;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// The pings of one WebSocket connection. There is one at a time, from the beginning of its writing to its answer, and only a
 /// pong with its payload is that answer: pongs that nobody asked for say nothing. Knows no clock; of one strand.
@@ -43,4 +43,4 @@ class PingWatch {
   bool is_unanswered_ = false;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

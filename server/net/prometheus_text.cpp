@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 prometheus::ClientMetric::Histogram histogram_of(const Metric::Distribution& distribution) {
@@ -48,4 +48,4 @@ std::string prometheus_text(std::span<const Metric> metrics) {
   return prometheus::TextSerializer().Serialize(families);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// One number, or one distribution, for /metrics.
 struct Metric {
@@ -29,4 +29,4 @@ struct Metric {
 /// The metrics in the text format of Prometheus. Those of one name, which differ in their label, stand one after the other.
 std::string prometheus_text(std::span<const Metric> metrics);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

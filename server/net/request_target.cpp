@@ -1,6 +1,6 @@
 #include "server/net/request_target.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 int hex_digit(char c) {
@@ -94,4 +94,4 @@ std::optional<RequestTarget> parsed_target(std::string_view target) {
   return parsed;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A request target taken apart and decoded.
 struct RequestTarget {
@@ -21,4 +21,4 @@ std::optional<RequestTarget> parsed_target(std::string_view target);
 /// The other way round, without the first slash: what parsed_target reads again, after a slash.
 std::string target_text(std::string_view path, const std::vector<std::pair<std::string, std::string>>& query);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

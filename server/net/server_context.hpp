@@ -19,7 +19,7 @@
 #include "server/net/static_files.hpp"
 #include "server/net/viewer_link.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A connection as the server's staged stop sees it; both are callable from any thread.
 class Stoppable {
@@ -97,4 +97,4 @@ class ServerContext {
   std::map<const Stoppable*, std::weak_ptr<Stoppable>> connections_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -5,7 +5,7 @@
 #include "server/net/block_refusal.hpp"
 #include "server/net/request_right.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 using nlohmann::json;
 
 namespace {
@@ -35,17 +35,17 @@ HttpReply not_allowed(const char* methods) {
 
 }  // namespace
 
-HttpReply access_refusal(const AccessControl::Outcome& outcome) {
+HttpReply access_refusal(const access::AccessControl::Outcome& outcome) {
   if (outcome.identity) {
     return refused(
         {403, "forbidden", "", "that is not for the role " + std::string(to_string(outcome.identity->role)), ""});
   }
-  if (outcome.refusal == AccessControl::Refusal::TooMany) {
+  if (outcome.refusal == access::AccessControl::Refusal::TooMany) {
     return refused(
         {429, "too_many_attempts", "", "too many wrong tokens came from this address; wait a few seconds", ""});
   }
   auto reply = refused({401, "unauthorised", "",
-                        outcome.refusal == AccessControl::Refusal::Wrong
+                        outcome.refusal == access::AccessControl::Refusal::Wrong
                             ? "that token, cookie or code is not known, or not any more"
                             : "a token is needed: Authorization: Bearer TOKEN, or log in at /login",
                         ""});
@@ -53,20 +53,20 @@ HttpReply access_refusal(const AccessControl::Outcome& outcome) {
   return reply;
 }
 
-HttpReply session_reply(AccessControl& access, const std::optional<AccessControl::Identity>& who,
+HttpReply session_reply(access::AccessControl& access, const std::optional<access::AccessControl::Identity>& who,
                         const SessionRequest& request, double now_s) {
   using Method = SessionRequest::Method;
   if (request.path == kCodesPath) {
     if (request.method != Method::Post) return not_allowed("POST");
     const auto name = field_of(request.body, "role");
-    const auto role = name ? access_role(*name) : std::nullopt;
+    const auto role = name ? access::access_role(*name) : std::nullopt;
     if (!role) return bad_body("{\"role\": viewer, operator, ingest or admin}");
     if (!access.needs_token()) return refused({409, "not_needed", "", "this server asks nobody for a token", ""});
-    const auto code = access.make_code(who.value_or(AccessControl::Identity{}), *role);
-    if (!code) return access_refusal({who, AccessControl::Refusal::None});
+    const auto code = access.make_code(who.value_or(access::AccessControl::Identity{}), *role);
+    if (!code) return access_refusal({who, access::AccessControl::Refusal::None});
     return json_reply(200, {{"code", *code},
                             {"path", "/login#" + *code},
-                            {"seconds", std::chrono::seconds(AccessControl::kCodeLifetime).count()}});
+                            {"seconds", std::chrono::seconds(access::AccessControl::kCodeLifetime).count()}});
   }
   switch (request.method) {
     case Method::Get:
@@ -90,4 +90,4 @@ HttpReply session_reply(AccessControl& access, const std::optional<AccessControl
   return reply;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -6,7 +6,7 @@
 #include "server/access/access_control.hpp"
 #include "server/net/http_types.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// What the paths below kSessionPath do: say who one is, log in, log out, and let others in.
 struct SessionRequest {
@@ -18,10 +18,10 @@ struct SessionRequest {
 };
 
 /// docs/protocol.md, "Who may". `who` is as whom the request came, if as anybody.
-HttpReply session_reply(AccessControl& access, const std::optional<AccessControl::Identity>& who,
+HttpReply session_reply(access::AccessControl& access, const std::optional<access::AccessControl::Identity>& who,
                         const SessionRequest& request, double now_s);
 
 /// Why somebody who has not the right to something is refused.
-HttpReply access_refusal(const AccessControl::Outcome& outcome);
+HttpReply access_refusal(const access::AccessControl::Outcome& outcome);
 
-}  // namespace spectra::server
+}  // namespace spectra::net

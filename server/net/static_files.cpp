@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace fs = std::filesystem;
 namespace {
 
@@ -225,4 +225,4 @@ std::shared_ptr<const StaticFile> StaticFiles::find(std::string_view path) {
   return it == files_.end() ? nullptr : it->second;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

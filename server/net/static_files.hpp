@@ -11,7 +11,7 @@
 
 #include "server/net/http_types.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A file's content in one content coding.
 struct StaticVersion {
@@ -72,4 +72,4 @@ class StaticFiles {
   std::chrono::steady_clock::time_point last_miss_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

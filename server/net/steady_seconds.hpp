@@ -2,11 +2,11 @@
 
 #include <chrono>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Seconds of the steady clock.
 inline double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

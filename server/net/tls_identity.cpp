@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace ssl = boost::asio::ssl;
 using boost::system::error_code;
 
@@ -76,4 +76,4 @@ std::shared_ptr<ssl::context> TlsIdentity::current() const {
   return context_;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

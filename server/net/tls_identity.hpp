@@ -10,7 +10,7 @@ namespace boost::asio::ssl {
 class context;
 }
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// Certificate and private key that a server shows, TLS 1.2 or newer. Thread-safe.
 class TlsIdentity {
@@ -31,4 +31,4 @@ class TlsIdentity {
   std::shared_ptr<boost::asio::ssl::context> context_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

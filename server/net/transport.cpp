@@ -10,7 +10,7 @@
 #include <boost/beast/websocket/teardown.hpp>
 #include <optional>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 namespace ssl = boost::asio::ssl;
 
@@ -93,4 +93,4 @@ void Transport::tear_down(boost::beast::role_type role, std::function<void(Error
   boost::beast::websocket::async_teardown(role, layers_->connection.socket(), std::move(done));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -21,7 +21,7 @@ namespace boost::asio::ssl {
 class context;
 }
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// A connection as HTTP and WebSocket read and write it: as it is, or encrypted (TLS) after a handshake. Deadlines, counts of bytes and
 /// closing are those of the connection below, next_layer(). To be used on the connection's strand.
@@ -143,4 +143,4 @@ class Transport {
   std::unique_ptr<Layers> layers_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

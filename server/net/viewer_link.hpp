@@ -10,7 +10,7 @@
 #include "server/access/role.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// What hello is to hold: everything, or all but what is the same for every viewer.
 enum class HelloForm { Full, Brief };
@@ -50,7 +50,7 @@ class ViewerPeer {
   virtual HelloForm hello_form() const = 0;
 
   /// As whom the viewer was let in.
-  virtual AccessRole role() const = 0;
+  virtual access::AccessRole role() const = 0;
 
   /// Round trip of the last answered ping, milliseconds; 0 before the first.
   virtual double round_trip_ms() const = 0;
@@ -67,7 +67,7 @@ class ViewerClient {
   virtual void text_received(std::string_view text) = 0;
   virtual void binary_received() = 0;
   /// The frame lane: what to write next, or nothing now.
-  virtual std::optional<OutgoingFrame> next_frame() = 0;
+  virtual std::optional<stream::OutgoingFrame> next_frame() = 0;
   /// Called about once a NetLimits::tick.
   virtual void ticked() = 0;
   /// The last call.
@@ -76,4 +76,4 @@ class ViewerClient {
 
 using ViewerClientFactory = std::function<std::shared_ptr<ViewerClient>(std::shared_ptr<ViewerPeer> peer)>;
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -17,14 +17,14 @@
 #include "server/net/steady_seconds.hpp"
 #include "server/net/websocket_setup.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
 WebSocketSession::WebSocketSession(Transport stream, ServerContext& context, HelloForm hello_form,
-                                   AccessControl::Identity who)
+                                   access::AccessControl::Identity who)
     : ws_(std::move(stream)),
       context_(context),
       writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
@@ -100,7 +100,7 @@ asio::awaitable<void> WebSocketSession::read_messages() {
   }
 }
 
-asio::awaitable<void> WebSocketSession::pause(TokenBucket& bucket, double count) {
+asio::awaitable<void> WebSocketSession::pause(access::TokenBucket& bucket, double count) {
   while (!bucket.take(steady_seconds(), count) && !is_ended_) {
     reader_timer_.expires_after(std::chrono::duration_cast<Clock::duration>(
         std::chrono::duration<double>(bucket.wait_s(steady_seconds(), count))));
@@ -283,4 +283,4 @@ void WebSocketSession::cut() {
   asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end(true, "the server stops"); });
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

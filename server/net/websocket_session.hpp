@@ -16,7 +16,7 @@
 #include "server/net/server_context.hpp"
 #include "server/net/transport.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// One viewer's WebSocket: a reader, a writer and a minder of deadlines as coroutines on one strand. The writer takes the
 /// control lane before the frame lane; a read is outstanding all the time; the minder cuts whoever stops taking bytes.
@@ -27,7 +27,7 @@ class WebSocketSession final : public ViewerPeer,
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
   /// `stream` is connected and its executor is a strand.
-  WebSocketSession(Transport stream, ServerContext& context, HelloForm hello_form, AccessControl::Identity who);
+  WebSocketSession(Transport stream, ServerContext& context, HelloForm hello_form, access::AccessControl::Identity who);
 
   /// Answers the upgrade and serves until the connection ends. To be run on the stream's strand.
   boost::asio::awaitable<void> run(UpgradeRequest request);
@@ -36,7 +36,7 @@ class WebSocketSession final : public ViewerPeer,
   void wake() override;
   void send(OutgoingText text) override;
   HelloForm hello_form() const override { return hello_form_; }
-  AccessRole role() const override { return who_.role; }
+  access::AccessRole role() const override { return who_.role; }
   double round_trip_ms() const override { return round_trip_ms_; }
   std::size_t queued_bytes() const override { return control_bytes_; }
 
@@ -48,7 +48,7 @@ class WebSocketSession final : public ViewerPeer,
 
   boost::asio::awaitable<void> read_messages();
   /// Until so much may be read.
-  boost::asio::awaitable<void> pause(TokenBucket& bucket, double count);
+  boost::asio::awaitable<void> pause(access::TokenBucket& bucket, double count);
   boost::asio::awaitable<void> write_messages();
   boost::asio::awaitable<void> mind_deadlines();
   boost::asio::awaitable<void> ping(std::string payload);
@@ -66,10 +66,10 @@ class WebSocketSession final : public ViewerPeer,
   boost::asio::steady_timer writer_signal_;
   boost::asio::steady_timer minder_timer_;
   boost::asio::steady_timer reader_timer_;
-  TokenBucket messages_;
-  TokenBucket message_bytes_;
+  access::TokenBucket messages_;
+  access::TokenBucket message_bytes_;
   const HelloForm hello_form_;
-  const AccessControl::Identity who_;
+  const access::AccessControl::Identity who_;
   std::deque<OutgoingText> control_;
   std::size_t control_bytes_ = 0;
   bool is_open_ = false;
@@ -83,4 +83,4 @@ class WebSocketSession final : public ViewerPeer,
   double round_trip_ms_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::net {
 
 /// What every WebSocket that the server accepts has in common. `subprotocol` is what it agrees to, empty for none; a message of more than
 /// `message_max` bytes ends it (1009), 0 = of any length.
@@ -40,4 +40,4 @@ bool has_unknown_close(const Stream& ws) {
   return ws.reason().code > kLastCode;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::net

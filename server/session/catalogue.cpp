@@ -14,7 +14,7 @@
 #include "protocol/jsonrpc.hpp"
 #include "server/session/conversions.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 /// What closes params and message of a notification.
@@ -44,16 +44,16 @@ std::string gzip(const std::string& text) {
 Catalogue::Catalogue() {
   std::string text = protocol::to_json(protocol::Catalogue{method_messages(), palette_messages()}).dump();
   path_ = fmt::format("{}/{:016x}", kPath.substr(1), std::hash<std::string>{}(text));
-  auto file = std::make_shared<StaticFile>();
+  auto file = std::make_shared<net::StaticFile>();
   file->content_type = "application/json";
-  file->versions.push_back(version_of(gzip(text), "gzip"));
-  file->versions.push_back(version_of(std::move(text), {}));
+  file->versions.push_back(net::version_of(gzip(text), "gzip"));
+  file->versions.push_back(net::version_of(std::move(text), {}));
   text_ = std::shared_ptr<const std::string>(file, &file->versions.back().content);
   file_ = std::move(file);
 }
 
-OutgoingText Catalogue::hello_text(protocol::Hello hello, HelloForm form) const {
-  if (form == HelloForm::Brief) {
+net::OutgoingText Catalogue::hello_text(protocol::Hello hello, net::HelloForm form) const {
+  if (form == net::HelloForm::Brief) {
     hello.catalogue = path_;
     return protocol::notification_text("hello", protocol::to_json(hello));
   }
@@ -63,12 +63,12 @@ OutgoingText Catalogue::hello_text(protocol::Hello hello, HelloForm form) const 
   return {std::move(begin), text_, std::string_view(*text_).substr(1, text_->size() - 2), std::string(kEnd)};
 }
 
-HttpReply Catalogue::reply(const HttpRequest& request) const {
+net::HttpReply Catalogue::reply(const net::HttpRequest& request) const {
   const std::string_view path = request.target.path;
-  if (path == kPath) return file_reply(file_, request, false);
-  if (path.substr(1) == path_) return file_reply(file_, request, true);
-  return text_reply(404,
-                    "methods and palettes are not those of that name (any more): see " + std::string(kPath) + "\n");
+  if (path == kPath) return net::file_reply(file_, request, false);
+  if (path.substr(1) == path_) return net::file_reply(file_, request, true);
+  return net::text_reply(
+      404, "methods and palettes are not those of that name (any more): see " + std::string(kPath) + "\n");
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

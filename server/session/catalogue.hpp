@@ -8,7 +8,7 @@
 #include "server/net/static_files.hpp"
 #include "server/net/viewer_link.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// Methods and palettes, nearly all of a full hello and the same for every viewer: one text, made once, that hello and HTTP
 /// share. Immutable, so any thread may use it.
@@ -20,17 +20,17 @@ class Catalogue {
   const std::string& path() const { return path_; }
 
   /// hello as a text: with methods and palettes, or with the path where they are. `hello` has neither.
-  OutgoingText hello_text(protocol::Hello hello, HelloForm form) const;
+  net::OutgoingText hello_text(protocol::Hello hello, net::HelloForm form) const;
 
   /// The answer to a request for kPath, or for a path below it: 404 where that is not the one of this content.
-  HttpReply reply(const HttpRequest& request) const;
+  net::HttpReply reply(const net::HttpRequest& request) const;
 
   static constexpr std::string_view kPath = "/api/v1/catalogue";
 
  private:
   std::shared_ptr<const std::string> text_;
-  std::shared_ptr<const StaticFile> file_;
+  std::shared_ptr<const net::StaticFile> file_;
   std::string path_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -9,7 +9,7 @@
 #include "server/session/settings_text.hpp"
 #include "server/stream/extremes_in_view.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000;
@@ -32,19 +32,19 @@ protocol::ParameterKind to_message(fusion::ParameterKind kind) {
   return protocol::ParameterKind::Number;
 }
 
-protocol::UpAxis to_message(fusion::UpAxis up) {
+protocol::UpAxis to_message(base::UpAxis up) {
   switch (up) {
-    case fusion::UpAxis::X:
+    case base::UpAxis::X:
       return protocol::UpAxis::X;
-    case fusion::UpAxis::Y:
+    case base::UpAxis::Y:
       return protocol::UpAxis::Y;
-    case fusion::UpAxis::Z:
+    case base::UpAxis::Z:
       return protocol::UpAxis::Z;
-    case fusion::UpAxis::MinusX:
+    case base::UpAxis::MinusX:
       return protocol::UpAxis::MinusX;
-    case fusion::UpAxis::MinusY:
+    case base::UpAxis::MinusY:
       return protocol::UpAxis::MinusY;
-    case fusion::UpAxis::MinusZ:
+    case base::UpAxis::MinusZ:
       return protocol::UpAxis::MinusZ;
   }
   return protocol::UpAxis::Z;
@@ -133,20 +133,20 @@ std::optional<bool> if_true(bool value) {
   return value ? std::optional(true) : std::nullopt;
 }
 
-protocol::Vector3 to_message(const fusion::Vec3f& v) {
+protocol::Vector3 to_message(const base::Vec3f& v) {
   return {double{v.x}, double{v.y}, double{v.z}};
 }
 
-std::array<std::uint8_t, 3> to_message(fusion::Rgb8 colour) {
+std::array<std::uint8_t, 3> to_message(base::Rgb8 colour) {
   return {colour.r, colour.g, colour.b};
 }
 
-std::optional<protocol::Extreme> to_message(const std::optional<Extreme>& extreme) {
+std::optional<protocol::Extreme> to_message(const std::optional<map::Extreme>& extreme) {
   if (!extreme) return std::nullopt;
   return protocol::Extreme{to_message(extreme->position), double{extreme->temperature_celsius}};
 }
 
-fusion::Vec3f to_vec3f(const std::array<double, 3>& v) {
+base::Vec3f to_vec3f(const std::array<double, 3>& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
@@ -236,7 +236,7 @@ protocol::Result<fusion::FusionChange> from_message(const protocol::FusionChange
   return change;
 }
 
-protocol::RpcError to_rpc_error(const fusion::Error& error) {
+protocol::RpcError to_rpc_error(const base::Error& error) {
   protocol::RpcError message;
   message.code = protocol::RpcErrorCode::InvalidParams;
   message.message = error.message;
@@ -273,7 +273,7 @@ protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary)
   return message;
 }
 
-protocol::SceneDescription to_message(const SceneSnapshot& scene) {
+protocol::SceneDescription to_message(const map::SceneSnapshot& scene) {
   protocol::SceneDescription message;
   message.name = scene.name();
   message.revision = scene.revision();
@@ -329,7 +329,7 @@ protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fu
   return message;
 }
 
-protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
+protocol::ProbeReply to_message(const map::Probe& probe, base::Rgb8 fused) {
   protocol::ProbeReply message;
   message.vertex_index = probe.vertex_index;
   message.position = to_message(probe.position);
@@ -351,8 +351,8 @@ protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused) {
   return message;
 }
 
-static protocol::ExtremesReply to_message(const ExtremesInView& extremes) {
-  const auto place_of = [](const std::optional<Extreme>& extreme) -> std::optional<protocol::Vector3> {
+static protocol::ExtremesReply to_message(const stream::ExtremesInView& extremes) {
+  const auto place_of = [](const std::optional<map::Extreme>& extreme) -> std::optional<protocol::Vector3> {
     if (!extreme) return std::nullopt;
     return to_message(extreme->position);
   };
@@ -360,16 +360,17 @@ static protocol::ExtremesReply to_message(const ExtremesInView& extremes) {
           place_of(extremes.under_range)};
 }
 
-protocol::ExtremesReply extremes_message(const SceneSnapshot& scene) {
-  return to_message(ExtremesInView{scene.hottest(), scene.coldest(), scene.over_range(), scene.under_range()});
+protocol::ExtremesReply extremes_message(const map::SceneSnapshot& scene) {
+  return to_message(stream::ExtremesInView{scene.hottest(), scene.coldest(), scene.over_range(), scene.under_range()});
 }
 
-protocol::ExtremesReply extremes_message(const SceneSnapshot& scene, const protocol::ExtremesRequest& request) {
+protocol::ExtremesReply extremes_message(const map::SceneSnapshot& scene, const protocol::ExtremesRequest& request) {
   if (!request.camera) return extremes_message(scene);
-  return to_message(extremes_in_view(scene, from_message(*request.camera), request.window.value_or(kWholePicture)));
+  return to_message(
+      stream::extremes_in_view(scene, from_message(*request.camera), request.window.value_or(stream::kWholePicture)));
 }
 
-protocol::QualityState to_message(const StreamQuality& quality) {
+protocol::QualityState to_message(const stream::StreamQuality& quality) {
   protocol::QualityState message;
   message.mode = quality.automatic ? protocol::QualityMode::Auto : protocol::QualityMode::Manual;
   message.position_step_mm =
@@ -382,11 +383,12 @@ protocol::QualityState to_message(const StreamQuality& quality) {
   return message;
 }
 
-protocol::Result<StreamQuality> with_change(const StreamQuality& quality, const protocol::QualityChange& change) {
-  StreamQuality changed = quality;
+protocol::Result<stream::StreamQuality> with_change(const stream::StreamQuality& quality,
+                                                    const protocol::QualityChange& change) {
+  stream::StreamQuality changed = quality;
   if (change.mode) changed.automatic = *change.mode == protocol::QualityMode::Auto;
   if (change.position_step_mm) {
-    changed.position_step_m = lattice_step(*change.position_step_mm / kMillimetresPerMetre);
+    changed.position_step_m = stream::lattice_step(*change.position_step_mm / kMillimetresPerMetre);
   }
   if (change.colour_bits) changed.colour_bits = *change.colour_bits;
   if (change.pixel_error) changed.pixel_error = *change.pixel_error;
@@ -396,12 +398,12 @@ protocol::Result<StreamQuality> with_change(const StreamQuality& quality, const 
   return changed;
 }
 
-Camera from_message(const protocol::CameraSet& message) {
+stream::Camera from_message(const protocol::CameraSet& message) {
   return {to_vec3f(message.eye), to_vec3f(message.target), to_vec3f(message.up), message.fov_y_deg, message.viewport};
 }
 
-protocol::StreamComplete to_message(const StreamComplete& complete) {
+protocol::StreamComplete to_message(const stream::StreamComplete& complete) {
   return {complete.generation, complete.scene_revision, complete.tile_count, complete.vertex_count};
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

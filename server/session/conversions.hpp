@@ -21,7 +21,7 @@
 
 /// The one place that translates between what the fusion library, the scene and the streams know and what goes over
 /// the wire.
-namespace spectra::server {
+namespace spectra::session {
 
 protocol::MethodDescription to_message(const fusion::Method& method);
 protocol::PaletteDescription to_message(const fusion::Palette& palette);
@@ -41,26 +41,27 @@ std::optional<std::string> palette_warning(const fusion::Method& method, const f
 std::optional<std::string> direction_warning(const fusion::Method& method, const fusion::Palette* palette);
 
 /// InvalidParams with the field of the error; `is_known_method` tells a parameter's name from the other fields.
-protocol::RpcError to_rpc_error(const fusion::Error& error);
+protocol::RpcError to_rpc_error(const base::Error& error);
 
 protocol::SceneTemperature to_message(const fusion::TemperatureSummary& summary);
-protocol::SceneDescription to_message(const SceneSnapshot& scene);
+protocol::SceneDescription to_message(const map::SceneSnapshot& scene);
 /// Without histogram and hues.
 protocol::FactsReply facts_message(const fusion::TemperatureSummary& summary);
 protocol::HistogramReply to_message(const fusion::Histogram& histogram, const fusion::TemperatureSummary& scene,
                                     const std::vector<fusion::TemperatureInterval>& highlighted,
                                     std::optional<double> highlighted_share);
-protocol::ProbeReply to_message(const Probe& probe, fusion::Rgb8 fused);
-protocol::ExtremesReply extremes_message(const SceneSnapshot& scene);
+protocol::ProbeReply to_message(const map::Probe& probe, base::Rgb8 fused);
+protocol::ExtremesReply extremes_message(const map::SceneSnapshot& scene);
 /// Of what the camera of the request sees, where it has one.
-protocol::ExtremesReply extremes_message(const SceneSnapshot& scene, const protocol::ExtremesRequest& request);
+protocol::ExtremesReply extremes_message(const map::SceneSnapshot& scene, const protocol::ExtremesRequest& request);
 
-protocol::QualityState to_message(const StreamQuality& quality);
+protocol::QualityState to_message(const stream::StreamQuality& quality);
 
 /// `quality` with the change; refuses what this server does not do.
-protocol::Result<StreamQuality> with_change(const StreamQuality& quality, const protocol::QualityChange& change);
+protocol::Result<stream::StreamQuality> with_change(const stream::StreamQuality& quality,
+                                                    const protocol::QualityChange& change);
 
-Camera from_message(const protocol::CameraSet& message);
-protocol::StreamComplete to_message(const StreamComplete& complete);
+stream::Camera from_message(const protocol::CameraSet& message);
+protocol::StreamComplete to_message(const stream::StreamComplete& complete);
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::session {
 
 void LoadingProgress::set(std::optional<std::string> message) {
   std::vector<std::shared_ptr<const Listener>> alive;
@@ -32,4 +32,4 @@ std::shared_ptr<const LoadingProgress::Listener> LoadingProgress::subscribe(List
   return held;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -16,7 +16,7 @@
 #include "server/sources/baseline_marked.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// What is being done about the scene, in words; nothing when it is served. Thread-safe.
 class LoadingProgress {
@@ -41,15 +41,15 @@ struct ServedScene {
   ServedScene(unsigned worker_count, std::size_t cache_capacity_bytes)
       : cache(cache_capacity_bytes), pool(worker_count) {}
 
-  SceneStore scenes;
+  map::SceneStore scenes;
   LoadingProgress progress;
   const SessionIds session_ids;
   const Catalogue catalogue;
   /// MapKeeper::mark_baseline() of the map; whoever makes the keeper sets it before there are sessions.
-  std::function<void(BaselineDone)> mark_baseline;
+  std::function<void(sources::BaselineDone)> mark_baseline;
   std::atomic<std::uint64_t> viewer_count{0};
-  FrameCache cache;
-  WorkerPool pool;  ///< Last, so that it stops first: its jobs use the others.
+  stream::FrameCache cache;
+  jobs::WorkerPool pool;  ///< Last, so that it stops first: its jobs use the others.
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::session

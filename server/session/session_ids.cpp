@@ -2,7 +2,7 @@
 
 #include <random>
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 /// 16 random hexadecimal digits.
@@ -29,4 +29,4 @@ bool SessionIds::is_of_this_run(std::string_view session_id) const {
   return session_id.size() == 2 * run_.size() && session_id.starts_with(run_);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

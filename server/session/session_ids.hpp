@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// Makes the ids of the sessions of one run of the server, and knows them again. Tile revisions mean something only within
 /// the run that issued them, so whoever comes back with tiles says from which session they are. To clients the ids are
@@ -22,4 +22,4 @@ class SessionIds {
   const std::string run_;  ///< What every id of this run begins with.
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -7,9 +7,9 @@
 
 #include "fusion/registry.hpp"
 
-namespace spectra::server {
-using fusion::ErrorCode;
-using fusion::failure;
+namespace spectra::session {
+using base::ErrorCode;
+using base::failure;
 
 namespace {
 
@@ -23,7 +23,7 @@ std::optional<double> finite_number(std::string_view text) {
 
 }  // namespace
 
-fusion::Result<fusion::RangeSetting> range_from_text(std::string_view text) {
+base::Result<fusion::RangeSetting> range_from_text(std::string_view text) {
   constexpr std::string_view kPercentile = "percentile";
   if (text == "auto") return fusion::RangeSetting{};
   if (text == kPercentile) return fusion::RangeSetting::percentile();
@@ -33,27 +33,28 @@ fusion::Result<fusion::RangeSetting> range_from_text(std::string_view text) {
   const auto low = finite_number(numbers.substr(0, colon));
   const auto high = colon == std::string_view::npos ? std::nullopt : finite_number(numbers.substr(colon + 1));
   if (!low || !high) {
-    return failure(ErrorCode::WrongType,
-                   "range is \"" + std::string(text) +
-                       "\"; it must be auto, LO:HI with two numbers in degC, percentile, or percentile:LO:HI with two "
-                       "percentages from 0 to 100",
-                   "range");
+    return base::failure(
+        base::ErrorCode::WrongType,
+        "range is \"" + std::string(text) +
+            "\"; it must be auto, LO:HI with two numbers in degC, percentile, or percentile:LO:HI with two "
+            "percentages from 0 to 100",
+        "range");
   }
   return is_percentile ? fusion::RangeSetting::percentile(*low, *high) : fusion::RangeSetting::manual(*low, *high);
 }
 
-fusion::Result<fusion::MissingDisplay> missing_from_text(std::string_view text) {
+base::Result<fusion::MissingDisplay> missing_from_text(std::string_view text) {
   if (text == "visible") return fusion::MissingDisplay{};
   std::uint32_t rgb = 0;
   const bool is_colour = text.size() == 7 && text.front() == '#';
   const auto [end, error] = std::from_chars(text.data() + (is_colour ? 1 : 0), text.data() + text.size(), rgb, 16);
   if (!is_colour || error != std::errc{} || end != text.data() + text.size()) {
-    return failure(ErrorCode::WrongType,
-                   "missing is \"" + std::string(text) + "\"; it must be visible or a colour such as #ff00ff",
-                   "missing");
+    return base::failure(base::ErrorCode::WrongType,
+                         "missing is \"" + std::string(text) + "\"; it must be visible or a colour such as #ff00ff",
+                         "missing");
   }
   const auto channel = [rgb](int shift) { return static_cast<std::uint8_t>(rgb >> shift & 0xffU); };
-  return fusion::MissingDisplay{fusion::Rgb8{channel(16), channel(8), channel(0)}};
+  return fusion::MissingDisplay{base::Rgb8{channel(16), channel(8), channel(0)}};
 }
 
 std::string missing_to_text(const fusion::MissingDisplay& missing) {
@@ -67,7 +68,7 @@ std::string missing_to_text(const fusion::MissingDisplay& missing) {
   return text;
 }
 
-fusion::Result<fusion::FusionSettings> settings_from_text(const SettingsText& text) {
+base::Result<fusion::FusionSettings> settings_from_text(const SettingsText& text) {
   fusion::FusionChange change;
   change.method = text.method;
   change.palette = text.palette;
@@ -90,9 +91,9 @@ fusion::Result<fusion::FusionSettings> settings_from_text(const SettingsText& te
     if (parameter == parameters.end()) {
       std::string known;
       for (const auto& p : parameters) known += (known.empty() ? "" : ", ") + p.name;
-      return failure(ErrorCode::UnknownParameter,
-                     method_id + " has no parameter \"" + name + "\"; it has " + (known.empty() ? "none" : known),
-                     "params." + name);
+      return base::failure(base::ErrorCode::UnknownParameter,
+                           method_id + " has no parameter \"" + name + "\"; it has " + (known.empty() ? "none" : known),
+                           "params." + name);
     }
     BOOST_OUTCOME_TRY(auto parsed, fusion::parse_parameter(*parameter, value));
     change.params.insert_or_assign(name, std::move(parsed));
@@ -100,4 +101,4 @@ fusion::Result<fusion::FusionSettings> settings_from_text(const SettingsText& te
   return fusion::with_change(defaults, change);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

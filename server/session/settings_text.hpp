@@ -9,7 +9,7 @@
 #include "fusion/base/error.hpp"
 #include "fusion/settings.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// Fusion settings as a person writes them: on the command line and in the query of an export. What is absent has its
 /// default.
@@ -22,15 +22,15 @@ struct SettingsText {
 };
 
 /// The settings of the text, or an Error that names the field and what would be accepted.
-fusion::Result<fusion::FusionSettings> settings_from_text(const SettingsText& text);
+base::Result<fusion::FusionSettings> settings_from_text(const SettingsText& text);
 
 /// "auto", "LO:HI" in degC, "percentile" or "percentile:LO:HI" in percent.
-fusion::Result<fusion::RangeSetting> range_from_text(std::string_view text);
+base::Result<fusion::RangeSetting> range_from_text(std::string_view text);
 
 /// "visible" or "#rrggbb".
-fusion::Result<fusion::MissingDisplay> missing_from_text(std::string_view text);
+base::Result<fusion::MissingDisplay> missing_from_text(std::string_view text);
 
 /// The inverse of missing_from_text.
 std::string missing_to_text(const fusion::MissingDisplay& missing);
 
-}  // namespace spectra::server
+}  // namespace spectra::session

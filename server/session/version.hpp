@@ -2,9 +2,9 @@
 
 #include <string_view>
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// As CMake's project() says.
 inline constexpr std::string_view kVersion = SPECTRA_VERSION;
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -21,7 +21,7 @@
 #include "server/session/conversions.hpp"
 #include "server/session/version.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 using nlohmann::json;
 using protocol::refusal;
 using protocol::RpcErrorCode;
@@ -38,7 +38,7 @@ constexpr std::size_t kBinBytes = 48;
 const std::string kNotePrefix = "scene.";
 
 /// What settings are prepared with.
-fusion::SceneTemperature temperature_of(const std::shared_ptr<const SceneSnapshot>& scene) {
+fusion::SceneTemperature temperature_of(const std::shared_ptr<const map::SceneSnapshot>& scene) {
   return scene ? *scene->reference_temperature() : fusion::SceneTemperature{};
 }
 
@@ -63,7 +63,7 @@ std::optional<double> if_positive(double value) {
 
 /// One round on the pool: what goes in, and what comes out.
 struct ViewerSession::Preparation {
-  std::shared_ptr<const SceneSnapshot> scene;
+  std::shared_ptr<const map::SceneSnapshot> scene;
   bool is_new_scene = false;
   bool has_new_temperatures = false;  ///< The new scene asks for another plan.
   bool is_first_view = false;         ///< The viewer has changed nothing yet.
@@ -104,7 +104,8 @@ struct ViewerSession::Preparation {
   }
 };
 
-ViewerSession::ViewerSession(const std::shared_ptr<ViewerPeer>& peer, ServedScene& served, const NetLimits& limits)
+ViewerSession::ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, ServedScene& served,
+                             const net::NetLimits& limits)
     : peer_(*peer),
       weak_peer_(peer),
       served_(served),
@@ -121,7 +122,7 @@ void ViewerSession::opened() {
       });
     }
   };
-  scene_subscription_ = served_.scenes.subscribe([post](const std::shared_ptr<const SceneSnapshot>& scene) {
+  scene_subscription_ = served_.scenes.subscribe([post](const std::shared_ptr<const map::SceneSnapshot>& scene) {
     post([scene](ViewerSession& self) { self.take_scene(scene); });
   });
   progress_subscription_ = served_.progress.subscribe([post](const std::optional<std::string>& message) {
@@ -137,7 +138,7 @@ void ViewerSession::opened() {
   protocol::Hello hello;
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
-  hello.role = may(peer_.role(), Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
+  hello.role = access::may(peer_.role(), access::Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
                         "cache_bytes", "marks", "age",      "baseline"};
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
@@ -185,19 +186,19 @@ void ViewerSession::answered(const Id& id, const json& params) {
 std::span<const ViewerSession::Request> ViewerSession::requests() {
   using Self = ViewerSession;
   static constexpr Request kRequests[] = {
-      {"stream.ack", Right::Watch, Cost::Free, &Self::answered<&Self::acknowledge>},
-      {"camera.set", Right::Watch, Cost::Free, &Self::answered<&Self::set_camera>},
-      {"fusion.set", Right::Watch, Cost::Request, &Self::fusion_set},
-      {"fusion.get", Right::Watch, Cost::Request, &Self::answered<&Self::fusion_get>},
-      {"quality.set", Right::Watch, Cost::Request, &Self::answered<&Self::set_quality>},
-      {"scene.get", Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
-      {"scene.subscribe", Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
-      {"scene.unsubscribe", Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
-      {"scene.histogram", Right::Watch, Cost::Request, &Self::histogram},
-      {"scene.probe", Right::Watch, Cost::Request, &Self::probe},
-      {"fusion.facts", Right::Watch, Cost::Request, &Self::facts},
-      {"scene.extremes", Right::Watch, Cost::Request, &Self::extremes},
-      {"scene.baseline", Right::Watch, Cost::Request, &Self::baseline},
+      {"stream.ack", access::Right::Watch, Cost::Free, &Self::answered<&Self::acknowledge>},
+      {"camera.set", access::Right::Watch, Cost::Free, &Self::answered<&Self::set_camera>},
+      {"fusion.set", access::Right::Watch, Cost::Request, &Self::fusion_set},
+      {"fusion.get", access::Right::Watch, Cost::Request, &Self::answered<&Self::fusion_get>},
+      {"quality.set", access::Right::Watch, Cost::Request, &Self::answered<&Self::set_quality>},
+      {"scene.get", access::Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
+      {"scene.subscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
+      {"scene.unsubscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
+      {"scene.histogram", access::Right::Watch, Cost::Request, &Self::histogram},
+      {"scene.probe", access::Right::Watch, Cost::Request, &Self::probe},
+      {"fusion.facts", access::Right::Watch, Cost::Request, &Self::facts},
+      {"scene.extremes", access::Right::Watch, Cost::Request, &Self::extremes},
+      {"scene.baseline", access::Right::Watch, Cost::Request, &Self::baseline},
   };
   return kRequests;
 }
@@ -207,7 +208,7 @@ void ViewerSession::handle(const protocol::IncomingMessage& message) {
   const auto request = std::find_if(
       known.begin(), known.end(), [&message](const Request& candidate) { return candidate.method == message.method; });
   const bool is_known = request != known.end();
-  if ((!is_known || request->cost != Cost::Free) && !requests_.take(steady_seconds())) {
+  if ((!is_known || request->cost != Cost::Free) && !requests_.take(net::steady_seconds())) {
     const auto allowed = static_cast<long>(limits_.requests_per_s);
     return answer(message.id,
                   refusal(RpcErrorCode::Busy, "too many requests", "", std::to_string(allowed) + " a second"));
@@ -216,7 +217,7 @@ void ViewerSession::handle(const protocol::IncomingMessage& message) {
     return answer(message.id, refusal(RpcErrorCode::MethodNotFound,
                                       "there is no method \"" + message.method.substr(0, 64) + "\"", "method"));
   }
-  if (!may(peer_.role(), request->right)) {
+  if (!access::may(peer_.role(), request->right)) {
     return answer(message.id, refusal(RpcErrorCode::Forbidden,
                                       "that is not for the role " + std::string(to_string(peer_.role())), "method"));
   }
@@ -273,12 +274,12 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
 }
 
 bool ViewerSession::gives_raw_layers() const {
-  return limits_.gives_raw_layers && may(peer_.role(), Right::Operate);
+  return limits_.gives_raw_layers && access::may(peer_.role(), access::Right::Operate);
 }
 
 std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
   if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return 0;
-  std::vector<ResumedTile> tiles;
+  std::vector<stream::ResumedTile> tiles;
   tiles.reserve(request.tiles.size());
   for (const auto& [level, x, y, z, revision] : request.tiles) {
     tiles.push_back({{static_cast<std::uint8_t>(level), x, y, z}, revision});
@@ -318,7 +319,7 @@ ViewerSession::Answer ViewerSession::set_camera(const json& params) {
 
 ViewerSession::Answer ViewerSession::acknowledge(const json& params) {
   BOOST_OUTCOME_TRY(const auto ack, protocol::from_json<protocol::StreamAck>(params));
-  if (stream_) stream_->acknowledge(ack.sequence, steady_seconds());
+  if (stream_) stream_->acknowledge(ack.sequence, net::steady_seconds());
   peer_.wake();
   return json::object();
 }
@@ -367,7 +368,7 @@ void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::
           self->answer(id, computed);
         });
       },
-      kAnswerPriority);
+      jobs::kAnswerPriority);
 }
 
 void ViewerSession::histogram(const Id& id, const json& params) {
@@ -411,12 +412,12 @@ void ViewerSession::probe(const Id& id, const json& params) {
   if (!request) return answer(id, refused(request.error()));
   if (!scene_) return answer(id, no_scene());
   const auto& p = request.value().position;
-  const fusion::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+  const base::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
   answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, plan = *plan_, position]() -> Answer {
     const auto found = scene->probe(position);
     if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
     const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
-    fusion::Rgb8 fused;
+    base::Rgb8 fused;
     const float baseline = found->baseline_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
     std::uint8_t freshness = fusion::AgeSteps::kFresh;
     if (const auto& age = plan.settings().age; age.mode == fusion::AgeMode::Fade && found->observed_at) {
@@ -434,7 +435,7 @@ void ViewerSession::baseline(const Id& id, const json& params) {
   if (request.value().action == protocol::BaselineAction::Get) {
     return answer(id, protocol::to_json(protocol::BaselineReply{scene_->baseline_marked_at(), scene_->revision()}));
   }
-  if (!may(peer_.role(), Right::Operate)) {
+  if (!access::may(peer_.role(), access::Right::Operate)) {
     return answer(
         id, refusal(RpcErrorCode::Forbidden,
                     "to mark the baseline is not for the role " + std::string(to_string(peer_.role())), "action"));
@@ -446,10 +447,10 @@ void ViewerSession::baseline(const Id& id, const json& params) {
     peer->post([weak_self, id, outcome] {
       const auto self = weak_self.lock();
       if (!self) return;
-      if (const auto* marked = std::get_if<BaselineMarked>(&outcome)) {
+      if (const auto* marked = std::get_if<sources::BaselineMarked>(&outcome)) {
         self->answer(id, protocol::to_json(protocol::BaselineReply{marked->marked_at, marked->revision}));
       } else {
-        const auto& why = std::get<BlockRefusal>(outcome);
+        const auto& why = std::get<net::BlockRefusal>(outcome);
         const auto code = why.status == 503   ? RpcErrorCode::Busy
                           : why.status == 409 ? RpcErrorCode::InvalidRequest
                                               : RpcErrorCode::InternalError;
@@ -468,7 +469,7 @@ void ViewerSession::extremes(const Id& id, const json& params) {
   });
 }
 
-void ViewerSession::take_scene(const std::shared_ptr<const SceneSnapshot>& scene) {
+void ViewerSession::take_scene(const std::shared_ptr<const map::SceneSnapshot>& scene) {
   const auto& newest = coming_scene_ ? coming_scene_ : scene_;
   if (newest && scene->revision() <= newest->revision()) return;
   coming_scene_ = scene;
@@ -503,7 +504,7 @@ void ViewerSession::start_preparation() {
           if (const auto self = weak_self.lock()) self->finish_preparation(preparation);
         });
       },
-      kAnswerPriority);
+      jobs::kAnswerPriority);
 }
 
 void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
@@ -546,17 +547,17 @@ void ViewerSession::begin_stream() {
     stream_->set_scene(scene_);
     return;
   }
-  stream_ = ViewerStream::create(scene_, served_.cache, served_.pool, [weak_peer = weak_peer_] {
+  stream_ = stream::ViewerStream::create(scene_, served_.cache, served_.pool, [weak_peer = weak_peer_] {
     if (const auto peer = weak_peer.lock()) peer->wake();
   });
-  if (quality_ != StreamQuality{}) stream_->set_quality(quality_);
+  if (quality_ != stream::StreamQuality{}) stream_->set_quality(quality_);
   if (camera_) stream_->set_camera(*camera_);
   if (is_subscribed_) stream_->subscribe(subscription_);
 }
 
 void ViewerSession::tell_notes() {
   std::set<std::string> held;
-  for (const fusion::Note& note : scene_ ? scene_->notes() : std::span<const fusion::Note>()) {
+  for (const files::Note& note : scene_ ? scene_->notes() : std::span<const files::Note>()) {
     const std::string id = kNotePrefix + note.id;
     set_status(id, note.needs_attention ? protocol::StatusLevel::Warning : protocol::StatusLevel::Info, note.message);
     held.insert(id);
@@ -603,13 +604,13 @@ protocol::FusionReply ViewerSession::fusion_reply() const {
   return {stream_ ? stream_->generation() : 0, to_message(*plan_, temperature_of(scene_).summary)};
 }
 
-StreamQuality ViewerSession::quality() const {
+stream::StreamQuality ViewerSession::quality() const {
   return stream_ ? stream_->quality() : quality_;
 }
 
-std::optional<OutgoingFrame> ViewerSession::next_frame() {
+std::optional<stream::OutgoingFrame> ViewerSession::next_frame() {
   if (!stream_) return std::nullopt;
-  auto frame = stream_->next_frame(steady_seconds());
+  auto frame = stream_->next_frame(net::steady_seconds());
   if (!frame) {
     if (const auto complete = stream_->take_complete()) {
       notify("stream.complete", protocol::to_json(to_message(*complete)));
@@ -621,7 +622,7 @@ std::optional<OutgoingFrame> ViewerSession::next_frame() {
 void ViewerSession::ticked() {
   if (!is_subscribed_ || !stream_) return;
   stream_->set_time(unix_seconds());
-  const StreamStats stats = stream_->stats();
+  const stream::StreamStats stats = stream_->stats();
   protocol::StreamStats message;
   message.round_trip_ms = if_positive(stats.round_trip_ms);
   if (!message.round_trip_ms) message.round_trip_ms = if_positive(peer_.round_trip_ms());
@@ -652,4 +653,4 @@ void ViewerSession::set_status(const std::string& id, protocol::StatusLevel leve
   notify("status", protocol::to_json(protocol::Status{id, level, std::move(message)}));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -19,19 +19,19 @@
 #include "server/net/viewer_link.hpp"
 #include "server/session/served_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 
 /// What one viewer says and is told: the messages of docs/protocol.md over its own settings, camera and stream. Runs on
 /// its session's strand; what computes is posted to the worker pool and comes back through ViewerPeer::post().
-class ViewerSession final : public ViewerClient, public std::enable_shared_from_this<ViewerSession> {
+class ViewerSession final : public net::ViewerClient, public std::enable_shared_from_this<ViewerSession> {
  public:
   /// The peer owns the session and outlives every call to it.
-  ViewerSession(const std::shared_ptr<ViewerPeer>& peer, ServedScene& served, const NetLimits& limits);
+  ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, ServedScene& served, const net::NetLimits& limits);
 
   void opened() override;
   void text_received(std::string_view text) override;
   void binary_received() override;
-  std::optional<OutgoingFrame> next_frame() override;
+  std::optional<stream::OutgoingFrame> next_frame() override;
   void ticked() override;
   void closed() override;
 
@@ -53,7 +53,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   /// One of the methods that a viewer may call.
   struct Request {
     std::string_view method;
-    Right right;
+    access::Right right;
     Cost cost;
     void (ViewerSession::*handle)(const Id& id, const nlohmann::json& params);
   };
@@ -85,7 +85,7 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
   void answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute);
 
-  void take_scene(const std::shared_ptr<const SceneSnapshot>& scene);
+  void take_scene(const std::shared_ptr<const map::SceneSnapshot>& scene);
   /// Prepares the waiting changes, or the settings for a scene that has come, on the pool; one at a time.
   void start_preparation();
   void finish_preparation(const std::shared_ptr<Preparation>& preparation);
@@ -96,24 +96,24 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   void tell_method_limits();
   void set_plan(fusion::FusionPlan plan);
   protocol::FusionReply fusion_reply() const;
-  StreamQuality quality() const;
+  stream::StreamQuality quality() const;
   /// This viewer may have raw layers.
   bool gives_raw_layers() const;
 
   /// Sends a status when it differs from what the viewer was told last.
   void set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message);
 
-  ViewerPeer& peer_;
-  const std::weak_ptr<ViewerPeer> weak_peer_;
+  net::ViewerPeer& peer_;
+  const std::weak_ptr<net::ViewerPeer> weak_peer_;
   ServedScene& served_;
-  const NetLimits limits_;
-  TokenBucket requests_;
+  const net::NetLimits limits_;
+  access::TokenBucket requests_;
 
-  SceneStore::Subscription scene_subscription_;
+  map::SceneStore::Subscription scene_subscription_;
   std::shared_ptr<const LoadingProgress::Listener> progress_subscription_;
-  std::shared_ptr<const SceneSnapshot> scene_;
-  std::shared_ptr<const SceneSnapshot> coming_scene_;
-  std::shared_ptr<ViewerStream> stream_;
+  std::shared_ptr<const map::SceneSnapshot> scene_;
+  std::shared_ptr<const map::SceneSnapshot> coming_scene_;
+  std::shared_ptr<stream::ViewerStream> stream_;
   std::optional<fusion::FusionPlan> plan_;
   std::vector<FusionRequest> waiting_;
   bool is_preparing_ = false;
@@ -122,10 +122,10 @@ class ViewerSession final : public ViewerClient, public std::enable_shared_from_
   std::size_t computing_bytes_ = 0;  ///< Of those answers, at most.
 
   bool is_subscribed_ = false;
-  Subscription subscription_;
-  std::optional<Camera> camera_;
-  StreamQuality quality_;
+  stream::Subscription subscription_;
+  std::optional<stream::Camera> camera_;
+  stream::StreamQuality quality_;
   std::map<std::string, std::string> statuses_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -6,38 +6,38 @@
 #include <cmath>
 #include <optional>
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
-fusion::Result<double> number(const std::string& name, std::string_view text, bool may_be_infinite = false) {
+base::Result<double> number(const std::string& name, std::string_view text, bool may_be_infinite = false) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || std::isnan(value) ||
       (!may_be_infinite && std::isinf(value))) {
-    return fusion::failure(fusion::ErrorCode::WrongType, name + " is \"" + std::string(text) + "\"; a number is wanted",
-                           name);
+    return base::failure(base::ErrorCode::WrongType, name + " is \"" + std::string(text) + "\"; a number is wanted",
+                         name);
   }
   return value;
 }
 
-fusion::Result<fusion::Vec3d> place(const std::string& name, std::string_view text) {
+base::Result<base::Vec3d> place(const std::string& name, std::string_view text) {
   std::array<double, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     const auto comma = text.find(',');
     if ((comma == std::string_view::npos) != (i == 2)) {
-      return fusion::failure(fusion::ErrorCode::WrongType, name + ": three numbers with commas between them are wanted",
-                             name);
+      return base::failure(base::ErrorCode::WrongType, name + ": three numbers with commas between them are wanted",
+                           name);
     }
     BOOST_OUTCOME_TRY(values[i], number(name, text.substr(0, comma)));
     if (i < 2) text.remove_prefix(comma + 1);
   }
-  return fusion::Vec3d{values[0], values[1], values[2]};
+  return base::Vec3d{values[0], values[1], values[2]};
 }
 
-fusion::Result<void> read_field(IncomingBlock& block, const std::string& name, const std::string& value) {
-  fusion::ReadOptions& read = block.read;
+base::Result<void> read_field(IncomingBlock& block, const std::string& name, const std::string& value) {
+  files::ReadOptions& read = block.read;
   if (value.find_first_of("\r\n") != std::string::npos) {
-    return fusion::failure(fusion::ErrorCode::WrongType, name + " has more than one line", name);
+    return base::failure(base::ErrorCode::WrongType, name + " has more than one line", name);
   }
   if (name == "observed_at") {
     BOOST_OUTCOME_TRY(block.observed_at, number(name, value));
@@ -46,11 +46,10 @@ fusion::Result<void> read_field(IncomingBlock& block, const std::string& name, c
   } else if (name == "temperature_property") {
     read.temperature_property = value;
   } else if (name == "temperature_unit") {
-    read.temperature_unit = fusion::temperature_unit(value);
+    read.temperature_unit = files::temperature_unit(value);
     if (!read.temperature_unit) {
-      return fusion::failure(fusion::ErrorCode::WrongType,
-                             name + " is \"" + value + "\"; celsius, kelvin, centikelvin or fahrenheit is wanted",
-                             name);
+      return base::failure(base::ErrorCode::WrongType,
+                           name + " is \"" + value + "\"; celsius, kelvin, centikelvin or fahrenheit is wanted", name);
     }
   } else if (name == "temperature_scale") {
     BOOST_OUTCOME_TRY(read.temperature_scale, number(name, value));
@@ -62,16 +61,16 @@ fusion::Result<void> read_field(IncomingBlock& block, const std::string& name, c
   } else if (name == "scale") {
     BOOST_OUTCOME_TRY(read.metres_per_unit, number(name, value));
   } else if (name == "up") {
-    read.up = fusion::up_axis(value);
+    read.up = base::up_axis(value);
     if (!read.up && value != "auto") {
-      return fusion::failure(fusion::ErrorCode::WrongType,
-                             name + " is \"" + value + "\"; x, y, z, -x, -y, -z or auto is wanted", name);
+      return base::failure(base::ErrorCode::WrongType,
+                           name + " is \"" + value + "\"; x, y, z, -x, -y, -z or auto is wanted", name);
     }
   } else {
-    return fusion::failure(fusion::ErrorCode::UnknownParameter, "there is no option \"" + name + "\" of a block", name);
+    return base::failure(base::ErrorCode::UnknownParameter, "there is no option \"" + name + "\" of a block", name);
   }
   if (name != "observed_at" && name != "sensor") block.read_text += name + '=' + value + '\n';
-  return fusion::success();
+  return base::success();
 }
 
 std::string number_text(double value) {
@@ -82,11 +81,11 @@ std::string number_text(double value) {
 
 }  // namespace
 
-std::vector<std::pair<std::string, std::string>> query_of(const fusion::ReadOptions& read) {
+std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptions& read) {
   std::vector<std::pair<std::string, std::string>> query;
   if (!read.temperature_property.empty()) query.emplace_back("temperature_property", read.temperature_property);
   for (const char* name : {"celsius", "kelvin", "centikelvin", "fahrenheit"}) {
-    if (read.temperature_unit && read.temperature_unit == fusion::temperature_unit(name)) {
+    if (read.temperature_unit && read.temperature_unit == files::temperature_unit(name)) {
       query.emplace_back("temperature_unit", name);
     }
   }
@@ -94,22 +93,22 @@ std::vector<std::pair<std::string, std::string>> query_of(const fusion::ReadOpti
   if (read.temperature_offset) query.emplace_back("temperature_offset", number_text(*read.temperature_offset));
   for (const double value : read.no_data) query.emplace_back("no_data", number_text(value));
   if (read.metres_per_unit) query.emplace_back("scale", number_text(*read.metres_per_unit));
-  if (read.up) query.emplace_back("up", fusion::to_string(*read.up));
+  if (read.up) query.emplace_back("up", base::to_string(*read.up));
   return query;
 }
 
-fusion::Result<IncomingBlock> incoming_block(std::string id,
-                                             const std::vector<std::pair<std::string, std::string>>& query) {
+base::Result<IncomingBlock> incoming_block(std::string id,
+                                           const std::vector<std::pair<std::string, std::string>>& query) {
   IncomingBlock block;
   block.id = std::move(id);
   for (const auto& [name, value] : query) {
     BOOST_OUTCOME_TRYV(read_field(block, name, value));
   }
-  BOOST_OUTCOME_TRYV(fusion::check_read_options(block.read));
+  BOOST_OUTCOME_TRYV(files::check_read_options(block.read));
   return block;
 }
 
-fusion::Result<IncomingBlock> incoming_block(std::string id, const std::string& read_text) {
+base::Result<IncomingBlock> incoming_block(std::string id, const std::string& read_text) {
   std::vector<std::pair<std::string, std::string>> query;
   for (std::size_t begin = 0; begin < read_text.size();) {
     const std::size_t end = std::min(read_text.find('\n', begin), read_text.size());
@@ -121,4 +120,4 @@ fusion::Result<IncomingBlock> incoming_block(std::string id, const std::string& 
   return incoming_block(std::move(id), query);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -8,17 +8,17 @@
 #include "fusion/base/error.hpp"
 #include "server/sources/map_keeper.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 
 /// What a query says of a block: observed_at, sensor, and the reading options of the command line with underscores. WrongType,
 /// OutOfRange or UnknownParameter, naming the field.
-fusion::Result<IncomingBlock> incoming_block(std::string id,
-                                             const std::vector<std::pair<std::string, std::string>>& query);
+base::Result<IncomingBlock> incoming_block(std::string id,
+                                           const std::vector<std::pair<std::string, std::string>>& query);
 
 /// The other way round: what a query says of reading options.
-std::vector<std::pair<std::string, std::string>> query_of(const fusion::ReadOptions& read);
+std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptions& read);
 
 /// The same from the text that it keeps of its reading options.
-fusion::Result<IncomingBlock> incoming_block(std::string id, const std::string& read_text);
+base::Result<IncomingBlock> incoming_block(std::string id, const std::string& read_text);
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -12,7 +12,7 @@
 #include "server/mapping/simulated_drive.hpp"
 #include "server/sources/block_options.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -62,7 +62,7 @@ std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& f
   return query;
 }
 
-void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, WorkerPool& pool,
+void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
               mapping::FaultLog& faults) {
   mapping::UnitPublisher publisher;
   const auto begin = Clock::now();
@@ -103,7 +103,7 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
     if (state_->is_over) return;
     std::this_thread::sleep_for(kWait);
   }
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   mapping::MapperSettings settings;
   settings.voxel_m = voxel_m_;
   mapping::Mapper mapper(*frames_.calibration, settings, pool);
@@ -132,7 +132,7 @@ bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::
     ++state_->under_way;
     const auto done = [state = state_, id = unit.id](const auto& outcome) {
       --state->under_way;
-      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+      const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
       if (refusal != nullptr && !state->is_over) spdlog::warn("{} is refused: {}", id, refusal->reason);
     };
     if (unit.mesh.triangles.empty()) {
@@ -151,4 +151,4 @@ bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::
   return !state_->is_over;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -13,7 +13,7 @@
 #include "server/mapping/unit_publisher.hpp"
 #include "server/sources/map_keeper.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 
 /// Frames in the order of their time, wherever they come from.
 struct FrameStream {
@@ -39,7 +39,7 @@ struct FeedRun {
   std::function<bool(std::vector<mapping::PublishedUnit>, const Eigen::Vector3d& eye)> hand_over;
   std::function<void(double share)> progress = [](double) {};
 };
-void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, WorkerPool& pool,
+void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
               mapping::FaultLog& faults);
 
 /// What a block that is a unit is asked to be read with, and when it was seen: now.
@@ -72,4 +72,4 @@ class MapFeed {
   std::thread thread_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

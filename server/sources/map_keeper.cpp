@@ -22,7 +22,7 @@
 #include "server/sources/stored_baseline.hpp"
 #include "server/store/time_text.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
 constexpr const char* kConstantsKey = "map";
@@ -58,30 +58,30 @@ class MemoryFile {
   int descriptor_;
 };
 
-fusion::Result<fusion::LoadedScene> loaded(const IncomingBlock& block, const std::optional<fusion::Vec3d>& origin) {
+base::Result<files::LoadedScene> loaded(const IncomingBlock& block, const std::optional<base::Vec3d>& origin) {
   const MemoryFile file(*block.ply);
   if (!file.is_open()) {
-    return fusion::failure(fusion::ErrorCode::FileUnreadable, "there is no memory for the block", "body");
+    return base::failure(base::ErrorCode::FileUnreadable, "there is no memory for the block", "body");
   }
-  fusion::ReadOptions options = block.read;
+  files::ReadOptions options = block.read;
   options.origin = origin;
-  auto scene = fusion::read_ply(file.path(), options);
+  auto scene = files::read_ply(file.path(), options);
   if (scene) {
-    fusion::survey(scene.value(), block.read);
+    files::survey(scene.value(), block.read);
     scene.value().mesh.name = block.id;
     return scene;
   }
   // The reader speaks of a file.
-  const fusion::Error& error = scene.error();
+  const base::Error& error = scene.error();
   const std::string name = std::filesystem::path(file.path()).filename().string();
   const bool is_named = error.message.starts_with(name + ": ");
-  return fusion::failure(error.code, is_named ? error.message.substr(name.size() + 2) : error.message,
-                         error.field.empty() || error.field == name ? "body" : error.field);
+  return base::failure(error.code, is_named ? error.message.substr(name.size() + 2) : error.message,
+                       error.field.empty() || error.field == name ? "body" : error.field);
 }
 
 /// A block of the store, as loaded().
-fusion::Result<fusion::LoadedScene> read_stored(const store::StoredBlock& stored,
-                                                const std::optional<fusion::Vec3d>& origin) {
+base::Result<files::LoadedScene> read_stored(const store::StoredBlock& stored,
+                                             const std::optional<base::Vec3d>& origin) {
   const store::BlockDescription& told = stored.facts.description;
   BOOST_OUTCOME_TRY(auto block, incoming_block(told.id, told.read_options));
   block.ply = stored.ply;
@@ -103,29 +103,29 @@ BlockEntry entry_of(const store::BlockFacts& facts) {
           store::to_hex(facts.sha256)};
 }
 
-store::BlockBounds bounds_of_mesh(const fusion::MultispectralMesh& mesh) {
+store::BlockBounds bounds_of_mesh(const mesh::MultispectralMesh& mesh) {
   store::BlockBounds bounds;
   if (mesh.positions().empty()) return bounds;
-  fusion::Vec3f low = mesh.positions()[0], high = low;
-  for (const fusion::Vec3f& p : mesh.positions()) {
+  base::Vec3f low = mesh.positions()[0], high = low;
+  for (const base::Vec3f& p : mesh.positions()) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const auto absolute = [&](const fusion::Vec3f& p) {
-    return fusion::Vec3d{mesh.origin.x + double{p.x}, mesh.origin.y + double{p.y}, mesh.origin.z + double{p.z}};
+  const auto absolute = [&](const base::Vec3f& p) {
+    return base::Vec3d{mesh.origin.x + double{p.x}, mesh.origin.y + double{p.y}, mesh.origin.z + double{p.z}};
   };
   return {absolute(low), absolute(high)};
 }
 
-BlockRefusal busy(std::string reason, std::string limits = "") {
+net::BlockRefusal busy(std::string reason, std::string limits = "") {
   return {503, "busy", "", std::move(reason), std::move(limits)};
 }
 
-BlockRefusal no_history() {
+net::BlockRefusal no_history() {
   return {409, "no_history", "at", "the map's past is kept nowhere; serve it with --store FILE", ""};
 }
 
-BlockRefusal refusal_of(const store::StoreError& error) {
+net::BlockRefusal refusal_of(const store::StoreError& error) {
   using store::StoreErrorCode;
   switch (error.code) {
     case StoreErrorCode::NotFound:
@@ -146,7 +146,7 @@ BlockRefusal refusal_of(const store::StoreError& error) {
   }
 }
 
-std::string text_of(const MapConstants& constants) {
+std::string text_of(const map::MapConstants& constants) {
   char text[256];
   const auto& corner = constants.grid.corner_m();
   std::snprintf(text, sizeof text, "%a %a %a %a %a %a %a %a", constants.origin.x, constants.origin.y,
@@ -155,7 +155,7 @@ std::string text_of(const MapConstants& constants) {
   return text;
 }
 
-std::optional<MapConstants> constants_of(const std::string& text) {
+std::optional<map::MapConstants> constants_of(const std::string& text) {
   std::array<double, 8> v{};
   if (std::sscanf(text.c_str(), "%la %la %la %la %la %la %la %la", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &v[6],
                   &v[7]) != 8) {
@@ -163,14 +163,14 @@ std::optional<MapConstants> constants_of(const std::string& text) {
   }
   const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
   if (!is_finite || !(v[6] > 0) || !(static_cast<float>(v[7]) > 0)) return std::nullopt;
-  return MapConstants{.origin = {v[0], v[1], v[2]},
-                      .grid = MapGrid({v[3], v[4], v[5]}, v[6]),
-                      .position_step_m = static_cast<float>(v[7])};
+  return map::MapConstants{.origin = {v[0], v[1], v[2]},
+                           .grid = map::MapGrid({v[3], v[4], v[5]}, v[6]),
+                           .position_step_m = static_cast<float>(v[7])};
 }
 
 }  // namespace
 
-MapKeeper::MapKeeper(SceneStore& scenes, WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
+MapKeeper::MapKeeper(map::SceneStore& scenes, jobs::WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
                      const std::optional<store::StoreTime>& at)
     : scenes_(scenes),
       pool_(pool),
@@ -199,12 +199,12 @@ void MapKeeper::end() {
 }
 
 std::optional<std::string> MapKeeper::restore() {
-  MapChange change;
+  map::MapChange change;
   std::optional<std::string> problem;
   std::map<std::string, BlockEntry, std::less<>> entries;
-  std::optional<fusion::Vec3d> origin;
+  std::optional<base::Vec3d> origin;
   if (store_) {
-    std::optional<MapConstants> constants;
+    std::optional<map::MapConstants> constants;
     if (const auto text = store_->constant(kConstantsKey)) {
       constants = constants_of(*text);
       if (!constants) return "the store's constants of the map cannot be read";
@@ -251,11 +251,11 @@ std::optional<std::string> MapKeeper::restore() {
 
 void MapKeeper::open_with_file() {
   const auto scene = scenes_.current();
-  const fusion::Vec3d origin = scene->origin();
-  const auto absolute = [&](const fusion::Vec3f& p) {
-    return fusion::Vec3d{origin.x + double{p.x}, origin.y + double{p.y}, origin.z + double{p.z}};
+  const base::Vec3d origin = scene->origin();
+  const auto absolute = [&](const base::Vec3f& p) {
+    return base::Vec3d{origin.x + double{p.x}, origin.y + double{p.y}, origin.z + double{p.z}};
   };
-  const std::string id(SceneStore::kFileBlock);
+  const std::string id(map::SceneStore::kFileBlock);
   const std::lock_guard lock(mutex_);
   entries_[id] = {id,
                   0,
@@ -270,7 +270,7 @@ void MapKeeper::open_with_file() {
 
 void MapKeeper::put(IncomingBlock block, PutDone done, WhenFull when_full) {
   const std::size_t size = block.ply->size();
-  PutDone counted = [this, size, done = std::move(done)](std::variant<Taken, BlockRefusal> outcome) {
+  PutDone counted = [this, size, done = std::move(done)](std::variant<Taken, net::BlockRefusal> outcome) {
     {
       const std::lock_guard lock(mutex_);
       waiting_bytes_ -= size;
@@ -289,7 +289,7 @@ void MapKeeper::mark_baseline(BaselineDone done) {
 }
 
 void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
-  std::optional<BlockRefusal> refusal;
+  std::optional<net::BlockRefusal> refusal;
   {
     const std::lock_guard lock(mutex_);
     waiting_bytes_ += bytes;
@@ -332,14 +332,14 @@ void MapKeeper::begin_reading(Queue::iterator waiting) {
 }
 
 void MapKeeper::read(Queue::iterator waiting) {
-  std::optional<fusion::Vec3d> origin;
+  std::optional<base::Vec3d> origin;
   {
     const std::lock_guard lock(mutex_);
     origin = origin_;
     if (is_ending_) return;  // refused there
   }
   auto& put = std::get<Put>(waiting->change);
-  std::optional<BlockRefusal> refusal;
+  std::optional<net::BlockRefusal> refusal;
   try {
     auto scene = loaded(put.block, origin);
     if (scene) {
@@ -367,7 +367,7 @@ void MapKeeper::read_next() {
   for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) begin_reading(waiting);
 }
 
-void MapKeeper::refuse(Change& change, const BlockRefusal& refusal) {
+void MapKeeper::refuse(Change& change, const net::BlockRefusal& refusal) {
   if (auto* put = std::get_if<Put>(&change)) put->done(refusal);
   if (auto* gone = std::get_if<Remove>(&change)) gone->done(refusal);
   if (auto* marking = std::get_if<Mark>(&change)) marking->done(refusal);
@@ -533,7 +533,7 @@ std::vector<store::StoreResult<store::Revision>> MapKeeper::stored(const std::ve
 
 void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions) {
   std::vector<Taken> taken(batch.size());
-  MapChange wanted;
+  map::MapChange wanted;
   for (std::size_t i = 0; i < batch.size(); ++i) {
     auto* put = std::get_if<Put>(&batch[i]);
     if (put == nullptr) {
@@ -562,7 +562,7 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
   }
 }
 
-void MapKeeper::change_map(MapChange change) {
+void MapKeeper::change_map(map::MapChange change) {
   scenes_.change(std::move(change), pool_);
   {
     const std::lock_guard lock(mutex_);
@@ -610,8 +610,8 @@ MapKeeper::Page MapKeeper::page(std::string_view after, std::size_t limit) const
   return page;
 }
 
-std::variant<MapKeeper::Page, BlockRefusal> MapKeeper::page_at(store::StoreTime time, std::string_view after,
-                                                               std::size_t limit) const {
+std::variant<MapKeeper::Page, net::BlockRefusal> MapKeeper::page_at(store::StoreTime time, std::string_view after,
+                                                                    std::size_t limit) const {
   if (!store_) return no_history();
   const auto page = store_->page_at(time, after, limit);
   if (!page) return refusal_of(page.error());
@@ -626,9 +626,9 @@ void MapKeeper::read_at(store::StoreTime time, const std::string& id, PastDone d
   if (!facts) return done(refusal_of(facts.error()));
   if (!facts.value()) {
     return done(
-        BlockRefusal{404, "not_found", "id", "there was no block \"" + id + "\" at " + store::utc_text(time), ""});
+        net::BlockRefusal{404, "not_found", "id", "there was no block \"" + id + "\" at " + store::utc_text(time), ""});
   }
-  std::optional<fusion::Vec3d> origin;
+  std::optional<base::Vec3d> origin;
   {
     const std::lock_guard lock(mutex_);
     origin = origin_;
@@ -640,10 +640,10 @@ void MapKeeper::read_at(store::StoreTime time, const std::string& id, PastDone d
                  pool.post(
                      [stored = std::move(outcome).value(), origin, done] {
                        auto scene = read_stored(stored, origin);
-                       if (!scene) return done(BlockRefusal{500, "not_read", "", scene.error().message, ""});
+                       if (!scene) return done(net::BlockRefusal{500, "not_read", "", scene.error().message, ""});
                        done(std::move(scene).value());
                      },
-                     kExportPriority);
+                     jobs::kExportPriority);
                });
 }
 
@@ -652,4 +652,4 @@ bool MapKeeper::has(const std::string& id) const {
   return entries_.contains(id);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -21,7 +21,7 @@
 #include "server/sources/baseline_marked.hpp"
 #include "server/store/block_store.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 
 /// What the map knows of a block beside its mesh.
 struct BlockEntry {
@@ -37,8 +37,8 @@ struct BlockEntry {
 struct IncomingBlock {
   std::string id;
   std::optional<double> observed_at;
-  std::optional<fusion::Vec3d> sensor;
-  fusion::ReadOptions read;
+  std::optional<base::Vec3d> sensor;
+  files::ReadOptions read;
   std::string read_text;  ///< The same as text, for the store.
   std::shared_ptr<const std::string> ply;
 };
@@ -49,10 +49,10 @@ class MapKeeper {
  public:
   struct Taken {
     BlockEntry entry;
-    std::vector<fusion::Note> notes;
+    std::vector<files::Note> notes;
   };
-  using PutDone = std::function<void(std::variant<Taken, BlockRefusal>)>;
-  using RemoveDone = std::function<void(std::variant<store::Revision, BlockRefusal>)>;
+  using PutDone = std::function<void(std::variant<Taken, net::BlockRefusal>)>;
+  using RemoveDone = std::function<void(std::variant<store::Revision, net::BlockRefusal>)>;
 
   /// What becomes of a change when too much waits.
   enum class WhenFull {
@@ -62,7 +62,7 @@ class MapKeeper {
 
   /// `store` may be null: then the map is gone with the program. With a time the map is that of the store as it was then, and every
   /// change is refused (409, as_it_was).
-  MapKeeper(SceneStore& scenes, WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
+  MapKeeper(map::SceneStore& scenes, jobs::WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
             const std::optional<store::StoreTime>& at = std::nullopt);
   ~MapKeeper();  ///< As end().
   MapKeeper(const MapKeeper&) = delete;
@@ -96,9 +96,9 @@ class MapKeeper {
 
   /// The same as it was at a time. Refused where there is no store (409, no_history) and where the time is no longer kept (410,
   /// history_gone).
-  std::variant<Page, BlockRefusal> page_at(store::StoreTime time, std::string_view after, std::size_t limit) const;
+  std::variant<Page, net::BlockRefusal> page_at(store::StoreTime time, std::string_view after, std::size_t limit) const;
   /// One of them, read from the store: `done` is called once, in another thread. Refused in the same way.
-  using PastDone = std::function<void(std::variant<fusion::LoadedScene, BlockRefusal>)>;
+  using PastDone = std::function<void(std::variant<files::LoadedScene, net::BlockRefusal>)>;
   void read_at(store::StoreTime time, const std::string& id, PastDone done) const;
 
   /// Bytes of blocks that may wait at a time.
@@ -111,9 +111,9 @@ class MapKeeper {
  private:
   struct Put {
     IncomingBlock block;
-    fusion::LoadedScene scene;
+    files::LoadedScene scene;
     PutDone done;
-    BlockBaseline baseline = {};
+    map::BlockBaseline baseline = {};
   };
   struct Remove {
     std::string id;
@@ -134,7 +134,7 @@ class MapKeeper {
 
   /// The shape of what a batch puts, and the names of what it takes out.
   struct Shapes {
-    std::vector<BlockShape> put;
+    std::vector<map::BlockShape> put;
     std::vector<std::string> removed;
   };
 
@@ -153,15 +153,15 @@ class MapKeeper {
   std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
   /// Publishes the map with a change; its coarse tiles follow.
-  void change_map(MapChange change);
+  void change_map(map::MapChange change);
   void keep_constants();
   void mark(const Mark& wanted);
-  static void refuse(Change& change, const BlockRefusal& refusal);
+  static void refuse(Change& change, const net::BlockRefusal& refusal);
   static const std::string& id_of(const Change& change);
   static Shapes shapes_of(const std::vector<Change>& batch);
 
-  SceneStore& scenes_;
-  WorkerPool& pool_;
+  map::SceneStore& scenes_;
+  jobs::WorkerPool& pool_;
   const std::unique_ptr<store::BlockStore> store_;
   const std::optional<store::StoreTime> at_;
 
@@ -173,8 +173,8 @@ class MapKeeper {
   std::condition_variable is_read_;  ///< A job has ended.
   bool is_open_ = false;
   bool is_ending_ = false;
-  std::optional<fusion::Vec3d> origin_;  ///< Of the map, once it has one.
-  bool is_first_under_way_ = false;      ///< The block that may give the map its origin.
+  std::optional<base::Vec3d> origin_;  ///< Of the map, once it has one.
+  bool is_first_under_way_ = false;    ///< The block that may give the map its origin.
   std::map<std::string, BlockEntry, std::less<>> entries_;
   std::uint64_t last_revision_ = 0;
 
@@ -186,4 +186,4 @@ class MapKeeper {
   std::thread coarse_maker_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -11,13 +11,13 @@
 #include "protocol/little_endian.hpp"
 #include "server/map/vertex_times.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 
 // The number of different times, 32 bits; those, double; then of each vertex the temperature, float, and which time, 32 bits.
 
-std::string text_of(const BlockBaseline& baseline) {
+std::string text_of(const map::BlockBaseline& baseline) {
   if (baseline.is_empty()) return {};
-  const VertexTimes times = VertexTimes::of(baseline.at);
+  const map::VertexTimes times = map::VertexTimes::of(baseline.at);
   std::string text(4 + 8 * times.distinct.size() + 8 * baseline.celsius.size(), '\0');
   protocol::LittleEndianWriter writer(std::as_writable_bytes(std::span(text)));
   writer.put(static_cast<std::uint32_t>(times.distinct.size()));
@@ -29,8 +29,8 @@ std::string text_of(const BlockBaseline& baseline) {
   return text;
 }
 
-std::optional<BlockBaseline> baseline_from(std::string_view bytes, std::size_t vertex_count) {
-  BlockBaseline baseline;
+std::optional<map::BlockBaseline> baseline_from(std::string_view bytes, std::size_t vertex_count) {
+  map::BlockBaseline baseline;
   if (bytes.empty()) return baseline;
   if (bytes.size() < 4 || bytes.size() % 8 != 4) return std::nullopt;
   protocol::LittleEndianReader reader(std::as_bytes(std::span(bytes)));
@@ -42,7 +42,7 @@ std::optional<BlockBaseline> baseline_from(std::string_view bytes, std::size_t v
     baseline.celsius.push_back(reader.get_float());
     const std::uint32_t time = reader.get<std::uint32_t>();
     if (time >= std::max<std::uint64_t>(time_count, 1)) return std::nullopt;
-    baseline.at.push_back(time_count == 0 ? kUnknownTime : times[time]);
+    baseline.at.push_back(time_count == 0 ? map::kUnknownTime : times[time]);
   }
   return baseline;
 }
@@ -65,4 +65,4 @@ std::optional<StoredMark> mark_from(const std::string& text) {
   return stored;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::sources

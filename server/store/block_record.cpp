@@ -6,7 +6,7 @@
 namespace spectra::store {
 namespace {
 
-bool is_finite(const fusion::Vec3d& v) {
+bool is_finite(const base::Vec3d& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 

@@ -24,16 +24,16 @@ using SharedBytes = std::shared_ptr<const std::string>;
 
 /// Smallest and largest coordinates of a block, metres, as the file has them after its reading options.
 struct BlockBounds {
-  fusion::Vec3d min, max;
+  base::Vec3d min, max;
   friend bool operator==(const BlockBounds&, const BlockBounds&) = default;
 };
 
 /// What is known of a block beside its bytes and what the store itself adds.
 struct BlockDescription {
-  std::string id;                       ///< 1 to 64 of a-z A-Z 0-9 . _ -
-  std::optional<double> observed_at;    ///< When the sensor saw it, Unix seconds.
-  std::optional<fusion::Vec3d> sensor;  ///< Where the sensor was, metres.
-  std::string read_options;             ///< How the bytes are to be read, as text; the store does not look into it.
+  std::string id;                     ///< 1 to 64 of a-z A-Z 0-9 . _ -
+  std::optional<double> observed_at;  ///< When the sensor saw it, Unix seconds.
+  std::optional<base::Vec3d> sensor;  ///< Where the sensor was, metres.
+  std::string read_options;           ///< How the bytes are to be read, as text; the store does not look into it.
   std::uint64_t vertex_count = 0;
   std::uint64_t triangle_count = 0;
   BlockBounds bounds;

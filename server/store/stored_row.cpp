@@ -15,7 +15,7 @@ class Writer {
   }
   void time(StoreTime value) { integer(static_cast<std::uint64_t>(value.time_since_epoch().count())); }
   void number(double value) { integer(std::bit_cast<std::uint64_t>(value)); }
-  void vector(const fusion::Vec3d& v) {
+  void vector(const base::Vec3d& v) {
     number(v.x);
     number(v.y);
     number(v.z);
@@ -48,8 +48,8 @@ class Reader {
   }
   StoreTime time() { return StoreTime(std::chrono::microseconds(static_cast<std::int64_t>(integer()))); }
   double number() { return std::bit_cast<double>(integer()); }
-  fusion::Vec3d vector() {
-    fusion::Vec3d v;
+  base::Vec3d vector() {
+    base::Vec3d v;
     v.x = number();
     v.y = number();
     v.z = number();
@@ -110,7 +110,7 @@ std::string encode(const Change& change) {
   writer.text(d.id);
   if (change.is_removal) return writer.take();
   writer.number(d.observed_at.value_or(0));
-  writer.vector(d.sensor.value_or(fusion::Vec3d{}));
+  writer.vector(d.sensor.value_or(base::Vec3d{}));
   writer.integer(d.vertex_count);
   writer.integer(d.triangle_count);
   writer.vector(d.bounds.min);
@@ -137,7 +137,7 @@ std::optional<Change> decode_change(Revision revision, std::string_view bytes) {
   change.is_removal = (flags & kIsRemoval) != 0;
   if (!change.is_removal) {
     const double observed_at = reader.number();
-    const fusion::Vec3d sensor = reader.vector();
+    const base::Vec3d sensor = reader.vector();
     if ((flags & kHasObservedAt) != 0) d.observed_at = observed_at;
     if ((flags & kHasSensor) != 0) d.sensor = sensor;
     d.vertex_count = reader.integer();

@@ -7,7 +7,7 @@
 #include "fusion/fusion_plan.hpp"
 #include "server/stream/frame_cache.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// Which raw layers one viewer is to have. An epoch rises when what it has of a layer is to be sent in another form.
 struct RawDemand {
@@ -39,7 +39,7 @@ struct Demand {
   std::shared_ptr<const PlanIdentity> plan_identity;
   LookRules look_rules;
 
-  GeometryKey geometry_key(const std::shared_ptr<const Tile>& tile) const {
+  GeometryKey geometry_key(const std::shared_ptr<const map::Tile>& tile) const {
     return {Identity(tile), position_step_m, encoder_speed};
   }
   /// `bits` is one of the two above.
@@ -64,4 +64,4 @@ struct Demand {
   bool carries_marks() const { return marks && plan && plan->highlights(); }
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

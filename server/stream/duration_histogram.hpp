@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// How long something took, how often: counts for rising bounds. Thread-safe.
 class DurationHistogram {
@@ -59,4 +59,4 @@ struct EncodingTimes {
   DurationHistogram raw_layer;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -10,7 +10,7 @@
 
 #include "server/stream/view_selection.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 constexpr int kLongerSide = 640;
@@ -22,7 +22,7 @@ constexpr double kNearShare = 1e-4;
 
 using Vector = std::array<double, 3>;
 
-Vector vector_of(const fusion::Vec3f& v) {
+Vector vector_of(const base::Vec3f& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 double dot(const Vector& a, const Vector& b) {
@@ -78,7 +78,7 @@ class Eye {
   double near() const { return near_; }
   double pixels_per_tangent() const { return pixels_per_tangent_; }
 
-  Seen see(const fusion::Vec3f& position) const {
+  Seen see(const base::Vec3f& position) const {
     const Vector p = vector_of(position);
     const Vector way{p[0] - eye_[0], p[1] - eye_[1], p[2] - eye_[2]};
     return {dot(way, right_), dot(way, up_), dot(way, forward_)};
@@ -179,29 +179,29 @@ void draw_triangle(DepthMap& map, const Eye& eye, const std::array<Seen, 3>& cor
 class Choice {
  public:
   /// `index`: where the vertex stands in the input.
-  void offer(const Tile& tile, std::size_t vertex, std::uint32_t index, bool is_better) {
+  void offer(const map::Tile& tile, std::size_t vertex, std::uint32_t index, bool is_better) {
     const float celsius = tile.temperature_celsius[vertex];
     if (best_ && !is_better && !(celsius == best_->temperature_celsius && index < index_)) return;
     best_ = {tile.positions[vertex], celsius};
     index_ = index;
   }
-  const std::optional<Extreme>& best() const { return best_; }
+  const std::optional<map::Extreme>& best() const { return best_; }
 
  private:
-  std::optional<Extreme> best_;
+  std::optional<map::Extreme> best_;
   std::uint32_t index_ = 0;
 };
 
 class Choices {
  public:
-  void offer(const Tile& tile, std::size_t vertex, std::uint32_t index) {
+  void offer(const map::Tile& tile, std::size_t vertex, std::uint32_t index) {
     const float celsius = tile.temperature_celsius[vertex];
     if (std::isinf(celsius)) {
       (celsius > 0 ? over_ : under_).offer(tile, vertex, index, false);
       return;
     }
-    hottest_.offer(tile, vertex, index, celsius > hottest_.best().value_or(Extreme{}).temperature_celsius);
-    coldest_.offer(tile, vertex, index, celsius < coldest_.best().value_or(Extreme{}).temperature_celsius);
+    hottest_.offer(tile, vertex, index, celsius > hottest_.best().value_or(map::Extreme{}).temperature_celsius);
+    coldest_.offer(tile, vertex, index, celsius < coldest_.best().value_or(map::Extreme{}).temperature_celsius);
   }
   /// Whether a vertex of this temperature may change anything: only then it has to be known whether it is seen.
   bool may_want(float celsius) const {
@@ -217,11 +217,11 @@ class Choices {
 
 }  // namespace
 
-ExtremesInView extremes_in_view(const SceneSnapshot& scene, const Camera& camera, const PictureWindow& window) {
+ExtremesInView extremes_in_view(const map::SceneSnapshot& scene, const Camera& camera, const PictureWindow& window) {
   if (!is_usable(camera)) return {};
   const Eye eye(camera, window);
   DepthMap map(eye.width(), eye.height());
-  std::vector<const Tile*> tiles;
+  std::vector<const map::Tile*> tiles;
   for (const auto& tile : scene.tiles()) {
     if (tile->child_mask == 0 && !tile->positions.empty() && may_be_in_view(camera, tile->bounds)) {
       tiles.push_back(tile.get());
@@ -229,7 +229,7 @@ ExtremesInView extremes_in_view(const SceneSnapshot& scene, const Camera& camera
   }
   const double point_width = kStepsBetweenPoints * static_cast<double>(scene.suggested_position_step_m());
   std::vector<Seen> seen;
-  for (const Tile* tile : tiles) {
+  for (const map::Tile* tile : tiles) {
     seen.clear();
     for (const auto& position : tile->positions) seen.push_back(eye.see(position));
     for (const auto& [a, b, c] : tile->triangles) draw_triangle(map, eye, {seen[a], seen[b], seen[c]});
@@ -242,7 +242,7 @@ ExtremesInView extremes_in_view(const SceneSnapshot& scene, const Camera& camera
 
   Choices choices;
   std::vector<bool> is_drawn;
-  for (const Tile* tile : tiles) {
+  for (const map::Tile* tile : tiles) {
     // Vertices of no triangle are not drawn.
     is_drawn.assign(tile->positions.size(), tile->triangles.empty());
     for (const auto& triangle : tile->triangles) {
@@ -262,4 +262,4 @@ ExtremesInView extremes_in_view(const SceneSnapshot& scene, const Camera& camera
   return choices.result();
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -6,9 +6,9 @@
 #include "server/stream/lattice.hpp"
 #include "server/stream/view_selection.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
-void encode_first_picture(const std::shared_ptr<const SceneSnapshot>& scene, FrameCache& cache) {
+void encode_first_picture(const std::shared_ptr<const map::SceneSnapshot>& scene, FrameCache& cache) {
   FrameCache::State& state = *cache.state();
   const StreamQuality quality;
   const float step_m = position_step_in_force(quality.position_step_m, scene->suggested_position_step_m());
@@ -26,4 +26,4 @@ void encode_first_picture(const std::shared_ptr<const SceneSnapshot>& scene, Fra
   }
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

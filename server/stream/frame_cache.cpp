@@ -6,7 +6,7 @@
 #include <string_view>
 #include <variant>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 // Map nodes, list nodes, control blocks and vector heads of one entry, roughly.
@@ -221,4 +221,4 @@ void FrameCache::State::evict_surplus() {
   }
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

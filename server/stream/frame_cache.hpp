@@ -19,7 +19,7 @@
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// Which object, by ownership: stays different from every other object even after the object has died and another stands
 /// at its address.
@@ -231,4 +231,4 @@ struct FrameCache::State {
   unsigned stored_since_pruning_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

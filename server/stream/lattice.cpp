@@ -9,7 +9,7 @@
 
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 // So many steps of that length are exact in the 24 bits of a float, with those of the step itself.
@@ -26,13 +26,13 @@ constexpr double kMostStepsOfTile = 0x1p23;
 // How the coordinates of one tile are rounded.
 class Rounding {
  public:
-  Rounding(const Tile& tile, float step_m)
+  Rounding(const map::Tile& tile, float step_m)
       : tile_(tile),
         step_m_(static_cast<double>(step_m)),
         most_steps_(most_steps(step_m)),
         drawn_(tile.positions.size()) {
     if (tile.triangles.empty()) drawn_.assign(drawn_.size(), true);
-    for (const fusion::Triangle& triangle : tile.triangles) {
+    for (const base::Triangle& triangle : tile.triangles) {
       for (const std::uint32_t v : triangle) drawn_[v] = true;
     }
     std::array<float, 3> low{}, high{};
@@ -56,7 +56,7 @@ class Rounding {
   bool is_drawn(std::size_t v) const { return drawn_[v]; }
 
   std::array<float, 3> coordinates(std::size_t v) const {
-    const fusion::Vec3f& position = tile_.positions[v];
+    const base::Vec3f& position = tile_.positions[v];
     return {position.x, position.y, position.z};
   }
 
@@ -78,7 +78,7 @@ class Rounding {
     return wanted;
   }
 
-  const Tile& tile_;
+  const map::Tile& tile_;
   double step_m_;
   double most_steps_;
   int most_halvings_ = 0;
@@ -101,11 +101,11 @@ float position_step_in_force(float wanted_m, float suggested_m) {
   return lattice_step(static_cast<double>(wanted_m > 0 ? wanted_m : suggested_m));
 }
 
-float one_step_for_all(float step_m, const Bounds& bounds) {
+float one_step_for_all(float step_m, const base::Bounds& bounds) {
   constexpr int kMostSteps = 1 << 21;
   auto step = static_cast<double>(step_m);
   double reach = 0;
-  for (const auto member : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+  for (const auto member : {&base::Vec3f::x, &base::Vec3f::y, &base::Vec3f::z}) {
     const auto low = static_cast<double>(bounds.min.*member);
     const auto high = static_cast<double>(bounds.max.*member);
     reach = std::max({reach, std::abs(low), std::abs(high), high - low});
@@ -114,7 +114,7 @@ float one_step_for_all(float step_m, const Bounds& bounds) {
   return lattice_step(step);
 }
 
-protocol::Result<TileLattice> tile_lattice(const Tile& tile, float step_m) {
+protocol::Result<TileLattice> tile_lattice(const map::Tile& tile, float step_m) {
   TileLattice lattice;
   lattice.step_m = step_m;
   lattice.coarsest_step_m = step_m;
@@ -169,4 +169,4 @@ protocol::Result<TileLattice> tile_lattice(const Tile& tile, float step_m) {
   return lattice;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 constexpr std::array<QualityPoint, 8> kFrontier{{{1, 8}, {1, 7}, {1, 6}, {2, 6}, {4, 6}, {8, 6}, {16, 6}, {16, 5}}};
@@ -44,4 +44,4 @@ QualityPoint first_answer(const StreamQuality& quality, double rate_bytes_per_s,
   return answer;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -9,7 +9,7 @@
 #include "protocol/tile_frame.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// One way to answer a change of the settings: how coarse the tiles, how coarse their colours.
 struct QualityPoint {
@@ -42,4 +42,4 @@ QualityPoint first_answer(const StreamQuality& quality, double rate_bytes_per_s,
                           const ColourCost& cost,
                           const std::function<std::uint64_t(double pixel_error)>& target_vertex_count);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -12,7 +12,7 @@
 
 #include "server/stream/tile_encoder.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 /// The geometry that the viewer holds. The encoder is deterministic, so that one which the cache has let go comes back as it was.
@@ -35,7 +35,7 @@ protocol::Result<Payload> encoded_layer(const RawEncoding& encoding, FrameCache:
                                    demand.raw.temperature_step_celsius);
 }
 
-double squared_distance(const Camera& camera, const Bounds& bounds) {
+double squared_distance(const Camera& camera, const base::Bounds& bounds) {
   const auto outside = [](float at, float low, float high) {
     return static_cast<double>(std::max({low - at, at - high, 0.0F}));
   };
@@ -108,4 +108,4 @@ std::vector<std::shared_ptr<TileSlot>> raw_order(const std::vector<std::shared_p
   return slots;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

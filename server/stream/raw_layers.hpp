@@ -7,12 +7,12 @@
 
 #include "server/stream/viewer_tiles.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// A raw layer of a tile that a job has claimed in the cache, and what came of it.
 struct RawEncoding {
   std::shared_ptr<TileSlot> slot;
-  std::shared_ptr<const Tile> tile;
+  std::shared_ptr<const map::Tile> tile;
   Demand demand;           ///< When it was claimed.
   std::size_t layer = 0;   ///< In RawDemand::kLayers.
   std::uint32_t revision;  ///< Of the geometry that the viewer holds.
@@ -28,4 +28,4 @@ void encode(RawEncoding& encoding, FrameCache::State& cache);
 std::vector<std::shared_ptr<TileSlot>> raw_order(const std::vector<std::shared_ptr<TileSlot>>& wanted,
                                                  const ViewTree& tree, const std::optional<Camera>& camera);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace spectra::server {
+namespace spectra::stream {
 
 ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuality>& held,
                                const std::optional<Camera>& camera) {
@@ -47,4 +47,4 @@ ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuali
   return accuracy;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -5,7 +5,7 @@
 
 #include "server/stream/view_selection.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// The largest errors in what a viewer sees.
 struct ScreenAccuracy {
@@ -26,4 +26,4 @@ struct HeldQuality {
 ScreenAccuracy screen_accuracy(const ViewTree& tree, const std::vector<HeldQuality>& held,
                                const std::optional<Camera>& camera);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

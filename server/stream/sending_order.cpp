@@ -1,6 +1,6 @@
 #include "server/stream/sending_order.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 void SendingOrder::choose(ViewerTiles& tiles, const std::vector<SelectedTile>& selected, double most_preview_vertices) {
   ++choice_count_;
@@ -54,4 +54,4 @@ std::uint64_t target_vertex_count(const ViewTree& tree, const std::vector<Select
   return count;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -7,7 +7,7 @@
 
 #include "server/stream/viewer_tiles.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// The tiles that one viewer wants, as they are to be sent, and how far that has come. Not thread-safe: the stream's lock is
 /// held.
@@ -43,4 +43,4 @@ class SendingOrder {
 /// Vertices of the selected tiles that are to be drawn in the end.
 std::uint64_t target_vertex_count(const ViewTree& tree, const std::vector<SelectedTile>& selected);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 constexpr std::uint64_t kRateMemoryRounds = 10;
@@ -130,4 +130,4 @@ double SendingWindow::gain() const {
   }
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

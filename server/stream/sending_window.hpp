@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <deque>
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// How many bytes may be on their way to one viewer: given out and not yet acknowledged as decoded.
 ///
@@ -92,4 +92,4 @@ class SendingWindow {
   int rounds_without_growth_ = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -8,7 +8,7 @@
 
 #include "server/stream/tile_encoder.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 /// Why it failed; empty when it did not.
@@ -124,4 +124,4 @@ std::optional<Encoding> SlotPreparation::advance_after(const Encoding& done, con
   return advance(done.slot, demand, waiter);
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -5,12 +5,12 @@
 
 #include "server/stream/viewer_tiles.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// One encoding that a job has claimed in the cache, and what came of it.
 struct Encoding {
   std::shared_ptr<TileSlot> slot;
-  std::shared_ptr<const Tile> tile;
+  std::shared_ptr<const map::Tile> tile;
   Demand demand;  ///< When it was claimed, as is the next.
   int colour_bits = 8;
   TileLook look;
@@ -53,4 +53,4 @@ class SlotPreparation {
   ViewerTiles& tiles_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

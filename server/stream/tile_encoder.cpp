@@ -12,12 +12,12 @@
 #include "server/stream/duration_histogram.hpp"
 #include "server/stream/lattice.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
-protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed) {
+protocol::Result<EncodedTile> encoded_tile(const map::Tile& tile, float position_step_m, int encoder_speed) {
   BOOST_OUTCOME_TRY(auto lattice, tile_lattice(tile, position_step_m));
   BOOST_OUTCOME_TRY(auto geometry,
-                    protocol::encoded_geometry(lattice.points, tile.triangles, lattice.step_m, encoder_speed));
+                    protocol::codec::encoded_geometry(lattice.points, tile.triangles, lattice.step_m, encoder_speed));
   return EncodedTile{.revision = 0,
                      .position_step_m = lattice.coarsest_step_m,
                      .origin_m = lattice.origin_m,
@@ -25,17 +25,17 @@ protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step
                      .payload = std::make_shared<const std::vector<std::byte>>(std::move(geometry.payload))};
 }
 
-protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
+protocol::Result<Payload> encoded_tile_colours(const map::Tile& tile, const EncodedTile& geometry,
                                                const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
                                                int encoder_speed, protocol::ColourTransform transform, bool has_marks,
                                                EncodingTimes* times) {
   std::optional<TimedWork> watch;
   if (times != nullptr) watch.emplace(times->fusing);
-  const std::vector<fusion::Rgb8> fused = fused_colours(tile, plan, look);
+  const std::vector<base::Rgb8> fused = fused_colours(tile, plan, look);
   if (times != nullptr) watch.emplace(times->colours);
-  std::vector<protocol::ColourBytes> colours(geometry.input_of_decoded.size());
+  std::vector<protocol::codec::ColourBytes> colours(geometry.input_of_decoded.size());
   for (std::size_t i = 0; i < colours.size(); ++i) {
-    const fusion::Rgb8 colour = fused[geometry.input_of_decoded[i]];
+    const base::Rgb8 colour = fused[geometry.input_of_decoded[i]];
     colours[i] = {colour.r, colour.g, colour.b};
   }
   std::vector<std::uint8_t> marks;
@@ -43,24 +43,25 @@ protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTi
     const std::vector<std::uint8_t> marked = highlight_marks(tile, plan, look);
     for (const std::uint32_t input : geometry.input_of_decoded) marks.push_back(marked[input]);
   }
-  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));
+  BOOST_OUTCOME_TRY(auto payload,
+                    protocol::codec::encoded_colours(colours, colour_bits, encoder_speed, transform, marks));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 
-protocol::Result<Payload> encoded_visible_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+protocol::Result<Payload> encoded_visible_layer(const map::Tile& tile, const EncodedTile& geometry, int encoder_speed,
                                                 protocol::ColourTransform transform) {
-  std::vector<protocol::ColourBytes> colours;
+  std::vector<protocol::codec::ColourBytes> colours;
   colours.reserve(geometry.input_of_decoded.size());
   for (const std::uint32_t input : geometry.input_of_decoded) {
-    const fusion::Rgb8 colour = tile.visible[input];
+    const base::Rgb8 colour = tile.visible[input];
     colours.push_back({colour.r, colour.g, colour.b});
   }
-  BOOST_OUTCOME_TRY(auto payload, protocol::encoded_colours(colours, 8, encoder_speed, transform));
+  BOOST_OUTCOME_TRY(auto payload, protocol::codec::encoded_colours(colours, 8, encoder_speed, transform));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 
-protocol::Result<Payload> encoded_temperature_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
-                                                    double step_celsius) {
+protocol::Result<Payload> encoded_temperature_layer(const map::Tile& tile, const EncodedTile& geometry,
+                                                    int encoder_speed, double step_celsius) {
   std::vector<float> temperature;
   temperature.reserve(geometry.input_of_decoded.size());
   float lowest = std::numeric_limits<float>::infinity();
@@ -79,8 +80,8 @@ protocol::Result<Payload> encoded_temperature_layer(const Tile& tile, const Enco
   std::vector<std::uint16_t> code(temperature.size());
   codes.encode(temperature, code);
   BOOST_OUTCOME_TRY(auto payload,
-                    protocol::encoded_temperature_codes(code, {codes.scale, codes.offset}, encoder_speed));
+                    protocol::codec::encoded_temperature_codes(code, {codes.scale, codes.offset}, encoder_speed));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

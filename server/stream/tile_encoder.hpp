@@ -12,7 +12,7 @@
 #include "server/map/scene_snapshot.hpp"
 #include "server/stream/tile_look.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 struct EncodingTimes;
 
@@ -28,23 +28,23 @@ struct EncodedTile {
 };
 
 /// Encodes the geometry of a tile of a scene whose largest step is to be `position_step_m`; the revision is left to the cache.
-protocol::Result<EncodedTile> encoded_tile(const Tile& tile, float position_step_m, int encoder_speed);
+protocol::Result<EncodedTile> encoded_tile(const map::Tile& tile, float position_step_m, int encoder_speed);
 
 /// Fuses a tile under a look of it and encodes its colours in the decoded vertex order of `geometry`, which was made from the same tile; with
 /// which vertices are highlighted where it `has_marks`. `times` is told of both.
-protocol::Result<Payload> encoded_tile_colours(const Tile& tile, const EncodedTile& geometry,
+protocol::Result<Payload> encoded_tile_colours(const map::Tile& tile, const EncodedTile& geometry,
                                                const fusion::FusionPlan& plan, const TileLook& look, int colour_bits,
                                                int encoder_speed,
                                                protocol::ColourTransform transform = protocol::ColourTransform::None,
                                                bool has_marks = false, EncodingTimes* times = nullptr);
 
 /// The visible colours of a tile in the decoded vertex order of `geometry`.
-protocol::Result<Payload> encoded_visible_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
+protocol::Result<Payload> encoded_visible_layer(const map::Tile& tile, const EncodedTile& geometry, int encoder_speed,
                                                 protocol::ColourTransform transform);
 
 /// Its temperatures as codes (fusion::TemperatureCodes); `step_celsius` 0 = the default one. A tile without temperatures
 /// has missing ones.
-protocol::Result<Payload> encoded_temperature_layer(const Tile& tile, const EncodedTile& geometry, int encoder_speed,
-                                                    double step_celsius);
+protocol::Result<Payload> encoded_temperature_layer(const map::Tile& tile, const EncodedTile& geometry,
+                                                    int encoder_speed, double step_celsius);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -5,26 +5,26 @@
 #include <limits>
 #include <span>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 /// The first letter of a look that is not empty: what the vertices are compared with.
 enum BaselineLetter : char { kNotAsked = '-', kNothing = '0', kThemselves = 't', kKept = 'k' };
 
-char baseline_letter(const Tile& tile, const LookRules& rules) {
+char baseline_letter(const map::Tile& tile, const LookRules& rules) {
   if (!rules.compares_with_baseline) return kNotAsked;
-  const std::span<const float> baseline = baseline_of(tile, rules.baseline_mark);
+  const std::span<const float> baseline = map::baseline_of(tile, rules.baseline_mark);
   if (baseline.empty()) return kNothing;
   return baseline.data() == tile.temperature_celsius.data() ? kThemselves : kKept;
 }
 
-std::span<const float> baseline_under(const Tile& tile, const TileLook& look) {
+std::span<const float> baseline_under(const map::Tile& tile, const TileLook& look) {
   if (look.empty() || look[0] == kNotAsked || look[0] == kNothing) return {};
   return look[0] == kKept ? tile.baseline_celsius : tile.temperature_celsius;
 }
 
 /// One for each vertex, or none where all are fresh.
-std::vector<std::uint8_t> freshness_under(const Tile& tile, const TileLook& look) {
+std::vector<std::uint8_t> freshness_under(const map::Tile& tile, const TileLook& look) {
   if (look.size() < 2) return {};
   const auto of_time = [&look](std::size_t time) { return static_cast<std::uint8_t>(look[1 + time] - '0'); };
   std::vector<std::uint8_t> freshness(tile.positions.size(), of_time(0));
@@ -34,7 +34,7 @@ std::vector<std::uint8_t> freshness_under(const Tile& tile, const TileLook& look
 
 }  // namespace
 
-TileLook look_of(const Tile& tile, const LookRules& rules) {
+TileLook look_of(const map::Tile& tile, const LookRules& rules) {
   TileLook look;
   if (const char letter = baseline_letter(tile, rules); letter != kNotAsked) look += letter;
   if (!rules.age) return look;
@@ -48,7 +48,7 @@ TileLook look_of(const Tile& tile, const LookRules& rules) {
   return look + steps;
 }
 
-double next_look_s(const Tile& tile, const LookRules& rules) {
+double next_look_s(const map::Tile& tile, const LookRules& rules) {
   double next = std::numeric_limits<double>::infinity();
   if (!rules.age) return next;
   for (const double time : tile.seen_at.distinct) {
@@ -59,7 +59,7 @@ double next_look_s(const Tile& tile, const LookRules& rules) {
   return next;
 }
 
-std::vector<fusion::Rgb8> fused_colours(const Tile& tile, const fusion::FusionPlan& plan, const TileLook& look) {
+std::vector<base::Rgb8> fused_colours(const map::Tile& tile, const fusion::FusionPlan& plan, const TileLook& look) {
   std::vector<float> no_temperature;
   std::span<const float> temperature = tile.temperature_celsius;
   if (temperature.empty()) {
@@ -67,15 +67,15 @@ std::vector<fusion::Rgb8> fused_colours(const Tile& tile, const fusion::FusionPl
     temperature = no_temperature;
   }
   const std::vector<std::uint8_t> freshness = freshness_under(tile, look);
-  std::vector<fusion::Rgb8> fused(tile.visible.size());
+  std::vector<base::Rgb8> fused(tile.visible.size());
   plan.fuse({temperature, tile.visible, baseline_under(tile, look), freshness}, fused);
   return fused;
 }
 
-std::vector<std::uint8_t> highlight_marks(const Tile& tile, const fusion::FusionPlan& plan, const TileLook& look) {
+std::vector<std::uint8_t> highlight_marks(const map::Tile& tile, const fusion::FusionPlan& plan, const TileLook& look) {
   std::vector<std::uint8_t> marked(tile.visible.size());
   if (!tile.temperature_celsius.empty()) plan.mark(tile.temperature_celsius, baseline_under(tile, look), marked);
   return marked;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

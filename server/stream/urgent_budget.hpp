@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// How much one viewer may have computed before others: what is coarse goes first, over all viewers, so that everybody has a picture
 /// soon; but who asks for coarse pictures without end would leave nothing for others. Beyond it his jobs take turns with theirs.
@@ -35,4 +35,4 @@ class UrgentBudget {
   Clock::time_point last_ = Clock::now();
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::TileId;
@@ -23,7 +23,7 @@ struct Vector {
   double x = 0, y = 0, z = 0;
 };
 
-Vector vector_of(const fusion::Vec3f& v) {
+Vector vector_of(const base::Vec3f& v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
 Vector operator-(const Vector& a, const Vector& b) {
@@ -50,26 +50,26 @@ double half_height_tangent(const Camera& camera) {
 }
 
 // How far the box reaches along a direction, from the eye; negative when all of it lies behind.
-double reach(const Vector& direction, const Vector& eye, const Bounds& bounds) {
+double reach(const Vector& direction, const Vector& eye, const base::Bounds& bounds) {
   const Vector low = vector_of(bounds.min) - eye;
   const Vector high = vector_of(bounds.max) - eye;
   return std::max(direction.x * low.x, direction.x * high.x) + std::max(direction.y * low.y, direction.y * high.y) +
          std::max(direction.z * low.z, direction.z * high.z);
 }
 
-bool is_finite(const fusion::Vec3f& v) {
+bool is_finite(const base::Vec3f& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-void extend(Bounds& bounds, const Bounds& by) {
-  for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+void extend(base::Bounds& bounds, const base::Bounds& by) {
+  for (const auto axis : {&base::Vec3f::x, &base::Vec3f::y, &base::Vec3f::z}) {
     bounds.min.*axis = std::min(bounds.min.*axis, by.min.*axis);
     bounds.max.*axis = std::max(bounds.max.*axis, by.max.*axis);
   }
 }
 
 // Of what a tile shows, within `bounds`: in pixels, or in metres without a camera.
-double error_of(const ViewTree::Node& node, const Bounds& bounds, const std::optional<Camera>& camera) {
+double error_of(const ViewTree::Node& node, const base::Bounds& bounds, const std::optional<Camera>& camera) {
   const double error_m = seen_error_m(*node.tile);
   return camera ? screen_error(*camera, bounds, error_m) : error_m;
 }
@@ -109,7 +109,7 @@ std::vector<SelectedTile> needed_tiles(const ViewTree& tree, const std::optional
 
 }  // namespace
 
-ViewTree::ViewTree(const SceneSnapshot& scene) {
+ViewTree::ViewTree(const map::SceneSnapshot& scene) {
   std::map<TileId, std::size_t> node_of;
   for (const auto& tile : scene.tiles()) {
     if (tile->positions.empty()) continue;
@@ -138,14 +138,14 @@ bool is_usable(const Camera& camera) {
          camera.fov_y_deg < 180 && camera.viewport[0] > 0 && camera.viewport[1] > 0;
 }
 
-double seen_error_m(const Tile& tile) {
+double seen_error_m(const map::Tile& tile) {
   return std::max(static_cast<double>(tile.geometric_error_m), static_cast<double>(tile.lost_detail_m) / kDetailPixels);
 }
 
-double screen_error(const Camera& camera, const Bounds& bounds, double size_m) {
+double screen_error(const Camera& camera, const base::Bounds& bounds, double size_m) {
   if (!(size_m > 0)) return 0;
   double squared = 0;
-  for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+  for (const auto axis : {&base::Vec3f::x, &base::Vec3f::y, &base::Vec3f::z}) {
     const auto eye = static_cast<double>(camera.eye.*axis);
     const double outside =
         std::max({0.0, static_cast<double>(bounds.min.*axis) - eye, eye - static_cast<double>(bounds.max.*axis)});
@@ -155,7 +155,7 @@ double screen_error(const Camera& camera, const Bounds& bounds, double size_m) {
   return size_m * camera.viewport[1] / (2 * half_height_tangent(camera) * std::sqrt(squared));
 }
 
-bool may_be_in_view(const Camera& camera, const Bounds& bounds) {
+bool may_be_in_view(const Camera& camera, const base::Bounds& bounds) {
   const Vector eye = vector_of(camera.eye);
   Vector forward = vector_of(camera.target) - eye;
   forward = forward * (1 / length(forward));
@@ -170,7 +170,7 @@ bool may_be_in_view(const Camera& camera, const Bounds& bounds) {
          reach(forward * tangent_y - up, eye, bounds) >= 0;
 }
 
-std::uint64_t decoded_bytes(const Tile& tile) {
+std::uint64_t decoded_bytes(const map::Tile& tile) {
   return std::uint64_t{16} * tile.positions.size() + std::uint64_t{12} * tile.triangles.size();
 }
 
@@ -206,4 +206,4 @@ std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::option
   return selected;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -10,21 +10,21 @@
 #include "server/map/scene_snapshot.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// The tiles of a snapshot with their ties: who replaces whom. Tiles without vertices are left out; a tile's parent is
 /// its nearest ancestor that is there.
 class ViewTree {
  public:
   struct Node {
-    std::shared_ptr<const Tile> tile;
-    Bounds bounds;  ///< Of everything beneath, too.
+    std::shared_ptr<const map::Tile> tile;
+    base::Bounds bounds;  ///< Of everything beneath, too.
     std::optional<std::size_t> parent;
     std::vector<std::size_t> children;
   };
 
   ViewTree() = default;
-  explicit ViewTree(const SceneSnapshot& scene);
+  explicit ViewTree(const map::SceneSnapshot& scene);
 
   /// Coarse before fine.
   const std::vector<Node>& nodes() const { return nodes_; }
@@ -44,7 +44,7 @@ struct SelectedTile {
 
 /// What a tile takes at a viewer who has decoded it: three floats and a colour of four bytes for each vertex, three
 /// indices of four bytes for each triangle.
-std::uint64_t decoded_bytes(const Tile& tile);
+std::uint64_t decoded_bytes(const map::Tile& tile);
 
 /// The tiles that a camera asks for, in sending order: coarse before fine; of one level those in view before others,
 /// then by how much their lack is seen (in octaves of the error on the screen), and among equals the hottest first.
@@ -60,15 +60,15 @@ std::vector<SelectedTile> selected_tiles(const ViewTree& tree, const std::option
 
 /// How far something on a tile may be from where it is in the full mesh, or half the size of the largest patch of another
 /// colour or temperature (metres): whichever is seen from farther away.
-double seen_error_m(const Tile& tile);
+double seen_error_m(const map::Tile& tile);
 
 /// Size on the screen, in pixels, of something so large within `bounds`; infinite when the eye is inside.
-double screen_error(const Camera& camera, const Bounds& bounds, double size_m);
+double screen_error(const Camera& camera, const base::Bounds& bounds, double size_m);
 
 /// False when nothing within `bounds` can be in view, the field of view widened by a tenth.
-bool may_be_in_view(const Camera& camera, const Bounds& bounds);
+bool may_be_in_view(const Camera& camera, const base::Bounds& bounds);
 
 /// A camera that selected_tiles() can use: finite, with a direction, a viewport and a field of view between 0 and 180.
 bool is_usable(const Camera& camera);
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

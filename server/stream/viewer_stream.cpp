@@ -18,7 +18,7 @@
 #include "server/stream/view_selection.hpp"
 #include "server/stream/viewer_tiles.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -74,8 +74,8 @@ TileFrameHeader header_of(const TileSlot& slot, FrameKind kind) {
 // guards them all.
 class Stream final : public ViewerStream, public CacheWaiter {
  public:
-  Stream(std::shared_ptr<const SceneSnapshot> scene, std::shared_ptr<FrameCache::State> cache, WorkerPool& pool,
-         std::function<void()> wake)
+  Stream(std::shared_ptr<const map::SceneSnapshot> scene, std::shared_ptr<FrameCache::State> cache,
+         jobs::WorkerPool& pool, std::function<void()> wake)
       : cache_(std::move(cache)), pool_(pool), wake_(std::move(wake)) {
     adopt(std::move(scene));
   }
@@ -93,7 +93,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     wake_ = nullptr;
   }
 
-  void set_scene(std::shared_ptr<const SceneSnapshot> scene) override {
+  void set_scene(std::shared_ptr<const map::SceneSnapshot> scene) override {
     change([&] { adopt(std::move(scene)); });
   }
 
@@ -355,7 +355,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // With the lock held: everything below, except where it says otherwise.
 
-  void adopt(std::shared_ptr<const SceneSnapshot> scene) {
+  void adopt(std::shared_ptr<const map::SceneSnapshot> scene) {
     scene_ = std::move(scene);
     order_.clear();
     raw_order_.clear();
@@ -733,7 +733,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   }
 
   const std::shared_ptr<FrameCache::State> cache_;
-  WorkerPool& pool_;
+  jobs::WorkerPool& pool_;
 
   std::mutex wake_mutex_;
   std::function<void()> wake_;
@@ -743,7 +743,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   bool closed_ = false;
   bool subscribed_ = false;
   bool is_complete_due_ = false;
-  std::shared_ptr<const SceneSnapshot> scene_;
+  std::shared_ptr<const map::SceneSnapshot> scene_;
   StreamQuality quality_;
   float wanted_step_m_ = 0;
   std::optional<Camera> camera_;
@@ -768,9 +768,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
 }  // namespace
 
-std::shared_ptr<ViewerStream> ViewerStream::create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                                   WorkerPool& pool, std::function<void()> wake) {
+std::shared_ptr<ViewerStream> ViewerStream::create(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache,
+                                                   jobs::WorkerPool& pool, std::function<void()> wake) {
   return std::make_shared<Stream>(std::move(scene), cache.state(), pool, std::move(wake));
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

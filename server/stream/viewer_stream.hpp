@@ -15,7 +15,7 @@
 #include "server/jobs/worker_pool.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// The knobs of PROTOCOL quality.set, as in force.
 ///
@@ -38,7 +38,7 @@ float lattice_step(double wanted_m);
 
 /// Where a viewer looks from; metres relative to the scene origin.
 struct Camera {
-  fusion::Vec3f eye, target, up;
+  base::Vec3f eye, target, up;
   double fov_y_deg = 50;
   std::array<int, 2> viewport{1280, 720};
 };
@@ -122,14 +122,14 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
  public:
   /// `wake` is called from any thread whenever next_frame() or take_complete() may have something new; it must only
   /// post to the session's strand. It is not called after close().
-  static std::shared_ptr<ViewerStream> create(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache,
-                                              WorkerPool& pool, std::function<void()> wake);
+  static std::shared_ptr<ViewerStream> create(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache,
+                                              jobs::WorkerPool& pool, std::function<void()> wake);
   virtual ~ViewerStream() = default;
 
   virtual void close() = 0;
 
   /// A scene that replaces the current one: tiles that are gone get remove frames, changed ones new geometry.
-  virtual void set_scene(std::shared_ptr<const SceneSnapshot> scene) = 0;
+  virtual void set_scene(std::shared_ptr<const map::SceneSnapshot> scene) = 0;
 
   /// Starts sending. A later call replaces the subscription; what was sent with another transform or step is sent anew, what
   /// the viewer has is not, nor is geometry.
@@ -168,4 +168,4 @@ class ViewerStream : public std::enable_shared_from_this<ViewerStream> {
   virtual StreamStats stats() const = 0;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::stream {
 
 using protocol::TileFrameHeader;
 using protocol::TileId;
@@ -32,7 +32,7 @@ void TileSlot::forget_raw() {
   }
 }
 
-void ViewerTiles::adopt(const SceneSnapshot& scene) {
+void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
   tree_ = ViewTree(scene);
   std::map<TileId, std::shared_ptr<TileSlot>> known_slots;
   for (auto& slot : slots_) known_slots.emplace(slot->tile->id, slot);
@@ -108,7 +108,7 @@ std::size_t ViewerTiles::set_looks(const LookRules& rules) {
   next_look_s_ = std::numeric_limits<double>::infinity();
   for (const auto& slot : slots_) {
     TileLook look = look_of(*slot->tile, rules);
-    next_look_s_ = std::min(next_look_s_, server::next_look_s(*slot->tile, rules));
+    next_look_s_ = std::min(next_look_s_, stream::next_look_s(*slot->tile, rules));
     if (look == slot->look) continue;
     slot->look = std::move(look);
     put_down(*slot);
@@ -247,4 +247,4 @@ TileFrameHeader ViewerTiles::take_removal() {
   return header;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -14,7 +14,7 @@
 #include "server/stream/demand.hpp"
 #include "server/stream/view_selection.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 
 /// What one viewer has and needs of one tile.
 struct TileSlot {
@@ -25,7 +25,7 @@ struct TileSlot {
     Ready,    ///< `geometry` and `colours` answer the present demand.
   };
 
-  std::shared_ptr<const Tile> tile;
+  std::shared_ptr<const map::Tile> tile;
   std::size_t node = 0;  ///< In the tree.
   bool is_gone = false;  ///< No longer part of the scene, or the stream has ended.
 
@@ -96,7 +96,7 @@ class ViewerTiles {
  public:
   /// The tiles of another scene. Those that both have stay as they are; of those that have changed the viewer holds
   /// something outdated; those that are gone are removed.
-  void adopt(const SceneSnapshot& scene);
+  void adopt(const map::SceneSnapshot& scene);
   /// The end: nothing is left, and jobs that are under way find their slots gone.
   void clear();
 
@@ -158,4 +158,4 @@ class ViewerTiles {
   double next_look_s_ = std::numeric_limits<double>::infinity();
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -14,11 +14,11 @@
 #include "server/stream/tile_encoder.hpp"
 #include "server/tradeoff/stopwatch.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 namespace {
 
-using fusion::failure;
-using fusion::Rgb8;
+using base::failure;
+using base::Rgb8;
 
 constexpr int kZstdLevel = 3;
 
@@ -33,9 +33,9 @@ struct PlainTile {
   std::size_t vertex_count = 0;
 };
 
-fusion::Result<PlainTile> plain_tile(const Tile& tile, float step_m) {
-  const auto lattice = tile_lattice(tile, step_m);
-  if (!lattice) return failure(fusion::ErrorCode::BadValue, lattice.error().message, "position");
+base::Result<PlainTile> plain_tile(const map::Tile& tile, float step_m) {
+  const auto lattice = stream::tile_lattice(tile, step_m);
+  if (!lattice) return base::failure(base::ErrorCode::BadValue, lattice.error().message, "position");
   PlainTile plain;
   plain.vertex_count = tile.positions.size();
   plain.positions.reserve(4 * plain.vertex_count);
@@ -105,38 +105,38 @@ GeometryPoint with_meshoptimizer(const std::vector<PlainTile>& tiles, GeometryPo
   return point;
 }
 
-fusion::Result<GeometryPoint> with_draco(const Tiles& tiles, float step_m, int speed, GeometryPoint point) {
+base::Result<GeometryPoint> with_draco(const Tiles& tiles, float step_m, int speed, GeometryPoint point) {
   point.codec = "draco";
   point.encoder_speed = speed;
   for (const auto& tile : tiles) {
     const auto encoded = [&] {
       const Stopwatch watch(point.encode_ms);
-      return encoded_tile(*tile, step_m, speed);
+      return stream::encoded_tile(*tile, step_m, speed);
     }();
-    if (!encoded) return failure(fusion::ErrorCode::BadValue, encoded.error().message, "geometry");
+    if (!encoded) return base::failure(base::ErrorCode::BadValue, encoded.error().message, "geometry");
     point.size_bytes += encoded.value().payload->size();
     const Stopwatch watch(point.decode_ms);
-    if (!protocol::decoded_geometry(*encoded.value().payload)) {
-      return failure(fusion::ErrorCode::BadValue, "an encoded tile cannot be decoded", "geometry");
+    if (!protocol::codec::decoded_geometry(*encoded.value().payload)) {
+      return base::failure(base::ErrorCode::BadValue, "an encoded tile cannot be decoded", "geometry");
     }
   }
   return point;
 }
 
-fusion::Result<ColourPoint> draco_colours(const Tiles& tiles, const std::vector<EncodedTile>& geometry,
-                                          const fusion::FusionPlan& plan, protocol::ColourTransform transform,
-                                          ColourPoint point) {
+base::Result<ColourPoint> draco_colours(const Tiles& tiles, const std::vector<stream::EncodedTile>& geometry,
+                                        const fusion::FusionPlan& plan, protocol::ColourTransform transform,
+                                        ColourPoint point) {
   point.codec = transform == protocol::ColourTransform::None ? "draco" : kSubtractGreen;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const auto payload = [&] {
       const Stopwatch watch(point.encode_ms);
-      return encoded_tile_colours(*tiles[i], geometry[i], plan, {}, point.colour_bits, 7, transform);
+      return stream::encoded_tile_colours(*tiles[i], geometry[i], plan, {}, point.colour_bits, 7, transform);
     }();
-    if (!payload) return failure(fusion::ErrorCode::BadValue, payload.error().message, "colours");
+    if (!payload) return base::failure(base::ErrorCode::BadValue, payload.error().message, "colours");
     point.size_bytes += payload.value()->size();
     const Stopwatch watch(point.decode_ms);
-    if (!protocol::decoded_colours(*payload.value(), transform)) {
-      return failure(fusion::ErrorCode::BadValue, "encoded colours cannot be decoded", "colours");
+    if (!protocol::codec::decoded_colours(*payload.value(), transform)) {
+      return base::failure(base::ErrorCode::BadValue, "encoded colours cannot be decoded", "colours");
     }
   }
   return point;
@@ -152,7 +152,7 @@ ColourPoint zstd_colours(const Tiles& tiles, const fusion::FusionPlan& plan, Col
   point.codec = "zstd";
   for (const auto& tile : tiles) {
     std::vector<std::byte> packed;
-    std::vector<Rgb8> fused(tile->positions.size());
+    std::vector<base::Rgb8> fused(tile->positions.size());
     {
       const Stopwatch watch(point.encode_ms);
       plan.fuse(tile->temperature_celsius, tile->visible, fused);
@@ -161,7 +161,7 @@ ColourPoint zstd_colours(const Tiles& tiles, const fusion::FusionPlan& plan, Col
       packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel));
     }
     const Stopwatch watch(point.decode_ms);
-    ZSTD_decompress(fused.data(), fused.size() * sizeof(Rgb8), packed.data(), packed.size());
+    ZSTD_decompress(fused.data(), fused.size() * sizeof(base::Rgb8), packed.data(), packed.size());
     point.size_bytes += packed.size();
   }
   return point;
@@ -171,7 +171,7 @@ ColourPoint meshoptimizer_colours(const Tiles& tiles, const fusion::FusionPlan& 
   point.codec = "meshoptimizer";
   for (const auto& tile : tiles) {
     const std::size_t count = tile->positions.size();
-    std::vector<Rgb8> fused(count);
+    std::vector<base::Rgb8> fused(count);
     std::vector<std::array<std::uint8_t, 4>> padded(count);  // the codec takes vertices of a multiple of four bytes
     std::vector<unsigned char> packed(meshopt_encodeVertexBufferBound(count, 4));
     {
@@ -189,9 +189,9 @@ ColourPoint meshoptimizer_colours(const Tiles& tiles, const fusion::FusionPlan& 
 
 }  // namespace
 
-fusion::Result<std::vector<GeometryPoint>> geometry_costs(const Tiles& tiles, float step_m,
-                                                          const std::vector<int>& encoder_speeds,
-                                                          const GeometryPoint& point) {
+base::Result<std::vector<GeometryPoint>> geometry_costs(const Tiles& tiles, float step_m,
+                                                        const std::vector<int>& encoder_speeds,
+                                                        const GeometryPoint& point) {
   std::vector<PlainTile> plain;
   for (const auto& tile : tiles) {
     BOOST_OUTCOME_TRY(auto one, plain_tile(*tile, step_m));
@@ -205,12 +205,12 @@ fusion::Result<std::vector<GeometryPoint>> geometry_costs(const Tiles& tiles, fl
   return points;
 }
 
-fusion::Result<std::vector<ColourPoint>> colour_costs(const Tiles& tiles, float step_m, const fusion::FusionPlan& plan,
-                                                      const std::vector<ColourPoint>& points) {
-  std::vector<EncodedTile> geometry;
+base::Result<std::vector<ColourPoint>> colour_costs(const Tiles& tiles, float step_m, const fusion::FusionPlan& plan,
+                                                    const std::vector<ColourPoint>& points) {
+  std::vector<stream::EncodedTile> geometry;
   for (const auto& tile : tiles) {
-    auto encoded = encoded_tile(*tile, step_m, 7);
-    if (!encoded) return failure(fusion::ErrorCode::BadValue, encoded.error().message, "geometry");
+    auto encoded = stream::encoded_tile(*tile, step_m, 7);
+    if (!encoded) return base::failure(base::ErrorCode::BadValue, encoded.error().message, "geometry");
     geometry.push_back(std::move(encoded.value()));
   }
   std::vector<ColourPoint> costs;
@@ -227,4 +227,4 @@ fusion::Result<std::vector<ColourPoint>> colour_costs(const Tiles& tiles, float 
   return costs;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -12,11 +12,11 @@
 #include "server/tradeoff/raw_costs.hpp"
 #include "server/tradeoff/shown_error.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 namespace {
 
 // A level above every leaf's parent would draw nothing new: levels without a tile of their own are left out.
-std::vector<int> drawn_levels(const SceneSnapshot& scene) {
+std::vector<int> drawn_levels(const map::SceneSnapshot& scene) {
   std::vector<int> levels;
   for (const auto& tile : scene.tiles()) levels.push_back(tile->id.level);
   std::sort(levels.begin(), levels.end());
@@ -27,7 +27,7 @@ std::vector<int> drawn_levels(const SceneSnapshot& scene) {
 }
 
 // Drawn when the tree is refined to `level`: the tiles of that level, and leaves above it.
-Tiles tiles_at_level(const SceneSnapshot& scene, int level) {
+Tiles tiles_at_level(const map::SceneSnapshot& scene, int level) {
   Tiles chosen;
   for (const auto& tile : scene.tiles()) {
     const bool leaf = tile->child_mask == 0;
@@ -44,8 +44,8 @@ std::uint64_t vertex_count_of(const Tiles& tiles) {
 
 }  // namespace
 
-fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,
-                                                      const fusion::Progress& progress) {
+base::Result<TradeoffMeasurement> measured_tradeoff(const map::SceneSnapshot& scene, const TradeoffOptions& options,
+                                                    const base::Progress& progress) {
   BOOST_OUTCOME_TRY(const auto samples, ErrorSamples::take(scene, options.sample_count, options.palette));
   const float suggested_m = scene.suggested_position_step_m();
   TradeoffMeasurement result{scene.name(),
@@ -72,9 +72,10 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
     const double step_share =
         static_cast<double>(base.vertex_count) / whole / static_cast<double>(options.step_factors.size() + 1);
     for (const double factor : options.step_factors) {
-      const float step_m = position_step_in_force(lattice_step(factor * static_cast<double>(suggested_m)), suggested_m);
+      const float step_m =
+          stream::position_step_in_force(stream::lattice_step(factor * static_cast<double>(suggested_m)), suggested_m);
       base.position_step_mm = 1000 * static_cast<double>(step_m);
-      fusion::report(progress, kMeasuringPhase, done);
+      base::report(progress, kMeasuringPhase, done);
       done += step_share;
       BOOST_OUTCOME_TRY(const PositionError error, samples.position_error(tiles, step_m));
       base.error_rms_mm = error.rms_mm;
@@ -83,7 +84,7 @@ fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene
       append(result.geometry, std::move(points));
     }
 
-    fusion::report(progress, kMeasuringPhase, done);
+    base::report(progress, kMeasuringPhase, done);
     done += step_share;
     std::vector<ColourPoint> bases;
     const auto errors = samples.colour_errors(tiles, options.colour_bits);
@@ -153,4 +154,4 @@ std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measur
   return recommendations;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -10,9 +10,9 @@
 #include "fusion/base/progress.hpp"
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
-using Tiles = std::vector<std::shared_ptr<const Tile>>;
+using Tiles = std::vector<std::shared_ptr<const map::Tile>>;
 
 /// What `spectra tradeoff` measures and how closely.
 struct TradeoffOptions {
@@ -88,8 +88,8 @@ const ColourPoint& full_change(const TradeoffMeasurement& measurement);
 std::uint64_t break_even(const RawPoint& raw, const ColourPoint& change);
 
 /// Measures on one thread, as one core of the server would work; `progress` is told of kMeasuringPhase.
-fusion::Result<TradeoffMeasurement> measured_tradeoff(const SceneSnapshot& scene, const TradeoffOptions& options,
-                                                      const fusion::Progress& progress = {});
+base::Result<TradeoffMeasurement> measured_tradeoff(const map::SceneSnapshot& scene, const TradeoffOptions& options,
+                                                    const base::Progress& progress = {});
 
 inline constexpr std::string_view kMeasuringPhase = "measuring";
 
@@ -108,4 +108,4 @@ std::vector<Recommendation> recommended_points(const TradeoffMeasurement& measur
                                                const std::vector<double>& rates_mbit_per_s,
                                                double change_target_s = 0.5, double picture_target_s = 10);
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -12,19 +12,19 @@
 #include "server/stream/tile_encoder.hpp"
 #include "server/tradeoff/stopwatch.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 namespace {
 
 constexpr int kEncoderSpeed = 7;
 
-fusion::Error unencodable(const std::string& why) {
-  return {fusion::ErrorCode::BadValue, why, "raw layers"};
+base::Error unencodable(const std::string& why) {
+  return {base::ErrorCode::BadValue, why, "raw layers"};
 }
 
 /// How often each difference of 0 to 255 levels was seen.
 class Levels {
  public:
-  void add(fusion::Rgb8 a, fusion::Rgb8 b) {
+  void add(base::Rgb8 a, base::Rgb8 b) {
     const int level = std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)});
     ++counts_[static_cast<std::size_t>(level)];
   }
@@ -48,14 +48,14 @@ class Levels {
 };
 
 /// The smaller of both forms, as the stream sends it.
-fusion::Result<std::size_t> visible_size(const Tile& tile, const EncodedTile& geometry, RawPoint& point) {
+base::Result<std::size_t> visible_size(const map::Tile& tile, const stream::EncodedTile& geometry, RawPoint& point) {
   std::size_t least = SIZE_MAX;
   protocol::ColourTransform chosen = protocol::ColourTransform::None;
-  Payload payload;
+  stream::Payload payload;
   {
     const Stopwatch watch(point.encode_ms);
     for (const auto transform : {protocol::ColourTransform::None, protocol::ColourTransform::SubtractGreen}) {
-      auto encoded = encoded_visible_layer(tile, geometry, kEncoderSpeed, transform);
+      auto encoded = stream::encoded_visible_layer(tile, geometry, kEncoderSpeed, transform);
       if (!encoded) return unencodable(encoded.error().message);
       if (encoded.value()->size() >= least) continue;
       least = encoded.value()->size();
@@ -64,18 +64,18 @@ fusion::Result<std::size_t> visible_size(const Tile& tile, const EncodedTile& ge
     }
   }
   const Stopwatch watch(point.decode_ms);
-  if (!protocol::decoded_colours(*payload, chosen)) return unencodable("a layer cannot be decoded");
+  if (!protocol::codec::decoded_colours(*payload, chosen)) return unencodable("a layer cannot be decoded");
   return least;
 }
 
 }  // namespace
 
-fusion::Result<std::vector<RawPoint>> raw_costs(const Tiles& tiles, float step_m, const fusion::FusionPlan& plan,
-                                                const std::vector<double>& temperature_steps_celsius) {
-  std::vector<EncodedTile> geometry;
+base::Result<std::vector<RawPoint>> raw_costs(const Tiles& tiles, float step_m, const fusion::FusionPlan& plan,
+                                              const std::vector<double>& temperature_steps_celsius) {
+  std::vector<stream::EncodedTile> geometry;
   RawPoint visible;
   for (const auto& tile : tiles) {
-    auto encoded = encoded_tile(*tile, step_m, kEncoderSpeed);
+    auto encoded = stream::encoded_tile(*tile, step_m, kEncoderSpeed);
     if (!encoded) return unencodable(encoded.error().message);
     geometry.push_back(std::move(encoded).value());
     BOOST_OUTCOME_TRY(const std::size_t size, visible_size(*tile, geometry.back(), visible));
@@ -87,16 +87,16 @@ fusion::Result<std::vector<RawPoint>> raw_costs(const Tiles& tiles, float step_m
     point.temperature_step_celsius = step;
     Levels levels;
     for (std::size_t t = 0; t < tiles.size(); ++t) {
-      const Tile& tile = *tiles[t];
+      const map::Tile& tile = *tiles[t];
       const auto payload = [&] {
         const Stopwatch watch(point.encode_ms);
-        return encoded_temperature_layer(tile, geometry[t], kEncoderSpeed, step);
+        return stream::encoded_temperature_layer(tile, geometry[t], kEncoderSpeed, step);
       }();
       if (!payload) return unencodable(payload.error().message);
       point.temperature_bytes += payload.value()->size();
       const auto decoded = [&] {
         const Stopwatch watch(point.decode_ms);
-        return protocol::decoded_temperature_codes(*payload.value());
+        return protocol::codec::decoded_temperature_codes(*payload.value());
       }();
       if (!decoded) return unencodable("a layer cannot be decoded");
       const std::size_t count = tile.positions.size();
@@ -105,7 +105,7 @@ fusion::Result<std::vector<RawPoint>> raw_costs(const Tiles& tiles, float step_m
       std::vector<float> seen(count), in_decoded_order(codes.size());
       fusion::TemperatureCodes{table.scale, table.offset}.decode(codes, in_decoded_order);
       for (std::size_t i = 0; i < codes.size(); ++i) seen[geometry[t].input_of_decoded[i]] = in_decoded_order[i];
-      std::vector<fusion::Rgb8> exact(count), rounded(count);
+      std::vector<base::Rgb8> exact(count), rounded(count);
       plan.fuse(tile.temperature_celsius, tile.visible, exact);
       plan.fuse(seen, tile.visible, rounded);
       for (std::size_t i = 0; i < count; ++i) {
@@ -121,4 +121,4 @@ fusion::Result<std::vector<RawPoint>> raw_costs(const Tiles& tiles, float step_m
   return points;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -12,7 +12,7 @@
 
 #include "fusion/files/output_file.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 namespace {
 
@@ -250,15 +250,15 @@ std::vector<Row> raw_rows(const TradeoffMeasurement& measurement) {
 }
 
 /// All of them or none.
-fusion::Result<void> written_files(const std::filesystem::path& folder,
-                                   const std::vector<std::pair<const char*, std::string>>& texts) {
-  std::vector<fusion::OutputFile> files;
+base::Result<void> written_files(const std::filesystem::path& folder,
+                                 const std::vector<std::pair<const char*, std::string>>& texts) {
+  std::vector<files::OutputFile> files;
   for (const auto& [name, text] : texts) {
-    BOOST_OUTCOME_TRY(auto file, fusion::OutputFile::create(folder / name));
+    BOOST_OUTCOME_TRY(auto file, files::OutputFile::create(folder / name));
     BOOST_OUTCOME_TRYV(file.write(std::as_bytes(std::span(text))));
     files.push_back(std::move(file));
   }
-  return fusion::OutputFile::commit_all(files);
+  return files::OutputFile::commit_all(files);
 }
 
 }  // namespace
@@ -361,8 +361,8 @@ std::string raw_text(const TradeoffMeasurement& measurement) {
       break_even(raw, change), raw.temperature_worst_celsius, raw.levels_p95);
 }
 
-fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
-                                  const std::vector<Recommendation>& recommendations) {
+base::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
+                                const std::vector<Recommendation>& recommendations) {
   std::error_code ignored;  // what is wrong with the folder, the first file tells
   const bool is_new = std::filesystem::create_directories(folder, ignored);
   auto written = written_files(folder, {{"geometry.csv", geometry_csv(measurement)},
@@ -374,4 +374,4 @@ fusion::Result<void> write_report(const std::filesystem::path& folder, const Tra
   return written;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -7,7 +7,7 @@
 #include "fusion/base/error.hpp"
 #include "server/tradeoff/measure.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 /// One line of header and one a row; numbers with a point, missing ones empty.
 std::string geometry_csv(const TradeoffMeasurement& measurement);
@@ -27,7 +27,7 @@ std::string raw_text(const TradeoffMeasurement& measurement);
 
 /// Writes geometry.csv, colours.csv, raw.csv, grid.csv and report.html into a folder, made when it does not exist: all of them whole,
 /// or none.
-fusion::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
-                                  const std::vector<Recommendation>& recommendations);
+base::Result<void> write_report(const std::filesystem::path& folder, const TradeoffMeasurement& measurement,
+                                const std::vector<Recommendation>& recommendations);
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -13,17 +13,17 @@
 #include "server/stream/lattice.hpp"
 #include "server/tradeoff/surface_index.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 namespace {
 
-using fusion::failure;
-using fusion::Rgb8;
-using fusion::Vec3f;
+using base::failure;
+using base::Rgb8;
+using base::Vec3f;
 
 /// A level of detail as one surface; vertex i belongs to tile vertex i in the order of the tiles.
 struct LevelSurface {
-  std::vector<Vec3f> positions;
-  std::vector<fusion::Triangle> triangles;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Triangle> triangles;
 };
 
 LevelSurface merged(const Tiles& tiles) {
@@ -37,15 +37,15 @@ LevelSurface merged(const Tiles& tiles) {
 }
 
 /// The same surface as a client decodes it at a position step.
-fusion::Result<LevelSurface> decoded(const Tiles& tiles, float step_m) {
+base::Result<LevelSurface> decoded(const Tiles& tiles, float step_m) {
   LevelSurface surface = merged(tiles);
   std::size_t next = 0;
   for (const auto& tile : tiles) {
-    const auto lattice = tile_lattice(*tile, step_m);
-    if (!lattice) return failure(fusion::ErrorCode::BadValue, lattice.error().message, "position");
+    const auto lattice = stream::tile_lattice(*tile, step_m);
+    if (!lattice) return base::failure(base::ErrorCode::BadValue, lattice.error().message, "position");
     const auto& [x, y, z] = lattice.value().origin_m;
     const float finest_m = lattice.value().step_m;
-    for (const protocol::LatticePoint& point : lattice.value().points) {
+    for (const protocol::codec::LatticePoint& point : lattice.value().points) {
       const auto metres = [&](std::size_t axis) { return static_cast<float>(point[axis]) * finest_m; };
       surface.positions[next++] = {x + metres(0), y + metres(1), z + metres(2)};
     }
@@ -89,27 +89,27 @@ class PaletteReader {
 };
 
 /// What one set of settings shows at one level: fused colours of every vertex of the level's surface, rounded as sent.
-std::vector<Rgb8> shown_colours(const Tiles& tiles, const fusion::FusionPlan& plan, int bits) {
-  std::vector<Rgb8> shown;
+std::vector<base::Rgb8> shown_colours(const Tiles& tiles, const fusion::FusionPlan& plan, int bits) {
+  std::vector<base::Rgb8> shown;
   for (const auto& tile : tiles) {
-    std::vector<Rgb8> fused(tile->positions.size());
+    std::vector<base::Rgb8> fused(tile->positions.size());
     plan.fuse(tile->temperature_celsius, tile->visible, fused);
-    for (const Rgb8 c : fused) {
-      shown.push_back({protocol::rounded_channel(c.r, bits), protocol::rounded_channel(c.g, bits),
-                       protocol::rounded_channel(c.b, bits)});
+    for (const base::Rgb8 c : fused) {
+      shown.push_back({protocol::codec::rounded_channel(c.r, bits), protocol::codec::rounded_channel(c.g, bits),
+                       protocol::codec::rounded_channel(c.b, bits)});
     }
   }
   return shown;
 }
 
 /// The colour on the screen at a surface point: corner colours, linearly interpolated.
-std::array<double, 3> colour_at(const LevelSurface& surface, const std::vector<Rgb8>& colours,
+std::array<double, 3> colour_at(const LevelSurface& surface, const std::vector<base::Rgb8>& colours,
                                 const SurfacePoint& point) {
-  fusion::Triangle corners{point.triangle, point.triangle, point.triangle};
+  base::Triangle corners{point.triangle, point.triangle, point.triangle};
   if (!surface.triangles.empty()) corners = surface.triangles[point.triangle];
   std::array<double, 3> colour{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const Rgb8 c = colours[corners[i]];
+    const base::Rgb8 c = colours[corners[i]];
     const std::array<std::uint8_t, 3> channels{c.r, c.g, c.b};
     for (std::size_t axis = 0; axis < 3; ++axis) colour[axis] += point.barycentric[i] * channels[axis];
   }
@@ -118,8 +118,8 @@ std::array<double, 3> colour_at(const LevelSurface& surface, const std::vector<R
 
 }  // namespace
 
-fusion::Result<ErrorSamples> ErrorSamples::take(const SceneSnapshot& scene, std::uint32_t sample_count,
-                                                const std::string& palette) {
+base::Result<ErrorSamples> ErrorSamples::take(const map::SceneSnapshot& scene, std::uint32_t sample_count,
+                                              const std::string& palette) {
   fusion::FusionChange change;
   change.palette = palette;
   BOOST_OUTCOME_TRY(auto look_settings, fusion::with_change(fusion::default_settings(), change));
@@ -130,12 +130,12 @@ fusion::Result<ErrorSamples> ErrorSamples::take(const SceneSnapshot& scene, std:
   ErrorSamples samples(std::move(look), std::move(thermal), fusion::find_palette(palette)->table);
   samples.take_evenly(scene, sample_count);
   if (samples.positions_.empty()) {
-    return failure(fusion::ErrorCode::Unsupported, "the scene has no vertex that could be drawn", "scene");
+    return base::failure(base::ErrorCode::Unsupported, "the scene has no vertex that could be drawn", "scene");
   }
   return samples;
 }
 
-void ErrorSamples::take_evenly(const SceneSnapshot& scene, std::uint32_t wanted) {
+void ErrorSamples::take_evenly(const map::SceneSnapshot& scene, std::uint32_t wanted) {
   const std::uint64_t stride = std::max<std::uint64_t>(1, scene.vertex_count() / std::max(1u, wanted));
   std::uint64_t counter = 0;
   for (const auto& tile : scene.tiles()) {
@@ -153,12 +153,12 @@ void ErrorSamples::take_evenly(const SceneSnapshot& scene, std::uint32_t wanted)
   }
 }
 
-fusion::Result<PositionError> ErrorSamples::position_error(const Tiles& tiles, float step_m) const {
+base::Result<PositionError> ErrorSamples::position_error(const Tiles& tiles, float step_m) const {
   BOOST_OUTCOME_TRY(const auto surface, decoded(tiles, step_m));
   const SurfaceIndex index(surface.positions, surface.triangles);
   PositionError error;
   double squares = 0;
-  for (const Vec3f& place : positions_) {
+  for (const base::Vec3f& place : positions_) {
     const double distance_mm = 1000 * index.nearest(place).distance_m;
     squares += distance_mm * distance_mm;
     error.worst_mm = std::max(error.worst_mm, distance_mm);
@@ -172,14 +172,14 @@ std::vector<ColourError> ErrorSamples::colour_errors(const Tiles& tiles, const s
   const LevelSurface surface = merged(tiles);
   const SurfaceIndex index(surface.positions, surface.triangles);
   std::vector<SurfacePoint> nearest;
-  for (const Vec3f& place : positions_) nearest.push_back(index.nearest(place));
-  std::vector<Rgb8> truth(positions_.size());
+  for (const base::Vec3f& place : positions_) nearest.push_back(index.nearest(place));
+  std::vector<base::Rgb8> truth(positions_.size());
   look_.fuse(temperature_celsius_, visible_, truth);
 
   std::vector<ColourError> errors;
   for (const int bits : colour_bits) {
-    const std::vector<Rgb8> look = shown_colours(tiles, look_, bits);
-    const std::vector<Rgb8> thermal = shown_colours(tiles, thermal_, bits);
+    const std::vector<base::Rgb8> look = shown_colours(tiles, look_, bits);
+    const std::vector<base::Rgb8> thermal = shown_colours(tiles, thermal_, bits);
     std::vector<double> differences, celsius;
     double sum = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -197,4 +197,4 @@ std::vector<ColourError> ErrorSamples::colour_errors(const Tiles& tiles, const s
   return errors;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

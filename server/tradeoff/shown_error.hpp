@@ -11,7 +11,7 @@
 #include "server/map/scene_snapshot.hpp"
 #include "server/tradeoff/measure.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 /// Distance of the full mesh's vertices to the surface that a client draws.
 struct PositionError {
@@ -30,11 +30,11 @@ struct ColourError {
 class ErrorSamples {
  public:
   /// Fails for a palette that does not exist and for a scene without a vertex that could be drawn.
-  static fusion::Result<ErrorSamples> take(const SceneSnapshot& scene, std::uint32_t sample_count,
-                                           const std::string& palette);
+  static base::Result<ErrorSamples> take(const map::SceneSnapshot& scene, std::uint32_t sample_count,
+                                         const std::string& palette);
 
   /// Of these tiles as a client decodes them when the largest position step is `step_m`. Fails where a tile cannot be encoded.
-  fusion::Result<PositionError> position_error(const Tiles& tiles, float step_m) const;
+  base::Result<PositionError> position_error(const Tiles& tiles, float step_m) const;
   /// Of these tiles' colours, fused with look() and rounded to each number of bits, and of the temperature that thermal_only
   /// shows.
   std::vector<ColourError> colour_errors(const Tiles& tiles, const std::vector<int>& colour_bits) const;
@@ -45,14 +45,14 @@ class ErrorSamples {
  private:
   ErrorSamples(fusion::FusionPlan look, fusion::FusionPlan thermal, const fusion::PaletteTable& palette)
       : look_(std::move(look)), thermal_(std::move(thermal)), palette_(palette) {}
-  void take_evenly(const SceneSnapshot& scene, std::uint32_t wanted);
+  void take_evenly(const map::SceneSnapshot& scene, std::uint32_t wanted);
 
   fusion::FusionPlan look_;
   fusion::FusionPlan thermal_;
   fusion::PaletteTable palette_;
-  std::vector<fusion::Vec3f> positions_;
-  std::vector<fusion::Rgb8> visible_;
+  std::vector<base::Vec3f> positions_;
+  std::vector<base::Rgb8> visible_;
   std::vector<float> temperature_celsius_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 /// Adds the milliseconds of its own life to a sum.
 class Stopwatch {
@@ -19,4 +19,4 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_;
 };
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 namespace {
 
@@ -20,7 +20,7 @@ using Entry = std::pair<Box, std::uint32_t>;
 using Tree = bg::index::rtree<Entry, bg::index::rstar<16>>;
 using Vec = std::array<double, 3>;
 
-Vec to_vec(fusion::Vec3f p) {
+Vec to_vec(base::Vec3f p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
 
@@ -36,18 +36,18 @@ double squared_distance(const Vec& p, const std::array<Vec, 3>& corners, const s
 }  // namespace
 
 struct SurfaceIndex::State {
-  std::vector<fusion::Vec3f> positions;
-  std::vector<fusion::Triangle> triangles;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Triangle> triangles;
   Tree tree;
 
-  std::array<fusion::Vec3f, 3> corners(std::uint32_t index) const {
+  std::array<base::Vec3f, 3> corners(std::uint32_t index) const {
     if (triangles.empty()) return {positions[index], positions[index], positions[index]};
-    const fusion::Triangle& t = triangles[index];
+    const base::Triangle& t = triangles[index];
     return {positions[t[0]], positions[t[1]], positions[t[2]]};
   }
 };
 
-SurfaceIndex::SurfaceIndex(std::vector<fusion::Vec3f> positions, std::vector<fusion::Triangle> triangles)
+SurfaceIndex::SurfaceIndex(std::vector<base::Vec3f> positions, std::vector<base::Triangle> triangles)
     : state_(std::make_unique<State>()) {
   state_->positions = std::move(positions);
   state_->triangles = std::move(triangles);
@@ -69,7 +69,7 @@ bool SurfaceIndex::empty() const {
   return state_->tree.empty();
 }
 
-SurfacePoint SurfaceIndex::nearest(fusion::Vec3f place) const {
+SurfacePoint SurfaceIndex::nearest(base::Vec3f place) const {
   const Point point(place.x, place.y, place.z);
   SurfacePoint best;
   double best_distance = std::numeric_limits<double>::infinity();
@@ -79,7 +79,7 @@ SurfacePoint SurfaceIndex::nearest(fusion::Vec3f place) const {
     const double box_distance = static_cast<double>(bg::comparable_distance(point, entry->first));
     if (box_distance > best_distance) break;
     const auto corners = state_->corners(entry->second);
-    const auto weights = nearest_on_triangle(place, corners[0], corners[1], corners[2]);
+    const auto weights = mesh::nearest_on_triangle(place, corners[0], corners[1], corners[2]);
     const double distance =
         squared_distance(to_vec(place), {to_vec(corners[0]), to_vec(corners[1]), to_vec(corners[2])}, weights);
     if (distance < best_distance) {
@@ -90,4 +90,4 @@ SurfacePoint SurfaceIndex::nearest(fusion::Vec3f place) const {
   return best;
 }
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

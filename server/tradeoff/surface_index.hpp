@@ -9,7 +9,7 @@
 #include "fusion/base/vertex_types.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 
 /// The point of a surface that is nearest to some place.
 struct SurfacePoint {
@@ -21,18 +21,18 @@ struct SurfacePoint {
 /// Finds nearest points on a triangle mesh or point cloud (no triangles). Keeps its own copy. Immutable after construction.
 class SurfaceIndex {
  public:
-  SurfaceIndex(std::vector<fusion::Vec3f> positions, std::vector<fusion::Triangle> triangles);
+  SurfaceIndex(std::vector<base::Vec3f> positions, std::vector<base::Triangle> triangles);
   ~SurfaceIndex();
 
   bool empty() const;
   /// Must not be called on an empty surface.
-  SurfacePoint nearest(fusion::Vec3f place) const;
+  SurfacePoint nearest(base::Vec3f place) const;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
-using fusion::nearest_on_triangle;
+using mesh::nearest_on_triangle;
 
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kChanged = 10;  // CIEDE2000
 
-double triangle_area(Vec3f a, Vec3f b, Vec3f c) {
+double triangle_area(base::Vec3f a, base::Vec3f b, base::Vec3f c) {
   const std::array u = {double{b.x} - double{a.x}, double{b.y} - double{a.y}, double{b.z} - double{a.z}};
   const std::array v = {double{c.x} - double{a.x}, double{c.y} - double{a.y}, double{c.z} - double{a.z}};
   return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
@@ -34,19 +34,19 @@ float median_of(std::span<const float> temperature) {
 }
 
 /// Hue may be chosen against the scene, and percentiles need a histogram.
-SceneTemperature facts_of(const MultispectralMesh& mesh) {
-  TemperatureAccumulator accumulator;
+fusion::SceneTemperature facts_of(const mesh::MultispectralMesh& mesh) {
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(mesh.temperature_celsius());
-  SceneTemperature facts;
+  fusion::SceneTemperature facts;
   facts.summary = accumulator.summary();
   facts.histogram = [&mesh, summary = facts.summary](std::uint32_t bins) {
-    Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(mesh.temperature_celsius(), histogram);
+    fusion::Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
     return histogram;
   };
   facts.hues = [&mesh] {
-    Hues hues;
-    add_to_hues(mesh.visible(), hues);
+    fusion::Hues hues;
+    fusion::add_to_hues(mesh.visible(), hues);
     return hues;
   };
   return facts;
@@ -54,10 +54,10 @@ SceneTemperature facts_of(const MultispectralMesh& mesh) {
 
 }  // namespace
 
-Surface::Surface(MultispectralMesh scene)
+Surface::Surface(mesh::MultispectralMesh scene)
     : mesh(std::move(scene)), area(mesh.vertex_count()), neighbours(mesh.vertex_count()), facts(facts_of(mesh)) {
   const auto positions = mesh.positions();
-  for (const Triangle& triangle : mesh.triangles()) {
+  for (const base::Triangle& triangle : mesh.triangles()) {
     const double part = triangle_area(positions[triangle[0]], positions[triangle[1]], positions[triangle[2]]) / 3;
     for (unsigned corner = 0; corner < 3; ++corner) {
       area[triangle[corner]] += part;
@@ -81,7 +81,7 @@ Thing thing_from(const Surface& surface, std::string name, std::vector<std::uint
   // The vertices of the thing by cells as large as the ring is wide, so that a vertex looks into its own and the next ones.
   using Cell = std::array<std::int64_t, 3>;
   const auto positions = surface.mesh.positions();
-  const auto cell_of = [&](Vec3f p) {
+  const auto cell_of = [&](base::Vec3f p) {
     return Cell{static_cast<std::int64_t>(std::floor(double{p.x} / reach)),
                 static_cast<std::int64_t>(std::floor(double{p.y} / reach)),
                 static_cast<std::int64_t>(std::floor(double{p.z} / reach))};
@@ -158,14 +158,16 @@ std::vector<Thing> hottest_things(const Surface& surface, std::size_t count) {
   return things;
 }
 
-std::vector<Finding> findings(const Surface& surface, const FusionPlan& plan, const std::vector<Thing>& things) {
+std::vector<Finding> findings(const Surface& surface, const fusion::FusionPlan& plan,
+                              const std::vector<Thing>& things) {
   const std::size_t count = surface.mesh.vertex_count();
-  std::vector<Rgb8> fused(count);
+  std::vector<base::Rgb8> fused(count);
   plan.fuse(surface.mesh.temperature_celsius(), surface.mesh.visible(), fused);
   std::vector<std::uint8_t> has_changed(count);
   for (std::size_t v = 0; v < count; ++v) {
-    const Rgb8 seen = surface.mesh.visible()[v];
-    has_changed[v] = fused[v] != seen && ciede2000(lab_of(fused[v]), lab_of(seen)) >= kChanged ? 1 : 0;
+    const base::Rgb8 seen = surface.mesh.visible()[v];
+    has_changed[v] =
+        fused[v] != seen && fusion::ciede2000(fusion::lab_of(fused[v]), fusion::lab_of(seen)) >= kChanged ? 1 : 0;
   }
   // Share of the surface of some vertices that has changed.
   const auto changed = [&](auto is_in) {
@@ -178,11 +180,11 @@ std::vector<Finding> findings(const Surface& surface, const FusionPlan& plan, co
     return all > 0 ? marked / all : 0;
   };
   const auto mean_colour = [&](const std::vector<std::uint8_t>& is_in) {
-    Lab sum{};
+    fusion::Lab sum{};
     double all = 0;
     for (std::size_t v = 0; v < count; ++v) {
       if (is_in[v] == 0) continue;
-      const Lab colour = lab_of(fused[v]);
+      const fusion::Lab colour = fusion::lab_of(fused[v]);
       for (std::size_t c = 0; c < 3; ++c) sum[c] += surface.area[v] * colour[c];
       all += surface.area[v];
     }
@@ -196,17 +198,18 @@ std::vector<Finding> findings(const Surface& surface, const FusionPlan& plan, co
   for (const Thing& thing : things) {
     const bool has_ring = std::ranges::find(thing.is_ring, 1) != thing.is_ring.end();
     result.push_back({changed([&](std::size_t v) { return thing.is_part[v] != 0; }), rest,
-                      has_ring ? ciede2000(mean_colour(thing.is_part), mean_colour(thing.is_ring)) : 0});
+                      has_ring ? fusion::ciede2000(mean_colour(thing.is_part), mean_colour(thing.is_ring)) : 0});
   }
   return result;
 }
 
-FusionPlan first_view_plan(const Surface& surface, const std::string& method, const ParameterValues& params) {
-  FusionChange change;
+fusion::FusionPlan first_view_plan(const Surface& surface, const std::string& method,
+                                   const fusion::ParameterValues& params) {
+  fusion::FusionChange change;
   change.method = method;
   change.params = params;
-  const auto settings = with_change(first_view_settings(surface.facts.summary), change).value();
-  return FusionPlan::prepare(settings, surface.facts).value();
+  const auto settings = fusion::with_change(fusion::first_view_settings(surface.facts.summary), change).value();
+  return fusion::FusionPlan::prepare(settings, surface.facts).value();
 }
 
 }  // namespace spectra::fusion::test

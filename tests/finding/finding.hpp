@@ -12,14 +12,14 @@ namespace spectra::fusion::test {
 
 /// A scene with the surface that each vertex stands for, and the facts that a plan needs.
 struct Surface {
-  explicit Surface(MultispectralMesh scene);
+  explicit Surface(mesh::MultispectralMesh scene);
   Surface(const Surface&) = delete;
   Surface& operator=(const Surface&) = delete;
 
-  MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   std::vector<double> area;                            ///< Per vertex: a third of its triangles.
   std::vector<std::vector<std::uint32_t>> neighbours;  ///< Joined by an edge; some stand twice.
-  SceneTemperature facts;
+  fusion::SceneTemperature facts;
 };
 
 /// Something in a scene that should be found: its vertices, and the ones around it beyond the blur of the sensor.
@@ -46,7 +46,7 @@ struct Finding {
 };
 
 /// `things` are all that should be found in the scene; one finding each.
-std::vector<Finding> findings(const Surface& surface, const FusionPlan& plan, const std::vector<Thing>& things);
+std::vector<Finding> findings(const Surface& surface, const fusion::FusionPlan& plan, const std::vector<Thing>& things);
 
 /// What every method that marks should reach, and the plain views and those that recolour everything need not.
 inline constexpr double kLeastOfTheThing = 0.60;
@@ -54,6 +54,7 @@ inline constexpr double kMostOfTheRest = 0.15;
 inline constexpr double kLeastDifference = 10;
 
 /// The plan of a method at its defaults in the settings that a person sees first.
-FusionPlan first_view_plan(const Surface& surface, const std::string& method, const ParameterValues& params = {});
+fusion::FusionPlan first_view_plan(const Surface& surface, const std::string& method,
+                                   const fusion::ParameterValues& params = {});
 
 }  // namespace spectra::fusion::test

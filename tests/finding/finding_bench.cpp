@@ -30,7 +30,7 @@ struct Trial {
 struct Arguments {
   std::uint64_t seeds = 5;
   std::string method;  ///< Of --set and --sweep.
-  ParameterValues params;
+  fusion::ParameterValues params;
   std::string sweep;
   double from = 0, to = 0, step = 1;
   std::vector<std::pair<std::filesystem::path, std::size_t>> scenes;
@@ -39,13 +39,13 @@ struct Arguments {
 std::vector<Trial> trials(const Arguments& arguments) {
   std::vector<Trial> list;
   for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
-    LabelledDemoScene scene = labelled_demo_scene({.vertex_count = 40'000, .seed = seed});
+    demo::LabelledDemoScene scene = demo::labelled_demo_scene({.vertex_count = 40'000, .seed = seed});
     auto surface = std::make_unique<test::Surface>(std::move(scene.mesh));
     std::vector<test::Thing> things = {test::thing_from(*surface, "person", std::move(scene.is_skin))};
     list.push_back({"demo " + std::to_string(seed), std::move(surface), std::move(things)});
   }
   for (const auto& [path, count] : arguments.scenes) {
-    auto loaded = read_ply(path);
+    auto loaded = files::read_ply(path);
     if (!loaded) {
       std::fprintf(stderr, "%s: %s\n", path.c_str(), loaded.error().message.c_str());
       std::exit(1);
@@ -58,14 +58,14 @@ std::vector<Trial> trials(const Arguments& arguments) {
 }
 
 void print_facts(const Trial& trial) {
-  const TemperatureSummary& facts = trial.surface->facts.summary;
+  const fusion::TemperatureSummary& facts = trial.surface->facts.summary;
   std::printf("%-16s %8llu vertices, %.1f to %.1f degC, mean %.2f, sigma %.2f\n", trial.name.c_str(),
               static_cast<unsigned long long>(trial.surface->mesh.vertex_count()), double{facts.minimum},
               double{facts.maximum}, facts.mean, facts.sigma);
   for (const test::Thing& thing : trial.things) {
     double part = 0, all = 0, sum = 0;
     float hottest = facts.minimum, coldest = facts.maximum;
-    Vec3f at{};
+    base::Vec3f at{};
     for (std::size_t v = 0; v < thing.is_part.size(); ++v) {
       const float t = trial.surface->mesh.temperature_celsius()[v];
       const double area = trial.surface->area[v];
@@ -84,10 +84,11 @@ void print_facts(const Trial& trial) {
 }
 
 /// One line a scene and thing; whether all reach what is asked for.
-bool print_findings(const std::vector<Trial>& list, const Method& method, const ParameterValues& params) {
+bool print_findings(const std::vector<Trial>& list, const fusion::Method& method,
+                    const fusion::ParameterValues& params) {
   bool is_reached = true;
   for (const Trial& trial : list) {
-    const FusionPlan plan = test::first_view_plan(*trial.surface, method.id, params);
+    const fusion::FusionPlan plan = test::first_view_plan(*trial.surface, method.id, params);
     const auto found = test::findings(*trial.surface, plan, trial.things);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const bool is_found = method.highlights ? found[i].thing_changed >= test::kLeastOfTheThing &&
@@ -113,9 +114,9 @@ Arguments parsed(int argc, char** argv) {
       for (; i + 1 < argc && std::string(argv[i + 1]).find('=') != std::string::npos; ++i) {
         const std::string pair = argv[i + 1];
         const std::string name = pair.substr(0, pair.find('='));
-        for (const Parameter& parameter : find_method(arguments.method)->parameters) {
+        for (const fusion::Parameter& parameter : fusion::find_method(arguments.method)->parameters) {
           if (parameter.name == name) {
-            arguments.params[name] = parse_parameter(parameter, pair.substr(name.size() + 1)).value();
+            arguments.params[name] = fusion::parse_parameter(parameter, pair.substr(name.size() + 1)).value();
           }
         }
       }
@@ -145,14 +146,14 @@ int run(const Arguments& arguments) {
   if (!arguments.sweep.empty()) {
     for (double value = arguments.from; value <= arguments.to + 1e-9; value += arguments.step) {
       std::printf("-- %s = %g\n", arguments.sweep.c_str(), value);
-      ParameterValues params = arguments.params;
+      fusion::ParameterValues params = arguments.params;
       params[arguments.sweep] = value;
-      print_findings(list, *find_method(arguments.method), params);
+      print_findings(list, *fusion::find_method(arguments.method), params);
     }
     return 0;
   }
   bool is_reached = true;
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     if (!method->needs_temperature) continue;
     if (!arguments.method.empty() && arguments.method != method->id) continue;
     is_reached = print_findings(list, *method, arguments.params) && is_reached;

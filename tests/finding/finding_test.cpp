@@ -15,12 +15,12 @@ class FindsThePerson : public testing::TestWithParam<std::uint64_t> {};
 INSTANTIATE_TEST_SUITE_P(Demo, FindsThePerson, testing::Values(1U, 2U, 3U, 4U, 5U));
 
 TEST_P(FindsThePerson, InEveryMethodAtItsDefaults) {
-  LabelledDemoScene scene = labelled_demo_scene({.vertex_count = 40'000, .seed = GetParam()});
+  demo::LabelledDemoScene scene = demo::labelled_demo_scene({.vertex_count = 40'000, .seed = GetParam()});
   const test::Surface surface(std::move(scene.mesh));
   ASSERT_EQ(scene.is_skin.size(), surface.mesh.vertex_count());
   const std::vector<test::Thing> things = {test::thing_from(surface, "person", std::move(scene.is_skin))};
   ASSERT_GT(std::ranges::count(things[0].is_part, 1), 200);
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     if (!method->needs_temperature) continue;
     // Of a scene that has no past it shows nothing.
     if (method->compares_with_baseline) continue;

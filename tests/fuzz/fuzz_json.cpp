@@ -14,6 +14,7 @@
 
 namespace {
 
+using namespace spectra;
 using namespace spectra::protocol;
 
 void check(bool holds) {
@@ -25,13 +26,13 @@ template <class Message>
 void pass(const nlohmann::json& value) {
   const auto message = from_json<Message>(value);
   if (!message) {
-    check(message.error().code == RpcErrorCode::InvalidParams && !message.error().message.empty());
+    check(message.error().code == protocol::RpcErrorCode::InvalidParams && !message.error().message.empty());
     return;
   }
-  const nlohmann::json written = to_json(message.value());
+  const nlohmann::json written = protocol::to_json(message.value());
   const auto again = from_json<Message>(written);
-  check(again.has_value() && to_json(again.value()) == written);
-  check(nlohmann::json::accept(notification_text("m", written)));
+  check(again.has_value() && protocol::to_json(again.value()) == written);
+  check(nlohmann::json::accept(protocol::notification_text("m", written)));
 }
 
 }  // namespace
@@ -39,26 +40,26 @@ void pass(const nlohmann::json& value) {
 /// Any text as a message of a client.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const auto message = incoming_message(text);
-  if (const auto* refused = std::get_if<RefusedMessage>(&message)) {
-    check(nlohmann::json::accept(error_text(refused->id, refused->error)));
+  const auto message = protocol::incoming_message(text);
+  if (const auto* refused = std::get_if<protocol::RefusedMessage>(&message)) {
+    check(nlohmann::json::accept(protocol::error_text(refused->id, refused->error)));
     return 0;
   }
-  const auto& incoming = std::get<IncomingMessage>(message);
+  const auto& incoming = std::get<protocol::IncomingMessage>(message);
   check(nlohmann::json::parse(text, nullptr, false).at("method") == incoming.method);
-  if (incoming.id) check(nlohmann::json::accept(result_text(*incoming.id, incoming.params)));
-  pass<FusionChange>(incoming.params);
-  pass<FusionReply>(incoming.params);
-  pass<QualityChange>(incoming.params);
-  pass<QualityState>(incoming.params);
-  pass<SubscribeRequest>(incoming.params);
-  pass<CameraSet>(incoming.params);
-  pass<StreamAck>(incoming.params);
-  pass<StreamStats>(incoming.params);
-  pass<HistogramRequest>(incoming.params);
-  pass<HistogramReply>(incoming.params);
-  pass<ProbeRequest>(incoming.params);
-  pass<ProbeReply>(incoming.params);
-  pass<Hello>(incoming.params);
+  if (incoming.id) check(nlohmann::json::accept(protocol::result_text(*incoming.id, incoming.params)));
+  pass<protocol::FusionChange>(incoming.params);
+  pass<protocol::FusionReply>(incoming.params);
+  pass<protocol::QualityChange>(incoming.params);
+  pass<protocol::QualityState>(incoming.params);
+  pass<protocol::SubscribeRequest>(incoming.params);
+  pass<protocol::CameraSet>(incoming.params);
+  pass<protocol::StreamAck>(incoming.params);
+  pass<protocol::StreamStats>(incoming.params);
+  pass<protocol::HistogramRequest>(incoming.params);
+  pass<protocol::HistogramReply>(incoming.params);
+  pass<protocol::ProbeRequest>(incoming.params);
+  pass<protocol::ProbeReply>(incoming.params);
+  pass<protocol::Hello>(incoming.params);
   return 0;
 }

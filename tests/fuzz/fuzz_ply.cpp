@@ -16,7 +16,7 @@
 
 namespace {
 
-using namespace spectra::fusion;
+using namespace spectra;
 
 void check(bool holds) {
   if (!holds) std::abort();
@@ -36,24 +36,24 @@ class MemoryFile {
   int descriptor_;
 };
 
-std::string written(const MultispectralMesh& mesh) {
+std::string written(const mesh::MultispectralMesh& mesh) {
   std::ostringstream out;
-  check(write_ply(out, mesh, mesh.visible()).has_value());
+  check(files::write_ply(out, mesh, mesh.visible()).has_value());
   return out.str();
 }
 
-void check_scene(const LoadedScene& scene) {
-  const MultispectralMesh& mesh = scene.mesh;
+void check_scene(const files::LoadedScene& scene) {
+  const mesh::MultispectralMesh& mesh = scene.mesh;
   check(mesh.vertex_count() > 0);
   check(mesh.visible().size() == mesh.vertex_count());
   check(mesh.temperature_celsius().size() == mesh.vertex_count());
-  for (const Vec3f& p : mesh.positions()) check(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+  for (const base::Vec3f& p : mesh.positions()) check(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
   for (const float celsius : mesh.temperature_celsius())
     check(std::isnan(celsius) || celsius > -273.15F || celsius < -3e38F);
   for (const auto& [a, b, c] : mesh.triangles()) {
     check(std::max({a, b, c}) < mesh.vertex_count() && a != b && b != c && c != a);
   }
-  for (const Note& note : scene.notes) check(!note.id.empty() && note.count > 0 && !note.message.empty());
+  for (const files::Note& note : scene.notes) check(!note.id.empty() && note.count > 0 && !note.message.empty());
 }
 
 }  // namespace
@@ -62,19 +62,19 @@ void check_scene(const LoadedScene& scene) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const MemoryFile file;
   file.fill({reinterpret_cast<const char*>(data), size});
-  const auto scene = read_ply(file.path());
+  const auto scene = files::read_ply(file.path());
   if (!scene) {
     check(!scene.error().message.empty() && !scene.error().field.empty());
     return 0;
   }
   check_scene(scene.value());
-  const MultispectralMesh& mesh = scene.value().mesh;
-  const TopologyFacts facts = topology_facts(mesh);
+  const mesh::MultispectralMesh& mesh = scene.value().mesh;
+  const mesh::TopologyFacts facts = mesh::topology_facts(mesh);
   check(facts.boundary_edge_count <= 3 * mesh.triangle_count() && facts.component_count <= mesh.triangle_count());
 
   const std::string bytes = written(mesh);
   file.fill(bytes);
-  const auto again = read_ply(file.path());
+  const auto again = files::read_ply(file.path());
   check(again.has_value());
   check_scene(again.value());
   check(again.value().mesh.triangles() == mesh.triangles());

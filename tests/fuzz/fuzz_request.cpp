@@ -12,7 +12,7 @@
 
 namespace {
 
-using namespace spectra::server;
+using namespace spectra;
 
 constexpr std::string_view kToken = "spectra_operator_AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA";
 
@@ -25,18 +25,18 @@ bool has(std::string_view text, std::string_view part) {
 }
 
 void check_target(std::string_view text) {
-  const auto target = parsed_target(text);
+  const auto target = net::parsed_target(text);
   if (!target) return;
   check(target->path.starts_with('/') && !has(target->path, "//") && !has(target->path, "/../") &&
         !has(target->path, "/./") && !target->path.ends_with("/..") && !has(target->path, "\\"));
-  const auto again = parsed_target('/' + target_text(target->path.substr(1), target->query));
+  const auto again = net::parsed_target('/' + net::target_text(target->path.substr(1), target->query));
   check(again && again->path == target->path && again->query == target->query);
 }
 
 void check_hosts(std::string_view host, std::string_view origin) {
-  HostList hosts;
+  net::HostList hosts;
   hosts.add("robot");
-  const auto name = host_name(host);
+  const auto name = net::host_name(host);
   check(!hosts.allows_host(host, "10.0.0.1") || (name && !name->empty()));
   // Nothing is let in but what is on the list, whatever stands around it.
   constexpr std::array kNames{std::string_view("robot"), std::string_view("localhost"), std::string_view("127.0.0.1"),
@@ -48,7 +48,7 @@ void check_hosts(std::string_view host, std::string_view origin) {
     return false;
   };
   check(hosts.allows_host(host, "10.0.0.1") == is_listed(name));
-  check(hosts.allows_origin(origin, "10.0.0.1") == is_listed(origin_host_name(origin)));
+  check(hosts.allows_origin(origin, "10.0.0.1") == is_listed(net::origin_host_name(origin)));
 }
 
 }  // namespace
@@ -66,26 +66,28 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check_target(target);
   check_hosts(host, origin);
 
-  AccessControl access({{{"bridge", AccessRole::Operator, digest_of(kToken)}}, std::string(43, 's')}, "spectra_8080",
-                       [] { return std::chrono::sys_seconds(std::chrono::seconds(1'800'000'000)); });
+  access::AccessControl access(
+      {{{"bridge", access::AccessRole::Operator, access::digest_of(kToken)}}, std::string(43, 's')}, "spectra_8080",
+      [] { return std::chrono::sys_seconds(std::chrono::seconds(1'800'000'000)); });
   static const std::string kCookie = [] {
-    AccessControl maker({{{"bridge", AccessRole::Operator, digest_of(kToken)}}, std::string(43, 's')}, "spectra_8080",
-                        [] { return std::chrono::sys_seconds(std::chrono::seconds(1'800'000'000)); });
+    access::AccessControl maker(
+        {{{"bridge", access::AccessRole::Operator, access::digest_of(kToken)}}, std::string(43, 's')}, "spectra_8080",
+        [] { return std::chrono::sys_seconds(std::chrono::seconds(1'800'000'000)); });
     const std::string set = maker.login(kToken, "a", false, 0).set_cookie;
     return set.substr(0, set.find(';'));
   }();
   const auto who = access.identify(authorization, cookie, "10.0.0.9", false, 0);
   check(!who.identity || has(authorization, kToken) || has(cookie, kCookie));
-  SessionRequest request{.path = "/api/v1/session", .body = body, .address = "10.0.0.9"};
-  request.method = method == "POST"     ? SessionRequest::Method::Post
-                   : method == "DELETE" ? SessionRequest::Method::Delete
-                                        : SessionRequest::Method::Get;
-  const auto reply = session_reply(access, who.identity, request, 1);
+  net::SessionRequest request{.path = "/api/v1/session", .body = body, .address = "10.0.0.9"};
+  request.method = method == "POST"     ? net::SessionRequest::Method::Post
+                   : method == "DELETE" ? net::SessionRequest::Method::Delete
+                                        : net::SessionRequest::Method::Get;
+  const auto reply = net::session_reply(access, who.identity, request, 1);
   check(reply.status >= 200 && reply.status < 500);
   for (const auto& [name, value] : reply.headers) {
     check(!has(value, "\n") && !has(value, "\r") && !has(value, kToken));
     // Only who shows the token is given a cookie.
-    check(name != "Set-Cookie" || request.method != SessionRequest::Method::Post || reply.status >= 400 ||
+    check(name != "Set-Cookie" || request.method != net::SessionRequest::Method::Post || reply.status >= 400 ||
           has(body, kToken));
   }
   return 0;

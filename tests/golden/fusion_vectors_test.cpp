@@ -13,8 +13,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-ParameterValue parameter_value(const Json& json) {
-  if (json.is_null()) return Automatic{};
+fusion::ParameterValue parameter_value(const Json& json) {
+  if (json.is_null()) return fusion::Automatic{};
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_integer()) return json.get<std::int64_t>();
   if (json.is_number()) return json.get<double>();
@@ -22,9 +22,9 @@ ParameterValue parameter_value(const Json& json) {
 }
 
 struct Vectors {
-  std::vector<Rgb8> visible;
+  std::vector<base::Rgb8> visible;
   std::vector<float> temperature;
-  PaletteTable palette{};
+  fusion::PaletteTable palette{};
   Json cases;
 };
 
@@ -47,14 +47,14 @@ Vectors load() {
   return vectors;
 }
 
-SceneTemperature scene_of(const std::vector<float>& temperature) {
-  TemperatureAccumulator accumulator;
+fusion::SceneTemperature scene_of(const std::vector<float>& temperature) {
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(temperature);
-  SceneTemperature scene;
+  fusion::SceneTemperature scene;
   scene.summary = accumulator.summary();
   scene.histogram = [&temperature, summary = scene.summary](std::uint32_t bins) {
-    Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(temperature, histogram);
+    fusion::Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(temperature, histogram);
     return histogram;
   };
   return scene;
@@ -64,23 +64,23 @@ TEST(FusionVectors, EveryChannelEqualsTheGoldenAnswer) {
   const Vectors vectors = load();
   ASSERT_EQ(vectors.visible.size(), 48U);
   ASSERT_EQ(vectors.cases.size(), 31U);
-  const SceneTemperature scene = scene_of(vectors.temperature);
+  const fusion::SceneTemperature scene = scene_of(vectors.temperature);
 
   for (std::size_t number = 0; number < vectors.cases.size(); ++number) {
     const Json& one = vectors.cases[number];
     SCOPED_TRACE("case " + std::to_string(number) + ": " + one["method"].get<std::string>() + " " +
                  one["params"].dump());
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = one["method"].get<std::string>();
     for (const auto& [name, value] : one["params"].items()) change.params[name] = parameter_value(value);
     if (!one["range"].is_null()) {
-      change.range = RangeSetting::manual(one["range"][0].get<double>(), one["range"][1].get<double>());
+      change.range = fusion::RangeSetting::manual(one["range"][0].get<double>(), one["range"][1].get<double>());
     }
-    const auto settings = with_change(default_settings(), change);
+    const auto settings = fusion::with_change(fusion::default_settings(), change);
     ASSERT_TRUE(settings.has_value()) << settings.error().message;
-    const auto plan = FusionPlan::prepare(settings.value(), scene, vectors.palette);
+    const auto plan = fusion::FusionPlan::prepare(settings.value(), scene, vectors.palette);
     ASSERT_TRUE(plan.has_value()) << plan.error().message;
-    std::vector<Rgb8> fused(vectors.visible.size());
+    std::vector<base::Rgb8> fused(vectors.visible.size());
     plan.value().fuse(vectors.temperature, vectors.visible, fused);
 
     std::set<std::pair<std::size_t, std::size_t>> near_tie;

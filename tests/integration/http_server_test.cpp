@@ -16,16 +16,16 @@
 namespace spectra::tests {
 namespace {
 
-using server::HttpReply;
-using server::HttpRequest;
+using net::HttpReply;
+using net::HttpRequest;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 void answer_path(const HttpRequest& request, const std::function<void(HttpReply)>& reply) {
-  reply(server::text_reply(200, request.target.path));
+  reply(net::text_reply(200, request.target.path));
 }
 
-std::shared_ptr<server::ViewerClient> no_viewer(const std::shared_ptr<server::ViewerPeer>&) {
+std::shared_ptr<net::ViewerClient> no_viewer(const std::shared_ptr<net::ViewerPeer>&) {
   throw std::runtime_error("no viewer is expected here");
 }
 
@@ -268,15 +268,15 @@ TEST_F(HttpServerTest, AsksForTheBodyOfAGetThatWaitsForIt) {
 }
 
 TEST_F(HttpServerTest, CutsWhoReadsALongAnswerTooSlowly) {
-  server::NetOptions options = quick_options();
+  net::NetOptions options = quick_options();
   options.limits.write_timeout = std::chrono::seconds(20);
   options.limits.download_patience = std::chrono::milliseconds(300);
   options.limits.download_bytes_per_s = 1e8;
   const std::size_t size = std::size_t{64} << 20U;
   const TestServer server(
       std::move(options),
-      [body = std::make_shared<const std::string>(size, 'x')](const server::HttpRequest&,
-                                                              const std::function<void(server::HttpReply)>& reply) {
+      [body = std::make_shared<const std::string>(size, 'x')](const net::HttpRequest&,
+                                                              const std::function<void(net::HttpReply)>& reply) {
         reply({200, "text/plain", body, {}});
       },
       no_viewer);
@@ -292,12 +292,12 @@ TEST_F(HttpServerTest, CutsWhoReadsALongAnswerTooSlowly) {
 }
 
 TEST_F(HttpServerTest, GivesOneAddressSoManyConnectionsAndSaysSo) {
-  server::NetOptions options = quick_options();
+  net::NetOptions options = quick_options();
   options.limits.header_timeout = std::chrono::seconds(20);
   options.limits.connections_per_address = 3;
   const TestServer server(
       std::move(options),
-      [](const server::HttpRequest&, const std::function<void(server::HttpReply)>& reply) {
+      [](const net::HttpRequest&, const std::function<void(net::HttpReply)>& reply) {
         reply({200, "text/plain", std::make_shared<const std::string>("ok"), {}});
       },
       no_viewer);
@@ -349,7 +349,7 @@ TEST_F(HttpServerTest, PicksAFreePortAndSaysWhenOneIsTaken) {
   auto options = quick_options();
   options.port = server_->port();
   try {
-    server::HttpServer second(options, answer_path, no_viewer, {});
+    net::HttpServer second(options, answer_path, no_viewer, {});
     FAIL() << "two servers on one port";
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("in use"), std::string::npos);

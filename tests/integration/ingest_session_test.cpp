@@ -29,8 +29,8 @@ std::string message(std::uint64_t sequence, std::string_view target, std::string
 /// Holds what it is given until it is told to answer.
 class HeldBlocks {
  public:
-  server::BlockHandler handler() {
-    return [this](server::BlockChange change, std::function<void(server::BlockOutcome)> done) {
+  net::BlockHandler handler() {
+    return [this](net::BlockChange change, std::function<void(net::BlockOutcome)> done) {
       const std::lock_guard lock(mutex_);
       held_bytes_ += change.ply ? change.ply->size() : 0;
       most_held_bytes_ = std::max(most_held_bytes_, held_bytes_);
@@ -52,7 +52,7 @@ class HeldBlocks {
     return most_held_bytes_;
   }
 
-  void answer_first(server::BlockOutcome outcome = server::BlockTaken{}) {
+  void answer_first(net::BlockOutcome outcome = net::BlockTaken{}) {
     Held held;
     {
       const std::lock_guard lock(mutex_);
@@ -65,8 +65,8 @@ class HeldBlocks {
 
  private:
   struct Held {
-    server::BlockChange change;
-    std::function<void(server::BlockOutcome)> done;
+    net::BlockChange change;
+    std::function<void(net::BlockOutcome)> done;
   };
   std::mutex mutex_;
   std::deque<Held> held_;
@@ -81,8 +81,8 @@ class IngestSessionTest : public testing::Test {
     while (blocks_.count() > 0) blocks_.answer_first();
   }
 
-  static server::NetOptions options() {
-    server::NetOptions options = quick_options();
+  static net::NetOptions options() {
+    net::NetOptions options = quick_options();
     options.limits.block_size_bytes = 100'000;
     options.limits.ingest_credit_blocks = 4;
     options.limits.ingest_credit_bytes = 50'000;
@@ -90,14 +90,14 @@ class IngestSessionTest : public testing::Test {
     return options;
   }
 
-  void start(server::NetOptions options) {
+  void start(net::NetOptions options) {
     server_.reset();
     server_ = std::make_unique<TestServer>(
         std::move(options),
-        [](const server::HttpRequest&, const std::function<void(server::HttpReply)>& reply) {
-          reply(server::text_reply(200, "ok"));
+        [](const net::HttpRequest&, const std::function<void(net::HttpReply)>& reply) {
+          reply(net::text_reply(200, "ok"));
         },
-        [](const std::shared_ptr<server::ViewerPeer>&) { return nullptr; }, std::filesystem::path(), blocks_.handler());
+        [](const std::shared_ptr<net::ViewerPeer>&) { return nullptr; }, std::filesystem::path(), blocks_.handler());
   }
 
   RawWebSocket sender() const { return RawWebSocket(server_->port(), "", "spectra.ingest.v1", "/ingest"); }
@@ -154,13 +154,13 @@ TEST_F(IngestSessionTest, HandsOverInOrderAndAnswersAsAnswersCome) {
   peer.send_frame(kBinary, message(9, "a", "two"));
   ASSERT_TRUE(eventually([this] { return blocks_.count() == 3; }));
   EXPECT_EQ(blocks_.names(), (std::vector<std::string>{"put a", "remove a", "put a"}));
-  blocks_.answer_first(server::BlockTaken{41, {{"note", 2, "two things"}}});
+  blocks_.answer_first(net::BlockTaken{41, {{"note", 2, "two things"}}});
   const json first = next(peer, "ingest.acknowledged");
   EXPECT_EQ(first["sequence"], 1);
   EXPECT_EQ(first["revision"], 41);
   EXPECT_EQ(first["notes"], json::array({{{"id", "note"}, {"count", 2}, {"message", "two things"}}}));
   EXPECT_EQ(first["credit"], json({{"blocks", 5}, {"bytes", 50'000 + 20 + 9 + 3}}));
-  blocks_.answer_first(server::BlockRefusal{404, "not_found", "id", "there is no block", ""});
+  blocks_.answer_first(net::BlockRefusal{404, "not_found", "id", "there is no block", ""});
   const json second = next(peer, "ingest.refused");
   EXPECT_EQ(second["sequence"], 2);
   EXPECT_EQ(second["code"], "not_found");
@@ -304,7 +304,7 @@ TEST_F(IngestSessionTest, AnswersWhatIsUnderWayBeforeTheServerStops) {
   std::thread stopping([this] { server_->stop(); });
   std::this_thread::sleep_for(milliseconds(50));
   peer.send_frame(kBinary, message(2, "b", "x"));
-  blocks_.answer_first(server::BlockTaken{7, {}});
+  blocks_.answer_first(net::BlockTaken{7, {}});
   EXPECT_EQ(next(peer, "ingest.acknowledged")["revision"], 7);
   EXPECT_EQ(peer.receive_close_code(), 1001U);
   stopping.join();

@@ -13,8 +13,8 @@
 namespace spectra::tests {
 
 /// Options for a server of a test: a free port, short times.
-inline server::NetOptions quick_options() {
-  server::NetOptions options;
+inline net::NetOptions quick_options() {
+  net::NetOptions options;
   options.port = 0;
   options.limits.header_timeout = std::chrono::milliseconds(300);
   options.limits.write_timeout = std::chrono::milliseconds(300);
@@ -27,8 +27,8 @@ inline server::NetOptions quick_options() {
 /// Runs a server in a thread of its own and stops it in the end.
 class TestServer {
  public:
-  TestServer(server::NetOptions options, server::HttpHandler http, server::ViewerClientFactory viewers,
-             std::filesystem::path web_root = {}, server::BlockHandler blocks = {})
+  TestServer(net::NetOptions options, net::HttpHandler http, net::ViewerClientFactory viewers,
+             std::filesystem::path web_root = {}, net::BlockHandler blocks = {})
       : server_(std::move(options), std::move(http), std::move(viewers), std::move(web_root), std::move(blocks)),
         thread_([this] { server_.run(); }) {}
   ~TestServer() { stop(); }
@@ -40,10 +40,10 @@ class TestServer {
   }
 
   std::uint16_t port() const { return server_.port(); }
-  const server::NetMetrics& metrics() const { return server_.metrics(); }
+  const net::NetMetrics& metrics() const { return server_.metrics(); }
 
  private:
-  server::HttpServer server_;
+  net::HttpServer server_;
   std::thread thread_;
 };
 

@@ -25,8 +25,8 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 
 /// A wavy sheet of `side` x `side` vertices, warmer to the right; every 50th vertex has no temperature.
-fusion::MultispectralMesh sheet(std::uint32_t side, bool with_temperature = true) {
-  fusion::MultispectralMesh mesh;
+mesh::MultispectralMesh sheet(std::uint32_t side, bool with_temperature = true) {
+  mesh::MultispectralMesh mesh;
   mesh.name = "sheet";
   mesh.has_visible = true;
   mesh.has_temperature = with_temperature;
@@ -109,7 +109,7 @@ class Viewer {
   }
 
   /// Fused colours per tile, as decoded from the newest colour frame of each.
-  const std::map<protocol::TileId, std::vector<protocol::ColourBytes>>& colours() const { return colours_; }
+  const std::map<protocol::TileId, std::vector<protocol::codec::ColourBytes>>& colours() const { return colours_; }
   std::size_t geometry_frames() const { return geometry_frames_; }
   std::uint32_t newest_generation() const { return newest_generation_; }
 
@@ -118,7 +118,7 @@ class Viewer {
     const auto frame = protocol::decoded_frame(std::as_bytes(std::span(bytes))).value();
     if (frame.header.kind == protocol::FrameKind::Geometry) ++geometry_frames_;
     if (frame.header.kind == protocol::FrameKind::Colours) {
-      colours_[frame.header.tile] = protocol::decoded_colours(frame.payload).value();
+      colours_[frame.header.tile] = protocol::codec::decoded_colours(frame.payload).value();
       EXPECT_GE(frame.header.generation, newest_generation_);
       newest_generation_ = frame.header.generation;
     }
@@ -131,7 +131,7 @@ class Viewer {
   std::uint32_t last_sequence_ = 0;
   std::size_t geometry_frames_ = 0;
   std::uint32_t newest_generation_ = 0;
-  std::map<protocol::TileId, std::vector<protocol::ColourBytes>> colours_;
+  std::map<protocol::TileId, std::vector<protocol::codec::ColourBytes>> colours_;
   std::map<std::string, json> notifications_;
 };
 
@@ -139,32 +139,32 @@ class ViewerSessionTest : public testing::Test {
  protected:
   explicit ViewerSessionTest()
       : served_(2, 64U << 20U), map_(served_.scenes, served_.pool, nullptr), api_(served_, map_) {
-    served_.mark_baseline = [this](server::BaselineDone done) { map_.mark_baseline(std::move(done)); };
+    served_.mark_baseline = [this](sources::BaselineDone done) { map_.mark_baseline(std::move(done)); };
     start(quick_options());
   }
 
-  void start(server::NetOptions options) {
+  void start(net::NetOptions options) {
     options.limits.write_timeout = std::chrono::seconds(5);
     const auto limits = options.limits;
     server_ = std::make_unique<TestServer>(
         std::move(options), [this](const auto& request, const auto& reply) { api_.handle(request, reply); },
-        [this, limits](const std::shared_ptr<server::ViewerPeer>& peer) {
-          return std::make_shared<server::ViewerSession>(peer, served_, limits);
+        [this, limits](const std::shared_ptr<net::ViewerPeer>& peer) {
+          return std::make_shared<session::ViewerSession>(peer, served_, limits);
         });
     api_.set_metrics(server_->metrics());
   }
   ~ViewerSessionTest() override { server_->stop(); }
 
-  void serve(fusion::MultispectralMesh mesh) { served_.scenes.replace(std::move(mesh), served_.pool); }
+  void serve(mesh::MultispectralMesh mesh) { served_.scenes.replace(std::move(mesh), served_.pool); }
   std::string get(const std::string& target) const {
     return http_exchange(server_->port(),
                          "GET " + target + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
   }
 
   std::unique_ptr<TestServer> server_;  // outlives the pool, whose jobs answer through it
-  server::ServedScene served_;
-  server::MapKeeper map_;
-  server::HttpApi api_;
+  session::ServedScene served_;
+  sources::MapKeeper map_;
+  api::HttpApi api_;
 };
 
 TEST_F(ViewerSessionTest, TakesBlocksWhenTheMapIsOpen) {
@@ -186,7 +186,7 @@ TEST_F(ViewerSessionTest, TakesBlocksWhenTheMapIsOpen) {
 }
 
 TEST_F(ViewerSessionTest, ABurstOfLargeAnswersIsRefusedInPartAndCutsNobody) {
-  serve(fusion::demo_scene({.vertex_count = 20'000, .seed = 3}));
+  serve(demo::demo_scene({.vertex_count = 20'000, .seed = 3}));
   RawWebSocket viewer(server_->port());
   viewer.client().set_receive_buffer(4096);
   ASSERT_TRUE(viewer.receive_text());
@@ -214,7 +214,7 @@ TEST_F(ViewerSessionTest, ABurstOfLargeAnswersIsRefusedInPartAndCutsNobody) {
 }
 
 TEST_F(ViewerSessionTest, AFileThatIsBeingSentIsNotMadeAgainAndHindersNobody) {
-  serve(fusion::demo_scene({.vertex_count = 300'000, .seed = 3}));
+  serve(demo::demo_scene({.vertex_count = 300'000, .seed = 3}));
   const auto ask = [](const std::string& query) {
     return "GET /api/v1/scene.ply?method=visible_only" + query + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
   };
@@ -567,9 +567,9 @@ TEST_F(ViewerSessionTest, WarnsWhenAMethodCannotShowWhatItShould) {
 }
 
 TEST_F(ViewerSessionTest, TellsWhatWasNoticedInTheSceneAndTakesItBack) {
-  fusion::LoadedScene loaded{sheet(40), {}};
-  loaded.mesh.up = fusion::UpAxis::MinusY;
-  loaded.core_bounds = fusion::Bounds{{0, 0, 0}, {0.5F, 0.5F, 0}};
+  files::LoadedScene loaded{sheet(40), {}};
+  loaded.mesh.up = base::UpAxis::MinusY;
+  loaded.core_bounds = base::Bounds{{0, 0, 0}, {0.5F, 0.5F, 0}};
   loaded.notes.push_back({"stray_points", 2, "2 are astray"});
   loaded.notes.push_back({"may_be_millimetres", 1, "so large", true});
   served_.scenes.replace(std::move(loaded), served_.pool);

@@ -14,8 +14,8 @@
 namespace spectra::tests {
 namespace {
 
-using server::OutgoingFrame;
 using std::chrono::milliseconds;
+using stream::OutgoingFrame;
 
 /// What the tests see of all sessions together.
 struct Record {
@@ -27,9 +27,9 @@ struct Record {
 };
 
 /// Echoes texts; sends the record's frames as fast as they are taken.
-class EchoViewer final : public server::ViewerClient {
+class EchoViewer final : public net::ViewerClient {
  public:
-  EchoViewer(std::shared_ptr<server::ViewerPeer> peer, Record& record) : peer_(std::move(peer)), record_(record) {}
+  EchoViewer(std::shared_ptr<net::ViewerPeer> peer, Record& record) : peer_(std::move(peer)), record_(record) {}
   void opened() override {
     record_.opened += 1;
     peer_.lock()->send(std::string("hello"));
@@ -48,23 +48,21 @@ class EchoViewer final : public server::ViewerClient {
   void closed() override { record_.closed += 1; }
 
  private:
-  std::weak_ptr<server::ViewerPeer> peer_;
+  std::weak_ptr<net::ViewerPeer> peer_;
   Record& record_;
 };
 
 class WebSocketTest : public testing::Test {
  protected:
-  explicit WebSocketTest(server::NetOptions options = quick_options()) { start(std::move(options)); }
+  explicit WebSocketTest(net::NetOptions options = quick_options()) { start(std::move(options)); }
 
-  void start(server::NetOptions options) {
+  void start(net::NetOptions options) {
     server_ = std::make_unique<TestServer>(
         std::move(options),
-        [](const server::HttpRequest&, const std::function<void(server::HttpReply)>& reply) {
-          reply(server::text_reply(200, "ok"));
+        [](const net::HttpRequest&, const std::function<void(net::HttpReply)>& reply) {
+          reply(net::text_reply(200, "ok"));
         },
-        [this](const std::shared_ptr<server::ViewerPeer>& peer) {
-          return std::make_shared<EchoViewer>(peer, record_);
-        });
+        [this](const std::shared_ptr<net::ViewerPeer>& peer) { return std::make_shared<EchoViewer>(peer, record_); });
   }
 
   std::uint16_t port() const { return server_->port(); }

@@ -34,8 +34,8 @@ using Json = nlohmann::json;
 struct Scene {
   std::string name;
   std::vector<float> temperature;
-  std::vector<Rgb8> visible;
-  TemperatureSummary summary;
+  std::vector<base::Rgb8> visible;
+  fusion::TemperatureSummary summary;
 };
 
 template <class T>
@@ -53,12 +53,12 @@ void write(Json record, const std::vector<std::string>& arrays) {
   for (const std::string& array : arrays) std::fwrite(array.data(), 1, array.size(), stdout);
 }
 
-Json json_of(const ParameterValues& values) {
+Json json_of(const fusion::ParameterValues& values) {
   Json json = Json::object();
   for (const auto& [name, value] : values) {
     json[name] = std::visit(
         [](const auto& one) -> Json {
-          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, Automatic>) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(one)>, fusion::Automatic>) {
             return nullptr;
           } else {
             return one;
@@ -69,26 +69,26 @@ Json json_of(const ParameterValues& values) {
   return json;
 }
 
-Json json_of(const FusionChange& change) {
+Json json_of(const fusion::FusionChange& change) {
   Json json = {{"params", json_of(change.params)}};
   if (change.method) json["method"] = *change.method;
   if (change.palette) json["palette"] = *change.palette;
   if (const auto& range = change.range) {
     switch (range->mode) {
-      case RangeMode::Auto:
+      case fusion::RangeMode::Auto:
         json["range"] = {{"mode", "auto"}};
         break;
-      case RangeMode::Manual:
+      case fusion::RangeMode::Manual:
         json["range"] = {{"mode", "manual"}, {"min", range->minimum_celsius}, {"max", range->maximum_celsius}};
         break;
-      case RangeMode::Percentile:
+      case fusion::RangeMode::Percentile:
         json["range"] = {{"mode", "percentile"}, {"low", range->low_percent}, {"high", range->high_percent}};
         break;
     }
   }
   if (change.missing) {
     char text[8] = "visible";
-    if (const MissingDisplay& colour = *change.missing) {
+    if (const fusion::MissingDisplay& colour = *change.missing) {
       std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned{colour->r}, unsigned{colour->g}, unsigned{colour->b});
     }
     json["missing"] = text;
@@ -96,8 +96,8 @@ Json json_of(const FusionChange& change) {
   return json;
 }
 
-Json json_of(const FusionSettings& settings) {
-  FusionChange change;
+Json json_of(const fusion::FusionSettings& settings) {
+  fusion::FusionChange change;
   change.method = settings.method;
   change.params = settings.params;
   change.palette = settings.palette;
@@ -106,7 +106,7 @@ Json json_of(const FusionSettings& settings) {
   return json_of(change);
 }
 
-Json json_of(const TemperatureSummary& summary) {
+Json json_of(const fusion::TemperatureSummary& summary) {
   return {{"finite_count", summary.finite_count},
           {"missing_count", summary.missing_count},
           {"over_range_count", summary.over_range_count},
@@ -118,46 +118,47 @@ Json json_of(const TemperatureSummary& summary) {
 }
 
 /// The facts of a scene, and in `used` those that a plan asked for.
-SceneTemperature watched(const std::vector<float>& temperature, const std::vector<Rgb8>& visible,
-                         const TemperatureSummary& summary, Json& used) {
+fusion::SceneTemperature watched(const std::vector<float>& temperature, const std::vector<base::Rgb8>& visible,
+                                 const fusion::TemperatureSummary& summary, Json& used) {
   used = {{"summary", json_of(summary)}, {"histograms", Json::object()}, {"hues", nullptr}};
-  SceneTemperature facts;
+  fusion::SceneTemperature facts;
   facts.summary = summary;
   facts.histogram = [&temperature, &used, summary](std::uint32_t bins) {
-    Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(temperature, histogram);
+    fusion::Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(temperature, histogram);
     used["histograms"][std::to_string(bins)] = histogram.counts;
     return histogram;
   };
   facts.hues = [&visible, &used] {
-    Hues hues;
-    add_to_hues(visible, hues);
+    fusion::Hues hues;
+    fusion::add_to_hues(visible, hues);
     used["hues"] = hues.chroma;
     return hues;
   };
   return facts;
 }
 
-std::string bytes_of(const PaletteTable& palette) {
+std::string bytes_of(const fusion::PaletteTable& palette) {
   return {reinterpret_cast<const char*>(palette.data()), sizeof palette};
 }
 
-Json in_force(const FusionPlan& plan) {
+Json in_force(const fusion::FusionPlan& plan) {
   Json intervals = Json::array();
-  for (const TemperatureInterval& one : plan.highlighted()) intervals.push_back({one.low, one.high});
+  for (const fusion::TemperatureInterval& one : plan.highlighted()) intervals.push_back({one.low, one.high});
   return {{"range", {plan.range_minimum(), plan.range_maximum()}},
           {"params_in_force", json_of(plan.params_in_force())},
           {"highlighted", intervals}};
 }
 
 /// A record of settings under a palette, with arrays temperature, visible, palette and fused; or with `refused`.
-void write_case(const FusionSettings& settings, const PaletteTable& palette, const std::vector<float>& temperature,
-                const std::vector<Rgb8>& visible, const TemperatureSummary& summary, const std::string& name) {
+void write_case(const fusion::FusionSettings& settings, const fusion::PaletteTable& palette,
+                const std::vector<float>& temperature, const std::vector<base::Rgb8>& visible,
+                const fusion::TemperatureSummary& summary, const std::string& name) {
   Json used;
-  const SceneTemperature facts = watched(temperature, visible, summary, used);
-  const auto plan = FusionPlan::prepare(settings, facts, palette);
+  const fusion::SceneTemperature facts = watched(temperature, visible, summary, used);
+  const auto plan = fusion::FusionPlan::prepare(settings, facts, palette);
   Json record = {{"name", name}, {"settings", json_of(settings)}};
-  std::vector<Rgb8> fused(temperature.size());
+  std::vector<base::Rgb8> fused(temperature.size());
   if (plan) {
     plan.value().fuse(temperature, visible, fused);
     record["plan"] = in_force(plan.value());
@@ -170,14 +171,14 @@ void write_case(const FusionSettings& settings, const PaletteTable& palette, con
   write(record, {bytes_of(temperature), bytes_of(visible), bytes_of(palette), bytes_of(fused)});
 }
 
-TemperatureSummary summary_of(const std::vector<float>& temperature) {
-  TemperatureAccumulator accumulator;
+fusion::TemperatureSummary summary_of(const std::vector<float>& temperature) {
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(temperature);
   return accumulator.summary();
 }
 
-ParameterValue parameter_value(const Json& json) {
-  if (json.is_null()) return Automatic{};
+fusion::ParameterValue parameter_value(const Json& json) {
+  if (json.is_null()) return fusion::Automatic{};
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_integer()) return json.get<std::int64_t>();
   if (json.is_number()) return json.get<double>();
@@ -187,7 +188,7 @@ ParameterValue parameter_value(const Json& json) {
 void golden(const char* path) {
   std::ifstream file(path);
   const Json json = Json::parse(file);
-  std::vector<Rgb8> visible;
+  std::vector<base::Rgb8> visible;
   for (const Json& row : json["visible"]) {
     visible.push_back({row[0].get<std::uint8_t>(), row[1].get<std::uint8_t>(), row[2].get<std::uint8_t>()});
   }
@@ -195,35 +196,35 @@ void golden(const char* path) {
   for (const Json& value : json["temperature"]) {
     temperature.push_back(value.is_null() ? std::numeric_limits<float>::quiet_NaN() : value.get<float>());
   }
-  PaletteTable palette{};
+  fusion::PaletteTable palette{};
   for (std::size_t i = 0; i < 768; ++i) palette[i / 3][i % 3] = json["palette"][i / 3][i % 3].get<double>();
   for (const Json& one : json["cases"]) {
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = one["method"].get<std::string>();
     for (const auto& [name, value] : one["params"].items()) change.params[name] = parameter_value(value);
     if (!one["range"].is_null()) {
-      change.range = RangeSetting::manual(one["range"][0].get<double>(), one["range"][1].get<double>());
+      change.range = fusion::RangeSetting::manual(one["range"][0].get<double>(), one["range"][1].get<double>());
     }
-    write_case(with_change(default_settings(), change).value(), palette, temperature, visible, summary_of(temperature),
-               "golden " + *change.method + " " + one["params"].dump());
+    write_case(fusion::with_change(fusion::default_settings(), change).value(), palette, temperature, visible,
+               summary_of(temperature), "golden " + *change.method + " " + one["params"].dump());
   }
 }
 
 void property(std::size_t count) {
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     const auto generator = test::cases(*method);
     for (std::size_t i = 0; i < count; ++i) {
       const rc::Random random(0x5bec7a + i);
       const test::Case one = generator(random, static_cast<int>(i % 100)).value();
       write_case(one.settings, one.palette, one.temperature, one.visible, one.facts().summary,
-                 one.scene + " under " + cache_key(one.settings));
+                 one.scene + " under " + fusion::cache_key(one.settings));
     }
   }
 }
 
-std::vector<Rgb8> random_colours(std::size_t count, std::mt19937& engine) {
-  std::vector<Rgb8> colours(count);
-  for (Rgb8& colour : colours) {
+std::vector<base::Rgb8> random_colours(std::size_t count, std::mt19937& engine) {
+  std::vector<base::Rgb8> colours(count);
+  for (base::Rgb8& colour : colours) {
     const auto bits = static_cast<std::uint32_t>(engine());
     colour = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
               static_cast<std::uint8_t>(bits >> 16)};
@@ -262,28 +263,30 @@ std::vector<Scene> scenes(std::size_t count) {
 }
 
 void settings(std::size_t count) {
-  const std::vector<std::pair<std::string, RangeSetting>> ranges = {{"auto", {}},
-                                                                    {"manual", RangeSetting::manual(20, 31.7)},
-                                                                    {"one point", RangeSetting::manual(25, 25)},
-                                                                    {"huge", RangeSetting::manual(-1e308, 1e308)},
-                                                                    {"percentile", RangeSetting::percentile(2, 97)}};
+  const std::vector<std::pair<std::string, fusion::RangeSetting>> ranges = {
+      {"auto", {}},
+      {"manual", fusion::RangeSetting::manual(20, 31.7)},
+      {"one point", fusion::RangeSetting::manual(25, 25)},
+      {"huge", fusion::RangeSetting::manual(-1e308, 1e308)},
+      {"percentile", fusion::RangeSetting::percentile(2, 97)}};
   for (const Scene& scene : scenes(count)) {
     write({{"scene", scene.name}}, {bytes_of(scene.temperature), bytes_of(scene.visible)});
-    for (const Method* method : all_methods()) {
-      for (const Palette& palette : all_palettes()) {
-        if (!method->uses_palette && &palette != all_palettes().data()) continue;
+    for (const fusion::Method* method : fusion::all_methods()) {
+      for (const fusion::Palette& palette : fusion::all_palettes()) {
+        if (!method->uses_palette && &palette != fusion::all_palettes().data()) continue;
         for (const auto& [range_name, range] : ranges) {
           for (const bool is_fixed : {false, true}) {
-            FusionChange change;
+            fusion::FusionChange change;
             change.method = method->id;
             change.palette = palette.id;
             change.range = range;
-            if (is_fixed) change.missing = MissingDisplay{Rgb8{255, 0, 200}};
-            const FusionSettings all = with_change(default_settings(), change).value();
+            if (is_fixed) change.missing = fusion::MissingDisplay{base::Rgb8{255, 0, 200}};
+            const fusion::FusionSettings all = fusion::with_change(fusion::default_settings(), change).value();
             Json used;
-            const auto plan = FusionPlan::prepare(all, watched(scene.temperature, scene.visible, scene.summary, used));
+            const auto plan =
+                fusion::FusionPlan::prepare(all, watched(scene.temperature, scene.visible, scene.summary, used));
             if (!plan) continue;
-            std::vector<Rgb8> fused(count);
+            std::vector<base::Rgb8> fused(count);
             plan.value().fuse(scene.temperature, scene.visible, fused);
             std::string hash(SHA256_DIGEST_LENGTH, '\0');
             SHA256(reinterpret_cast<const unsigned char*>(fused.data()), 3 * fused.size(),
@@ -301,23 +304,23 @@ void settings(std::size_t count) {
 }
 
 void refusals() {
-  const std::vector<FusionChange> changes = {
+  const std::vector<fusion::FusionChange> changes = {
       {.method = "no_such_method"},
       {.params = {{"no_such_parameter", 1.0}}},
       {.params = {{"alpha", 1.5}}},
       {.params = {{"alpha", std::string("much")}}},
-      {.params = {{"alpha", Automatic{}}}},
+      {.params = {{"alpha", fusion::Automatic{}}}},
       {.palette = "no_such_palette"},
-      {.range = RangeSetting::manual(30, 20)},
-      {.range = RangeSetting::percentile(80, 20)},
+      {.range = fusion::RangeSetting::manual(30, 20)},
+      {.range = fusion::RangeSetting::percentile(80, 20)},
       {.method = "thermal_highlighting", .params = {{"low", 40.0}, {"high", 20.25}}},
       {.method = "histogram_bin", .params = {{"bins", 2.5}}},
       {.method = "histogram_bin", .params = {{"ties", std::string("neither")}}},
       {.method = "inverse_intensity_hue", .params = {{"k", 0.0}}},
       {.method = "colour_mapped_threshold", .params = {{"invert", 1.0}}},
   };
-  for (const FusionChange& change : changes) {
-    const auto settings = with_change(default_settings(), change);
+  for (const fusion::FusionChange& change : changes) {
+    const auto settings = fusion::with_change(fusion::default_settings(), change);
     if (settings) std::abort();
     write({{"change", json_of(change)},
            {"refused",
@@ -332,17 +335,19 @@ void codes() {
   std::mt19937 engine(4);
   for (const Scene& scene : scenes(20'000)) {
     for (const double step : {0.01, 0.5, 1e-9}) {
-      const TemperatureCodes table = TemperatureCodes::covering(scene.summary.minimum, scene.summary.maximum, step);
+      const fusion::TemperatureCodes table =
+          fusion::TemperatureCodes::covering(scene.summary.minimum, scene.summary.maximum, step);
       std::vector<std::uint16_t> code(scene.temperature.size());
       table.encode(scene.temperature, code);
       std::vector<float> decoded(code.size());
       table.decode(code, decoded);
-      FusionChange change;
+      fusion::FusionChange change;
       change.method = "thermal_only";
-      const FusionSettings all = with_change(default_settings(), change).value();
+      const fusion::FusionSettings all = fusion::with_change(fusion::default_settings(), change).value();
       Json used;
-      const auto plan = FusionPlan::prepare(all, watched(scene.temperature, scene.visible, scene.summary, used));
-      std::vector<Rgb8> fused(code.size());
+      const auto plan =
+          fusion::FusionPlan::prepare(all, watched(scene.temperature, scene.visible, scene.summary, used));
+      std::vector<base::Rgb8> fused(code.size());
       plan.value().fuse(decoded, scene.visible, fused);
       write({{"name", scene.name + ", step " + std::to_string(step)},
              {"scale", double{table.scale}},
@@ -356,11 +361,11 @@ void codes() {
 }
 
 /// Settings under which a method has work to do: thresholds in the middle, half of the bins, a fractional power.
-FusionSettings working_settings(const Method& method) {
-  FusionChange change;
+fusion::FusionSettings working_settings(const fusion::Method& method) {
+  fusion::FusionChange change;
   change.method = method.id;
   change.palette = "inferno";
-  for (const Parameter& parameter : method.parameters) {
+  for (const fusion::Parameter& parameter : method.parameters) {
     if (parameter.name == "threshold") change.params["threshold"] = 27.5;
     if (parameter.name == "low") change.params["low"] = 24.0;
     if (parameter.name == "high") change.params["high"] = 31.0;
@@ -369,7 +374,7 @@ FusionSettings working_settings(const Method& method) {
     if (parameter.name == "hue") change.params["hue"] = 0.0;
     if (parameter.name == "k") change.params["k"] = method.id == "inverse_intensity_hue" ? 2.5 : 1.0;
   }
-  return with_change(default_settings(), change).value();
+  return fusion::with_change(fusion::default_settings(), change).value();
 }
 
 double thread_seconds() {
@@ -383,14 +388,15 @@ void bench(std::size_t count, std::size_t rounds) {
   std::uniform_real_distribution<float> celsius(15, 40);
   std::vector<float> temperature(count);
   for (float& value : temperature) value = celsius(engine);
-  const std::vector<Rgb8> visible = random_colours(count, engine);
-  const TemperatureSummary summary = summary_of(temperature);
+  const std::vector<base::Rgb8> visible = random_colours(count, engine);
+  const fusion::TemperatureSummary summary = summary_of(temperature);
   write({{"scene", "bench"}}, {bytes_of(temperature), bytes_of(visible)});
-  std::vector<Rgb8> fused(count);
-  for (const Method* method : all_methods()) {
-    const FusionSettings all = working_settings(*method);
+  std::vector<base::Rgb8> fused(count);
+  for (const fusion::Method* method : fusion::all_methods()) {
+    const fusion::FusionSettings all = working_settings(*method);
     Json used;
-    const FusionPlan plan = FusionPlan::prepare(all, watched(temperature, visible, summary, used)).value();
+    const fusion::FusionPlan plan =
+        fusion::FusionPlan::prepare(all, watched(temperature, visible, summary, used)).value();
     double best = std::numeric_limits<double>::infinity();
     for (std::size_t round = 0; round < rounds; ++round) {
       const double begin = thread_seconds();

@@ -21,45 +21,46 @@ using test::FusionReference;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 /// Every property holds for every registered method.
-class EveryMethod : public testing::TestWithParam<const Method*> {};
+class EveryMethod : public testing::TestWithParam<const fusion::Method*> {};
 
 /// The registered methods that make a promise.
-std::vector<const Method*> methods_that(bool Method::*promise) {
-  std::vector<const Method*> methods;
-  for (const Method* method : all_methods()) {
+std::vector<const fusion::Method*> methods_that(bool fusion::Method::*promise) {
+  std::vector<const fusion::Method*> methods;
+  for (const fusion::Method* method : fusion::all_methods()) {
     if (method->*promise) methods.push_back(method);
   }
   return methods;
 }
 
-std::string id_of(const testing::TestParamInfo<const Method*>& one) {
+std::string id_of(const testing::TestParamInfo<const fusion::Method*>& one) {
   return one.param->id;
 }
 
 INSTANTIATE_TEST_SUITE_P(Fusion, EveryMethod,
-                         testing::ValuesIn(std::vector<const Method*>(all_methods().begin(), all_methods().end())),
+                         testing::ValuesIn(std::vector<const fusion::Method*>(fusion::all_methods().begin(),
+                                                                              fusion::all_methods().end())),
                          id_of);
 
 /// The plan of a case, or nothing when low and high contradict each other.
-std::optional<FusionPlan> plan_of(const Case& one) {
-  auto plan = FusionPlan::prepare(one.settings, one.facts(), one.palette);
+std::optional<fusion::FusionPlan> plan_of(const Case& one) {
+  auto plan = fusion::FusionPlan::prepare(one.settings, one.facts(), one.palette);
   if (plan.has_value()) return plan.value();
-  RC_ASSERT(plan.error().code == ErrorCode::Inconsistent);
+  RC_ASSERT(plan.error().code == base::ErrorCode::Inconsistent);
   return std::nullopt;
 }
 
 /// The exact answer for a case; a hue that follows the scene and percentiles are those of the plan.
-FusionReference reference_of(const Case& one, const FusionPlan& plan) {
-  FusionSettings settings = one.settings;
+FusionReference reference_of(const Case& one, const fusion::FusionPlan& plan) {
+  fusion::FusionSettings settings = one.settings;
   if (settings.params.contains("hue")) settings.params["hue"] = plan.params_in_force().at("hue");
-  if (settings.range.mode == RangeMode::Percentile) {
-    settings.range = RangeSetting::manual(plan.range_minimum(), plan.range_maximum());
+  if (settings.range.mode == fusion::RangeMode::Percentile) {
+    settings.range = fusion::RangeSetting::manual(plan.range_minimum(), plan.range_maximum());
   }
   return {settings, one.palette, one.facts().summary, one.temperature};
 }
 
-std::vector<Rgb8> fused(const FusionPlan& plan, const VertexValues& vertices) {
-  std::vector<Rgb8> result(vertices.visible.size());
+std::vector<base::Rgb8> fused(const fusion::FusionPlan& plan, const base::VertexValues& vertices) {
+  std::vector<base::Rgb8> result(vertices.visible.size());
   plan.fuse(vertices, result);
   return result;
 }
@@ -70,7 +71,7 @@ FusionReference::Colour exact_of(const FusionReference& reference, const Case& o
                          one.freshness.empty() ? std::uint8_t{8} : one.freshness[i]);
 }
 
-std::array<std::uint8_t, 3> channels(Rgb8 colour) {
+std::array<std::uint8_t, 3> channels(base::Rgb8 colour) {
   return {colour.r, colour.g, colour.b};
 }
 
@@ -96,7 +97,7 @@ TEST_P(EveryMethod, EqualsTheExactAnswer) {
 TEST_P(EveryMethod, EveryInstructionSetGivesTheSameBytes) {
   EXPECT_TRUE(rc::check([this] {
     const Case one = *test::cases(*GetParam());
-    std::optional<std::vector<Rgb8>> first;
+    std::optional<std::vector<base::Rgb8>> first;
     for (const std::int64_t target : test::instruction_sets()) {
       const test::UsingInstructionSet use(target);
       const auto plan = plan_of(one);
@@ -121,22 +122,22 @@ TEST_P(EveryMethod, EveryLengthGivesTheSameBytes) {
       room.baseline.push_back(i % 7 ? celsius(engine) : std::numeric_limits<float>::quiet_NaN());
       room.freshness.push_back(static_cast<std::uint8_t>(i < 300 ? 8 : engine() % 9));
     }
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = GetParam()->id;
-    room.settings = with_change(default_settings(), change).value();
-    room.palette = find_palette("iron")->table;
+    room.settings = fusion::with_change(fusion::default_settings(), change).value();
+    room.palette = fusion::find_palette("iron")->table;
     return room;
   }();
   for (const std::int64_t target : test::instruction_sets()) {
     const test::UsingInstructionSet use(target);
-    const FusionPlan plan = FusionPlan::prepare(one.settings, one.facts(), one.palette).value();
+    const fusion::FusionPlan plan = fusion::FusionPlan::prepare(one.settings, one.facts(), one.palette).value();
     const auto whole = fused(plan, one.values());
     for (std::size_t length = 0; length <= one.temperature.size(); ++length) {
-      const VertexValues last = one.values().subspan(one.temperature.size() - length, length);
+      const base::VertexValues last = one.values().subspan(one.temperature.size() - length, length);
       // One colour more than is asked for, to see that nothing is written behind the end.
-      std::vector<Rgb8> answer(length + 1, Rgb8{1, 2, 3});
+      std::vector<base::Rgb8> answer(length + 1, base::Rgb8{1, 2, 3});
       plan.fuse(last, std::span(answer).first(length));
-      ASSERT_EQ(answer.back(), (Rgb8{1, 2, 3})) << test::name_of(target) << " " << length;
+      ASSERT_EQ(answer.back(), (base::Rgb8{1, 2, 3})) << test::name_of(target) << " " << length;
       ASSERT_TRUE(std::equal(answer.begin(), answer.end() - 1, whole.end() - static_cast<std::ptrdiff_t>(length)))
           << test::name_of(target) << " " << length;
     }
@@ -160,7 +161,7 @@ TEST_P(EveryMethod, ThreadsAndSplitsGiveTheSameBytes) {
     const auto plan = plan_of(one);
     if (!plan) return;
     const auto whole = fused(*plan, one.values());
-    std::vector<Rgb8> pieces(whole.size());
+    std::vector<base::Rgb8> pieces(whole.size());
     std::vector<std::thread> threads;
     const std::size_t count = *rc::gen::inRange<std::size_t>(1, 5);
     const std::size_t piece = whole.size() / count + 1;
@@ -217,7 +218,7 @@ TEST_P(EveryMethod, AnyBitsAsTemperatureAreAllowedBesideTheScene) {
 TEST_P(EveryMethod, AlphaZeroIsVisibleAndAlphaOneIsThermal) {
   const auto& parameters = GetParam()->parameters;
   const bool has_alpha =
-      std::any_of(parameters.begin(), parameters.end(), [](const Parameter& p) { return p.name == "alpha"; });
+      std::any_of(parameters.begin(), parameters.end(), [](const fusion::Parameter& p) { return p.name == "alpha"; });
   if (!has_alpha) GTEST_SKIP() << GetParam()->id << " has no alpha";
   EXPECT_TRUE(rc::check([this] {
     Case one = *test::cases(*GetParam());
@@ -228,14 +229,14 @@ TEST_P(EveryMethod, AlphaZeroIsVisibleAndAlphaOneIsThermal) {
     if (!GetParam()->uses_palette) return;
     one.settings.params["alpha"] = 1.0;
     const auto answer = fused(plan_of(one).value(), one.values());
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = "thermal_only";
     Case thermal = one;
-    thermal.settings = with_change(one.settings, change).value();
+    thermal.settings = fusion::with_change(one.settings, change).value();
     if (GetParam()->compares_with_baseline) {
       // The palette is that of the changes.
       const double span = std::get<double>(one.settings.params.at("span"));
-      thermal.settings.range = RangeSetting::manual(-span, span);
+      thermal.settings.range = fusion::RangeSetting::manual(-span, span);
       thermal.baseline.resize(one.temperature.size(), kNan);
       for (std::size_t i = 0; i < one.temperature.size(); ++i) thermal.temperature[i] -= thermal.baseline[i];
     }
@@ -247,15 +248,15 @@ TEST_P(EveryMethod, AlphaZeroIsVisibleAndAlphaOneIsThermal) {
 }
 
 /// A scene of whole multiples of 1/64 degC, which can be shifted by 256 and doubled without any rounding.
-Case exact_case(const Method& method) {
+Case exact_case(const fusion::Method& method) {
   Case one;
   one.temperature = *rc::gen::nonEmpty(rc::gen::container<std::vector<float>>(rc::gen::map(
       rc::gen::inRange(0, 64 * 100), [](int sixty_fourths) { return static_cast<float>(sixty_fourths) / 64; })));
   one.visible = *test::colours(one.temperature.size());
   one.settings = *test::settings_of(method, one.temperature);
   one.settings.range = {};
-  for (const Parameter& parameter : method.parameters) {
-    if (parameter.kind == ParameterKind::Temperature) one.settings.params[parameter.name] = Automatic{};
+  for (const fusion::Parameter& parameter : method.parameters) {
+    if (parameter.kind == fusion::ParameterKind::Temperature) one.settings.params[parameter.name] = fusion::Automatic{};
   }
   one.palette = *test::palettes();
   return one;
@@ -274,7 +275,7 @@ TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
     if (GetParam()->id == "histogram_distribution") return;
     Case shifted = celsius;
     for (float& value : shifted.temperature) value += 256;
-    const FusionPlan shifted_plan = plan_of(shifted).value();
+    const fusion::FusionPlan shifted_plan = plan_of(shifted).value();
     const FusionReference reference = reference_of(shifted, shifted_plan);
     const auto moved = fused(shifted_plan, shifted.values());
     for (std::size_t i = 0; i < answer.size(); ++i) {
@@ -286,12 +287,12 @@ TEST_P(EveryMethod, UnitsLeavePixelsAlone) {
 }
 
 /// A palette and visible colours that cannot be mistaken for each other, so that a highlight can be seen.
-Case telling_case(const Method& method) {
+Case telling_case(const fusion::Method& method) {
   Case one = *test::cases(method);
   one.settings.missing.reset();
   one.freshness.clear();
   for (auto& row : one.palette) row = {250, 10, 10};
-  one.visible.assign(one.temperature.size(), Rgb8{0, 200, 100});
+  one.visible.assign(one.temperature.size(), base::Rgb8{0, 200, 100});
   if (one.settings.params.contains("alpha")) one.settings.params["alpha"] = 1.0;
   return one;
 }
@@ -299,20 +300,21 @@ Case telling_case(const Method& method) {
 std::vector<bool> highlighted(const Case& one) {
   const auto answer = fused(plan_of(one).value(), one.values());
   std::vector<bool> flags;
-  for (const Rgb8 colour : answer) flags.push_back(colour != Rgb8{0, 200, 100});
+  for (const base::Rgb8 colour : answer) flags.push_back(colour != base::Rgb8{0, 200, 100});
   return flags;
 }
 
-class InvertibleMethod : public testing::TestWithParam<const Method*> {};
-INSTANTIATE_TEST_SUITE_P(Fusion, InvertibleMethod, testing::ValuesIn(methods_that(&Method::invert_complements)), id_of);
+class InvertibleMethod : public testing::TestWithParam<const fusion::Method*> {};
+INSTANTIATE_TEST_SUITE_P(Fusion, InvertibleMethod, testing::ValuesIn(methods_that(&fusion::Method::invert_complements)),
+                         id_of);
 
 TEST_P(InvertibleMethod, InvertComplementsExceptOnTheThreshold) {
   EXPECT_TRUE(rc::check([this] {
     Case one = telling_case(*GetParam());
     // Automatic thresholds are others when inverted.
     std::vector<float> thresholds;
-    for (const Parameter& parameter : GetParam()->parameters) {
-      if (parameter.kind != ParameterKind::Temperature) continue;
+    for (const fusion::Parameter& parameter : GetParam()->parameters) {
+      if (parameter.kind != fusion::ParameterKind::Temperature) continue;
       const int threshold = *rc::gen::inRange(-50, 500);
       one.settings.params[parameter.name] = double(threshold);
       thresholds.push_back(static_cast<float>(threshold));
@@ -339,7 +341,7 @@ TEST_P(InvertibleMethod, InvertComplementsExceptOnTheThreshold) {
 }
 
 TEST(Promises, AMethodWithoutHighlightsOfTemperaturesHasNoIntervals) {
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     if (method->highlights && !method->compares_with_baseline) continue;
     EXPECT_TRUE(rc::check([method] {
       const auto plan = plan_of(*test::cases(*method));
@@ -349,13 +351,13 @@ TEST(Promises, AMethodWithoutHighlightsOfTemperaturesHasNoIntervals) {
 }
 
 TEST(Promises, EveryMethodThatMakesAPromiseIsTried) {
-  EXPECT_GE(methods_that(&Method::highlights).size(), 5U);
-  EXPECT_GE(methods_that(&Method::invert_complements).size(), 3U);
-  EXPECT_GE(methods_that(&Method::hotter_is_lighter).size(), 5U);
+  EXPECT_GE(methods_that(&fusion::Method::highlights).size(), 5U);
+  EXPECT_GE(methods_that(&fusion::Method::invert_complements).size(), 3U);
+  EXPECT_GE(methods_that(&fusion::Method::hotter_is_lighter).size(), 5U);
 }
 
 TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
-  for (const Method* method : methods_that(&Method::highlights)) {
+  for (const fusion::Method* method : methods_that(&fusion::Method::highlights)) {
     if (method->compares_with_baseline) continue;
     EXPECT_TRUE(rc::check([method] {
       const Case one = telling_case(*method);
@@ -366,9 +368,9 @@ TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
       for (std::size_t i = 0; i + 1 < intervals.size(); ++i) {
         RC_ASSERT(intervals[i].high < intervals[i + 1].low || intervals[i].high == intervals[i + 1].low);
       }
-      const TemperatureSummary data = one.facts().summary;
+      const fusion::TemperatureSummary data = one.facts().summary;
       const double tolerance = 1e-6 * (std::abs(double{data.minimum}) + std::abs(double{data.maximum}));
-      for (const TemperatureInterval& interval : intervals) {
+      for (const fusion::TemperatureInterval& interval : intervals) {
         RC_ASSERT(interval.low <= interval.high);
         RC_ASSERT(interval.low >= double{data.minimum} && interval.high <= double{data.maximum});
       }
@@ -376,7 +378,7 @@ TEST(HighlightedIntervals, HoldEveryHighlightedTemperature) {
         // The axis has no place for what is infinite.
         if (answer[i] == one.visible[i] || std::isinf(one.temperature[i])) continue;
         const double t = double{one.temperature[i]};
-        RC_ASSERT(std::any_of(intervals.begin(), intervals.end(), [&](const TemperatureInterval& interval) {
+        RC_ASSERT(std::any_of(intervals.begin(), intervals.end(), [&](const fusion::TemperatureInterval& interval) {
           return t >= interval.low - tolerance && t <= interval.high + tolerance;
         }));
       }
@@ -396,16 +398,16 @@ std::vector<std::size_t> by_temperature(const Case& one) {
 }
 
 TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
-  for (const Method* method : methods_that(&Method::hotter_is_lighter)) {
+  for (const fusion::Method* method : methods_that(&fusion::Method::hotter_is_lighter)) {
     EXPECT_TRUE(rc::check([method] {
       Case one = *test::cases(*method);
       one.freshness.clear();
-      one.palette = find_palette("white_hot")->table;
+      one.palette = fusion::find_palette("white_hot")->table;
       one.visible.assign(one.temperature.size(), (*test::colours(1))[0]);
       if (one.settings.params.contains("sides")) {
         // Beyond the hot threshold the palette lightens what is black.
         one.settings.params["sides"] = std::string("hot");
-        one.visible.assign(one.temperature.size(), Rgb8{0, 0, 0});
+        one.visible.assign(one.temperature.size(), base::Rgb8{0, 0, 0});
       }
       const auto answer = fused(plan_of(one).value(), one.values());
       const auto order = by_temperature(one);
@@ -420,13 +422,13 @@ TEST(Monotone, HotterIsNeverDarkerWhereTheEquationsSaySo) {
 
 TEST(IntensityHue, KeepsTheHueOfThePalette) {
   EXPECT_TRUE(rc::check([] {
-    Case one = *test::cases(*find_method("intensity_hue"));
+    Case one = *test::cases(*fusion::find_method("intensity_hue"));
     one.freshness.clear();
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = "thermal_only";
-    const FusionPlan plan = plan_of(one).value();
+    const fusion::FusionPlan plan = plan_of(one).value();
     Case thermal = one;
-    thermal.settings = with_change(one.settings, change).value();
+    thermal.settings = fusion::with_change(one.settings, change).value();
     const FusionReference reference = reference_of(thermal, plan);
     const auto answer = fused(plan, one.values());
     for (std::size_t i = 0; i < answer.size(); ++i) {
@@ -451,19 +453,19 @@ TEST(IntensityHue, KeepsTheHueOfThePalette) {
 TEST(Statistics, MatchExtendedPrecisionForAnyOrderAndSplit) {
   EXPECT_TRUE(rc::check([] {
     const auto values = *test::temperatures();
-    TemperatureAccumulator whole;
+    fusion::TemperatureAccumulator whole;
     whole.add(values);
-    TemperatureAccumulator merged;
+    fusion::TemperatureAccumulator merged;
     const std::size_t piece = *rc::gen::inRange<std::size_t>(1, 300);
     for (std::size_t end = values.size(); end > 0;) {
       const std::size_t begin = end > piece ? end - piece : 0;
-      TemperatureAccumulator part;
+      fusion::TemperatureAccumulator part;
       part.add(std::span(values).subspan(begin, end - begin));
       merged.merge(part);
       end = begin;
     }
-    const TemperatureSummary a = whole.summary();
-    const TemperatureSummary b = merged.summary();
+    const fusion::TemperatureSummary a = whole.summary();
+    const fusion::TemperatureSummary b = merged.summary();
     RC_ASSERT(a.mean == b.mean && a.sigma == b.sigma && a.minimum == b.minimum && a.maximum == b.maximum);
     RC_ASSERT(a.finite_count == b.finite_count && a.missing_count == b.missing_count);
     RC_ASSERT(a.over_range_count == b.over_range_count && a.under_range_count == b.under_range_count);
@@ -494,9 +496,9 @@ TEST(Statistics, MatchExtendedPrecisionForAnyOrderAndSplit) {
 TEST(Statistics, HistogramFollowsTheFormulaOnEveryInstructionSet) {
   EXPECT_TRUE(rc::check([] {
     const auto values = *test::temperatures();
-    TemperatureAccumulator accumulator;
+    fusion::TemperatureAccumulator accumulator;
     accumulator.add(values);
-    const TemperatureSummary summary = accumulator.summary();
+    const fusion::TemperatureSummary summary = accumulator.summary();
     const auto bins = *rc::gen::oneOf(rc::gen::inRange<std::size_t>(1, 100), rc::gen::inRange<std::size_t>(1, 4097));
     std::vector<std::uint64_t> expected(bins);
     const double low = double{summary.minimum};
@@ -508,8 +510,8 @@ TEST(Statistics, HistogramFollowsTheFormulaOnEveryInstructionSet) {
     }
     for (const std::int64_t target : test::instruction_sets()) {
       const test::UsingInstructionSet use(target);
-      Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
-      add_to_histogram(values, histogram);
+      fusion::Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+      fusion::add_to_histogram(values, histogram);
       RC_ASSERT(histogram.counts == expected);
     }
   }));
@@ -517,11 +519,11 @@ TEST(Statistics, HistogramFollowsTheFormulaOnEveryInstructionSet) {
 
 TEST(Range, APercentileIsWithinA4096thOfTheSpan) {
   EXPECT_TRUE(rc::check([] {
-    Case one = *test::cases(*find_method("thermal_only"));
+    Case one = *test::cases(*fusion::find_method("thermal_only"));
     const double low = *rc::gen::map(rc::gen::inRange(0, 500), [](int tenths) { return tenths / 10.0; });
     const double high = *rc::gen::map(rc::gen::inRange(501, 1001), [](int tenths) { return tenths / 10.0; });
-    one.settings.range = RangeSetting::percentile(low, high);
-    const FusionPlan plan = plan_of(one).value();
+    one.settings.range = fusion::RangeSetting::percentile(low, high);
+    const fusion::FusionPlan plan = plan_of(one).value();
     std::vector<double> sorted;
     for (const float t : one.temperature) {
       if (std::isfinite(t)) sorted.push_back(double{t});
@@ -542,14 +544,14 @@ TEST(Range, APercentileIsWithinA4096thOfTheSpan) {
     RC_ASSERT(holds(plan.range_minimum(), low));
     RC_ASSERT(holds(plan.range_maximum(), high));
     RC_ASSERT(plan.range_minimum() <= plan.range_maximum());
-    one.settings.range = RangeSetting::percentile(0, 100);
-    const FusionPlan whole = plan_of(one).value();
+    one.settings.range = fusion::RangeSetting::percentile(0, 100);
+    const fusion::FusionPlan whole = plan_of(one).value();
     RC_ASSERT(whole.range_minimum() == sorted.front() && whole.range_maximum() == sorted.back());
   }));
 }
 
 TEST(Marks, AreWhereThePictureIsAnother) {
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     EXPECT_TRUE(rc::check([method] {
       const Case one = telling_case(*method);
       const auto plan = plan_of(one);
@@ -566,11 +568,11 @@ TEST(Marks, AreWhereThePictureIsAnother) {
 
 TEST(ThermalChange, WithoutABaselineItShowsTheVisiblePicture) {
   EXPECT_TRUE(rc::check([] {
-    Case one = *test::cases(*find_method("thermal_change"));
+    Case one = *test::cases(*fusion::find_method("thermal_change"));
     one.baseline.clear();
     one.freshness.clear();
     one.settings.missing.reset();
-    const FusionPlan plan = plan_of(one).value();
+    const fusion::FusionPlan plan = plan_of(one).value();
     RC_ASSERT(fused(plan, one.values()) == one.visible);
     const double span = std::get<double>(one.settings.params.at("span"));
     RC_ASSERT(plan.change_scale() && plan.change_scale()->minimum == -span && plan.change_scale()->maximum == span);
@@ -578,7 +580,7 @@ TEST(ThermalChange, WithoutABaselineItShowsTheVisiblePicture) {
 }
 
 TEST(Age, WhatIsFreshIsTheSameByteForByteAndWhatIsOldestIsGrey) {
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     EXPECT_TRUE(rc::check([method] {
       Case one = *test::cases(*method);
       one.freshness.clear();
@@ -588,7 +590,8 @@ TEST(Age, WhatIsFreshIsTheSameByteForByteAndWhatIsOldestIsGrey) {
       one.freshness.assign(one.temperature.size(), 8);
       RC_ASSERT(fused(*plan, one.values()) == without);
       one.freshness.assign(one.temperature.size(), 0);
-      for (const Rgb8 colour : fused(*plan, one.values())) RC_ASSERT(colour.r == colour.g && colour.g == colour.b);
+      for (const base::Rgb8 colour : fused(*plan, one.values()))
+        RC_ASSERT(colour.r == colour.g && colour.g == colour.b);
     })) << method->id;
   }
 }
@@ -596,7 +599,7 @@ TEST(Age, WhatIsFreshIsTheSameByteForByteAndWhatIsOldestIsGrey) {
 TEST(Age, FreshnessIsTheRoundedPower) {
   EXPECT_TRUE(rc::check([] {
     const double half_life_s = std::exp2(*rc::gen::inRange(0, 24));
-    const AgeSteps steps(half_life_s);
+    const fusion::AgeSteps steps(half_life_s);
     const double age_s = half_life_s * (*rc::gen::inRange(-1000, 8000) / 1000.0);
     const double exact = age_s > 0 ? 8 * std::exp2(-age_s / half_life_s) : 8;
     const int told = steps.freshness(age_s);
@@ -608,7 +611,7 @@ TEST(Age, FreshnessIsTheRoundedPower) {
       RC_ASSERT(steps.freshness(std::nextafter(steps.last_age_s(static_cast<std::uint8_t>(told)), 1e300)) == told - 1);
     }
   }));
-  const AgeSteps minute(60);
+  const fusion::AgeSteps minute(60);
   EXPECT_EQ(minute.freshness(std::numeric_limits<double>::quiet_NaN()), 8);
   EXPECT_EQ(minute.freshness(std::numeric_limits<double>::infinity()), 0);
   EXPECT_EQ(minute.freshness(60), 4);
@@ -618,14 +621,14 @@ TEST(FusionProperty, AMillionEqualValuesWithOneOutlier) {
   Case one;
   one.temperature.assign(1'000'000, 21.5F);
   one.temperature[123'456] = 90.0F;
-  one.visible.assign(one.temperature.size(), Rgb8{60, 70, 80});
-  one.palette = find_palette("iron")->table;
-  for (const Method* method : all_methods()) {
-    FusionChange change;
+  one.visible.assign(one.temperature.size(), base::Rgb8{60, 70, 80});
+  one.palette = fusion::find_palette("iron")->table;
+  for (const fusion::Method* method : fusion::all_methods()) {
+    fusion::FusionChange change;
     change.method = method->id;
-    one.settings = with_change(default_settings(), change).value();
-    const SceneTemperature facts = one.facts();
-    const auto plan = FusionPlan::prepare(one.settings, facts, one.palette).value();
+    one.settings = fusion::with_change(fusion::default_settings(), change).value();
+    const fusion::SceneTemperature facts = one.facts();
+    const auto plan = fusion::FusionPlan::prepare(one.settings, facts, one.palette).value();
     const auto answer = fused(plan, one.values());
     const FusionReference reference = reference_of(one, plan);
     const auto ordinary = reference.fused(21.5F, one.visible[0], kNan, 8);

@@ -116,26 +116,26 @@ rc::Gen<double> number_within(double low, double high) {
 
 }  // namespace
 
-SceneTemperature Case::facts() const {
-  TemperatureAccumulator accumulator;
+fusion::SceneTemperature Case::facts() const {
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(temperature);
-  SceneTemperature facts;
+  fusion::SceneTemperature facts;
   facts.summary = accumulator.summary();
   facts.histogram = [values = temperature, summary = facts.summary](std::uint32_t bins) {
-    Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(values, histogram);
+    fusion::Histogram histogram{summary.minimum, summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(values, histogram);
     return histogram;
   };
   facts.hues = [colours = visible] {
-    Hues hues;
-    add_to_hues(colours, hues);
+    fusion::Hues hues;
+    fusion::add_to_hues(colours, hues);
     return hues;
   };
   return facts;
 }
 
 void showValue(const Case& one, std::ostream& out) {
-  out << one.scene << ", " << one.temperature.size() << " vertices, " << cache_key(one.settings);
+  out << one.scene << ", " << one.temperature.size() << " vertices, " << fusion::cache_key(one.settings);
 }
 
 rc::Gen<std::vector<float>> temperatures() {
@@ -146,11 +146,11 @@ rc::Gen<std::vector<float>> temperatures() {
                       });
 }
 
-rc::Gen<std::vector<Rgb8>> colours(std::size_t count) {
+rc::Gen<std::vector<base::Rgb8>> colours(std::size_t count) {
   return rc::gen::map(rc::gen::arbitrary<std::uint64_t>(), [count](std::uint64_t seed) {
     Engine engine(seed);
-    std::vector<Rgb8> result(count);
-    for (Rgb8& colour : result) {
+    std::vector<base::Rgb8> result(count);
+    for (base::Rgb8& colour : result) {
       const auto byte = [&] { return static_cast<std::uint8_t>(engine()); };
       switch (engine() % 8) {
         case 0:
@@ -175,22 +175,23 @@ rc::Gen<std::vector<Rgb8>> colours(std::size_t count) {
 
 namespace {
 
-rc::Gen<ParameterValue> value_that_is_set(const Parameter& parameter, const std::vector<float>& temperature) {
-  const auto boxed = [](auto value) { return ParameterValue{value}; };
+rc::Gen<fusion::ParameterValue> value_that_is_set(const fusion::Parameter& parameter,
+                                                  const std::vector<float>& temperature) {
+  const auto boxed = [](auto value) { return fusion::ParameterValue{value}; };
   switch (parameter.kind) {
-    case ParameterKind::Toggle:
+    case fusion::ParameterKind::Toggle:
       return rc::gen::map(rc::gen::arbitrary<bool>(), boxed);
-    case ParameterKind::Choice:
+    case fusion::ParameterKind::Choice:
       return rc::gen::map(rc::gen::elementOf(parameter.options),
-                          [](const std::string& option) { return ParameterValue{option}; });
-    case ParameterKind::Integer: {
+                          [](const std::string& option) { return fusion::ParameterValue{option}; });
+    case fusion::ParameterKind::Integer: {
       const auto low = static_cast<std::int64_t>(parameter.min);
       const auto high = static_cast<std::int64_t>(parameter.max);
       return rc::gen::map(rc::gen::oneOf(rc::gen::element(low, high), rc::gen::inRange(low, high + 1),
                                          rc::gen::inRange(low, std::min(high, low + 64) + 1)),
                           boxed);
     }
-    case ParameterKind::Temperature: {
+    case fusion::ParameterKind::Temperature: {
       std::vector<double> of_data = {0, 25, -1e30, 1e30, 1e300, -1e300};
       for (std::size_t i = 0; i < temperature.size() && i < 20; ++i) {
         if (std::isfinite(temperature[i])) of_data.push_back(double{temperature[i]});
@@ -198,7 +199,7 @@ rc::Gen<ParameterValue> value_that_is_set(const Parameter& parameter, const std:
       return rc::gen::oneOf(rc::gen::map(number_within(-50, 500), boxed),
                             rc::gen::map(rc::gen::elementOf(of_data), boxed));
     }
-    case ParameterKind::Number:
+    case fusion::ParameterKind::Number:
       break;
   }
   const bool bounded_below = std::isfinite(parameter.min);
@@ -216,16 +217,18 @@ rc::Gen<ParameterValue> value_that_is_set(const Parameter& parameter, const std:
 
 }  // namespace
 
-rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::vector<float>& temperature) {
+rc::Gen<fusion::ParameterValue> parameter_value(const fusion::Parameter& parameter,
+                                                const std::vector<float>& temperature) {
   if (!parameter.automatic) return value_that_is_set(parameter, temperature);
-  return rc::gen::oneOf(rc::gen::just(ParameterValue{Automatic{}}), value_that_is_set(parameter, temperature));
+  return rc::gen::oneOf(rc::gen::just(fusion::ParameterValue{fusion::Automatic{}}),
+                        value_that_is_set(parameter, temperature));
 }
 
-rc::Gen<FusionSettings> settings_of(const Method& method, const std::vector<float>& temperature) {
+rc::Gen<fusion::FusionSettings> settings_of(const fusion::Method& method, const std::vector<float>& temperature) {
   return rc::gen::exec([&method, temperature] {
-    FusionChange change;
+    fusion::FusionChange change;
     change.method = method.id;
-    for (const Parameter& parameter : method.parameters) {
+    for (const fusion::Parameter& parameter : method.parameters) {
       change.params[parameter.name] = *parameter_value(parameter, temperature);
     }
     const auto* low = change.params.contains("low") ? std::get_if<double>(&change.params["low"]) : nullptr;
@@ -234,29 +237,30 @@ rc::Gen<FusionSettings> settings_of(const Method& method, const std::vector<floa
     const int range = *rc::gen::inRange(0, 10);
     const double a = *number_within(-50, 500);
     const double b = *number_within(-50, 500);
-    if (range == 0) change.range = RangeSetting::manual(std::min(a, b), std::max(a, b));
-    if (range == 1) change.range = RangeSetting::manual(a, a);
-    if (range == 2) change.range = RangeSetting::manual(-1e308, 1e308);
-    if (range == 3) change.range = RangeSetting::manual(-1e-310, 2e-310);
-    if (range == 4) change.range = RangeSetting::manual(a, std::nextafter(a, 1e9));
-    if (range == 5) change.range = RangeSetting::percentile();
-    if (range == 6) change.range = RangeSetting::percentile(*number_within(0, 50), *number_within(50.001, 100));
-    if (*rc::gen::inRange(0, 4) == 0) change.missing = MissingDisplay{Rgb8{255, 0, 200}};
-    const auto settings = with_change(default_settings(), change);
+    if (range == 0) change.range = fusion::RangeSetting::manual(std::min(a, b), std::max(a, b));
+    if (range == 1) change.range = fusion::RangeSetting::manual(a, a);
+    if (range == 2) change.range = fusion::RangeSetting::manual(-1e308, 1e308);
+    if (range == 3) change.range = fusion::RangeSetting::manual(-1e-310, 2e-310);
+    if (range == 4) change.range = fusion::RangeSetting::manual(a, std::nextafter(a, 1e9));
+    if (range == 5) change.range = fusion::RangeSetting::percentile();
+    if (range == 6) change.range = fusion::RangeSetting::percentile(*number_within(0, 50), *number_within(50.001, 100));
+    if (*rc::gen::inRange(0, 4) == 0) change.missing = fusion::MissingDisplay{base::Rgb8{255, 0, 200}};
+    const auto settings = fusion::with_change(fusion::default_settings(), change);
     RC_ASSERT(settings.has_value());
     return settings.value();
   });
 }
 
-rc::Gen<PaletteTable> palettes() {
+rc::Gen<fusion::PaletteTable> palettes() {
   return rc::gen::map(
-      rc::gen::pair(rc::gen::inRange<std::size_t>(0, all_palettes().size() + 4), rc::gen::arbitrary<std::uint64_t>()),
+      rc::gen::pair(rc::gen::inRange<std::size_t>(0, fusion::all_palettes().size() + 4),
+                    rc::gen::arbitrary<std::uint64_t>()),
       [](const std::pair<std::size_t, std::uint64_t>& chosen) {
-        const auto known = all_palettes();
+        const auto known = fusion::all_palettes();
         if (chosen.first < known.size()) return known[chosen.first].table;
         Engine engine(chosen.second);
         std::uniform_real_distribution<double> channel(0, 255);
-        PaletteTable table{};
+        fusion::PaletteTable table{};
         const std::size_t kind = chosen.first - known.size();
         const std::array<double, 3> one = {channel(engine), channel(engine), channel(engine)};
         for (std::size_t row = 0; row < 256; ++row) {
@@ -268,7 +272,7 @@ rc::Gen<PaletteTable> palettes() {
       });
 }
 
-rc::Gen<Case> cases(const Method& method) {
+rc::Gen<Case> cases(const fusion::Method& method) {
   return rc::gen::exec([&method] {
     Case one;
     const int kind = *rc::gen::inRange(0, 15);

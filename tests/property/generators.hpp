@@ -14,13 +14,13 @@ namespace spectra::fusion::test {
 struct Case {
   std::string scene;  ///< What kind of temperatures it holds.
   std::vector<float> temperature;
-  std::vector<Rgb8> visible;
+  std::vector<base::Rgb8> visible;
   std::vector<float> baseline;          ///< Empty: none.
   std::vector<std::uint8_t> freshness;  ///< Empty: all fresh.
-  FusionSettings settings;
-  PaletteTable palette{};
-  SceneTemperature facts() const;
-  VertexValues values() const { return {temperature, visible, baseline, freshness}; }
+  fusion::FusionSettings settings;
+  fusion::PaletteTable palette{};
+  fusion::SceneTemperature facts() const;
+  base::VertexValues values() const { return {temperature, visible, baseline, freshness}; }
 };
 
 void showValue(const Case& one, std::ostream& out);
@@ -30,17 +30,18 @@ void showValue(const Case& one, std::ostream& out);
 rc::Gen<std::vector<float>> temperatures();
 
 /// Colours with many that are black, white or grey.
-rc::Gen<std::vector<Rgb8>> colours(std::size_t count);
+rc::Gen<std::vector<base::Rgb8>> colours(std::size_t count);
 
 /// Any allowed value of a parameter; often a bound, and for temperatures often one of the data's own.
-rc::Gen<ParameterValue> parameter_value(const Parameter& parameter, const std::vector<float>& temperature);
+rc::Gen<fusion::ParameterValue> parameter_value(const fusion::Parameter& parameter,
+                                                const std::vector<float>& temperature);
 
 /// Valid settings of a method.
-rc::Gen<FusionSettings> settings_of(const Method& method, const std::vector<float>& temperature);
+rc::Gen<fusion::FusionSettings> settings_of(const fusion::Method& method, const std::vector<float>& temperature);
 
 /// A palette: one of the known ones, one colour only, random, or with steps from one end of the range to the other.
-rc::Gen<PaletteTable> palettes();
+rc::Gen<fusion::PaletteTable> palettes();
 
-rc::Gen<Case> cases(const Method& method);
+rc::Gen<Case> cases(const fusion::Method& method);
 
 }  // namespace spectra::fusion::test

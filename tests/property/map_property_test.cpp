@@ -16,10 +16,10 @@
 #include "server/map/living_map.hpp"
 #include "server/map/tile_place.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 using protocol::TileId;
 
 constexpr std::uint32_t kLeafSize = 200;
@@ -33,9 +33,9 @@ struct Patch {
   int lone_count = 0;
 };
 
-fusion::LoadedScene scene_of(const Patch& patch) {
-  fusion::LoadedScene scene;
-  fusion::MultispectralMesh& mesh = scene.mesh;
+files::LoadedScene scene_of(const Patch& patch) {
+  files::LoadedScene scene;
+  mesh::MultispectralMesh& mesh = scene.mesh;
   const auto side = static_cast<std::size_t>(patch.side);
   const auto lone = static_cast<std::size_t>(patch.lone_count);
   mesh.resize_vertices(side * side + lone);
@@ -84,7 +84,7 @@ std::string name_of(int number) {
 }
 
 using Place = std::tuple<float, float, float>;
-Place place(const Vec3f& p) {
+Place place(const base::Vec3f& p) {
   return {p.x, p.y, p.z};
 }
 
@@ -96,7 +96,7 @@ bool same(std::span<const float> a, std::span<const float> b) {
 void expect_same_full_accuracy(const SceneSnapshot& a, const SceneSnapshot& b) {
   RC_ASSERT(a.vertex_count() == b.vertex_count());
   RC_ASSERT(a.triangle_count() == b.triangle_count());
-  const fusion::MultispectralMesh one = a.whole_mesh(), other = b.whole_mesh();
+  const mesh::MultispectralMesh one = a.whole_mesh(), other = b.whole_mesh();
   RC_ASSERT(std::ranges::equal(one.positions(), other.positions()));
   RC_ASSERT(std::ranges::equal(one.visible(), other.visible()));
   RC_ASSERT(same(one.temperature_celsius(), other.temperature_celsius()));
@@ -134,9 +134,9 @@ void expect_promises(const SceneSnapshot& scene) {
   std::map<TileId, std::set<Place>> places;
   std::map<Place, std::vector<TileId>> holders;
   for (const auto& [id, tile] : tiles) {
-    for (const Vec3f& p : tile->positions) places[id].insert(place(p));
+    for (const base::Vec3f& p : tile->positions) places[id].insert(place(p));
     if (tile->child_mask == 0) {
-      for (const Vec3f& p : open_positions(*tile)) holders[place(p)].push_back(id);
+      for (const base::Vec3f& p : open_positions(*tile)) holders[place(p)].push_back(id);
       continue;
     }
     float lowest = std::numeric_limits<float>::quiet_NaN(), highest = lowest;
@@ -180,7 +180,7 @@ void expect_all_are_there(const SceneSnapshot& scene) {
 }
 
 RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   const LivingMap::Options options{.leaf_vertex_count = kLeafSize, .first_level = 6};
   LivingMap map(options);
   std::map<std::string, Patch> in_it;
@@ -238,7 +238,7 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
 
 /// A block as the plain rule has it: what each of its vertices is compared with, and since when.
 struct ModelBlock {
-  fusion::LoadedScene scene;
+  files::LoadedScene scene;
   double observed_at = 0;
   std::vector<float> baseline;
   std::vector<double> baseline_at;
@@ -256,7 +256,7 @@ void put(Model& model, const std::string& id, const Patch& patch, double observe
     double nearest = std::numeric_limits<double>::infinity();
     std::size_t from = 0;
     for (std::size_t w = 0; before != model.end() && w < before->second.baseline.size(); ++w) {
-      const Vec3f &a = mesh.positions()[v], &b = before->second.scene.mesh.positions()[w];
+      const base::Vec3f &a = mesh.positions()[v], &b = before->second.scene.mesh.positions()[w];
       const double dx = double{a.x} - double{b.x}, dy = double{a.y} - double{b.y}, dz = double{a.z} - double{b.z};
       const double squared = dx * dx + dy * dy + dz * dz;
       if (squared < nearest) from = w;
@@ -310,7 +310,7 @@ void expect_remembered(const SceneSnapshot& scene, const Model& model) {
 }
 
 RC_GTEST_PROP(LivingMap, RemembersAsThePlainRuleSays, ()) {
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   LivingMap map({.leaf_vertex_count = kLeafSize, .first_level = 6, .remembers = true});
   Model model;
   std::map<std::string, Patch> in_it;
@@ -363,7 +363,7 @@ RC_GTEST_PROP(LivingMap, RemembersAsThePlainRuleSays, ()) {
 }
 
 TEST(LivingMap, ACoarseTileShowsTheMeanChangeAndTheNewestTime) {
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   LivingMap map({.leaf_vertex_count = kLeafSize, .first_level = 6, .remembers = true});
   MapChange change;
   for (int i = 0; i < 4; ++i) {
@@ -404,4 +404,4 @@ TEST(LivingMap, ACoarseTileShowsTheMeanChangeAndTheNewestTime) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -51,10 +51,10 @@ Colour from_hsv(Real hue, Real saturation, Real value) {
 
 }  // namespace
 
-FusionReference::FusionReference(const FusionSettings& settings, const PaletteTable& palette,
-                                 const TemperatureSummary& summary, std::span<const float> temperature)
+FusionReference::FusionReference(const fusion::FusionSettings& settings, const fusion::PaletteTable& palette,
+                                 const fusion::TemperatureSummary& summary, std::span<const float> temperature)
     : settings_(settings), palette_(palette), summary_(summary) {
-  if (settings.range.mode == RangeMode::Manual) {
+  if (settings.range.mode == fusion::RangeMode::Manual) {
     lo_ = settings.range.minimum_celsius;
     hi_ = settings.range.maximum_celsius;
   } else if (summary.has_temperature()) {
@@ -65,7 +65,7 @@ FusionReference::FusionReference(const FusionSettings& settings, const PaletteTa
 }
 
 double FusionReference::number(const char* name) const {
-  const ParameterValue& value = settings_.params.at(name);
+  const fusion::ParameterValue& value = settings_.params.at(name);
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return static_cast<double>(*integer);
   return std::get<double>(value);
 }
@@ -137,7 +137,7 @@ void FusionReference::choose_bins(std::span<const float> temperature) {
     return result;
   };
   std::size_t n = 0;
-  if (std::holds_alternative<Automatic>(settings_.params.at("n"))) {
+  if (std::holds_alternative<fusion::Automatic>(settings_.params.at("n"))) {
     const std::uint64_t allowed = summary_.finite_count / 10;
     while (n < ranked.size() && shown(n + 1).second <= static_cast<double>(allowed)) ++n;
   } else {
@@ -146,14 +146,14 @@ void FusionReference::choose_bins(std::span<const float> temperature) {
   for (std::size_t i = 0; i < shown(n).first; ++i) chosen_bins_[ranked[i].second] = true;
 }
 
-Colour FusionReference::fused(float temperature, Rgb8 visible, float baseline, std::uint8_t freshness) const {
+Colour FusionReference::fused(float temperature, base::Rgb8 visible, float baseline, std::uint8_t freshness) const {
   Colour colour = unfaded(temperature, visible, baseline);
   const Real grey = (299 * colour[0] + 587 * colour[1] + 114 * colour[2]) / 1000;
   for (Real& channel : colour) channel = grey + (channel - grey) * (Real(freshness) / 8);
   return colour;
 }
 
-Colour FusionReference::unfaded(float temperature, Rgb8 visible, float baseline) const {
+Colour FusionReference::unfaded(float temperature, base::Rgb8 visible, float baseline) const {
   const std::string& method = settings_.method;
   const Colour v = {Real(visible.r), Real(visible.g), Real(visible.b)};
   if (method == "visible_only") return v;

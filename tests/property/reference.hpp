@@ -17,14 +17,14 @@ class FusionReference {
 
   /// `temperature` are all temperatures of the scene. The range is not a percentile and the hue is a number: those of a plan
   /// are held to their meaning elsewhere.
-  FusionReference(const FusionSettings& settings, const PaletteTable& palette, const TemperatureSummary& summary,
-                  std::span<const float> temperature);
+  FusionReference(const fusion::FusionSettings& settings, const fusion::PaletteTable& palette,
+                  const fusion::TemperatureSummary& summary, std::span<const float> temperature);
 
   /// `baseline` is NaN where there is none; `freshness` in eighths.
-  Colour fused(float temperature, Rgb8 visible, float baseline, std::uint8_t freshness) const;
+  Colour fused(float temperature, base::Rgb8 visible, float baseline, std::uint8_t freshness) const;
 
  private:
-  Colour unfaded(float temperature, Rgb8 visible, float baseline) const;
+  Colour unfaded(float temperature, base::Rgb8 visible, float baseline) const;
   double number(const char* name) const;
   double temperature_or(const char* name, double sigmas) const;
   bool toggle(const char* name) const;
@@ -35,9 +35,9 @@ class FusionReference {
   std::size_t bin_of(float temperature) const;
   void choose_bins(std::span<const float> temperature);
 
-  FusionSettings settings_;
-  PaletteTable palette_;
-  TemperatureSummary summary_;
+  fusion::FusionSettings settings_;
+  fusion::PaletteTable palette_;
+  fusion::TemperatureSummary summary_;
   double lo_ = 0;
   double hi_ = 0;
   std::vector<bool> chosen_bins_;

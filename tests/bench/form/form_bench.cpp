@@ -15,30 +15,29 @@
 namespace {
 
 using namespace spectra;
-using namespace spectra::server;
 
 void measure(const std::string& path, std::size_t seed_count) {
-  auto loaded = fusion::read_ply(path);
+  auto loaded = files::read_ply(path);
   const std::string name = path.substr(path.find_last_of('/') + 1);
   if (!loaded) {
     std::printf("%-30s refused\n", name.c_str());
     return;
   }
-  WorkerPool pool(2);
-  const auto scene =
-      SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, kLeafVertexCount, LevelsOfDetail::All);
+  jobs::WorkerPool pool(2);
+  const auto scene = map::SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, map::kLeafVertexCount,
+                                               map::LevelsOfDetail::All);
   std::size_t root_bytes = 0, leaf_bytes = 0, bytes = 0, uniform_bytes = 0, uniform_leaf_bytes = 0;
   for (const auto& tile : scene->tiles()) {
-    const auto geometry = encoded_tile(*tile, scene->suggested_position_step_m(), 7);
+    const auto geometry = stream::encoded_tile(*tile, scene->suggested_position_step_m(), 7);
     if (!geometry) {
       std::printf("%s: %s\n", name.c_str(), geometry.error().message.c_str());
       std::exit(1);
     }
     const std::size_t size = geometry.value().payload->size();
-    Tile uniform = *tile;
+    map::Tile uniform = *tile;
     uniform.step_halvings.clear();
     const std::size_t uniform_size =
-        encoded_tile(uniform, scene->suggested_position_step_m(), 7).value().payload->size();
+        stream::encoded_tile(uniform, scene->suggested_position_step_m(), 7).value().payload->size();
     bytes += size;
     uniform_bytes += uniform_size;
     if (tile->child_mask == 0) {
@@ -47,7 +46,7 @@ void measure(const std::string& path, std::size_t seed_count) {
     }
     if (tile->id.level == 0) root_bytes += size;
   }
-  const testing::FormReport form = testing::form_of(*scene, seed_count);
+  const stream::testing::FormReport form = stream::testing::form_of(*scene, seed_count);
   std::printf(
       "%-30s step %-11.6g geometry: leaves %8zu (%.3f of one step) all %8zu (%.3f) root %6zu | pieces %5zu: flattened "
       "%zu, "

@@ -23,7 +23,7 @@ namespace {
 struct Run {
   const char* what;
   const char* method;
-  ParameterValues params;
+  fusion::ParameterValues params;
   const char* palette = "iron";
   float low = 15;
   float high = 40;
@@ -37,25 +37,25 @@ struct Seen {
   double worst_ciede2000 = 0;   ///< From the exact answer rounded.
 };
 
-Seen compare(const Run& run, const std::vector<float>& temperature, const std::vector<Rgb8>& visible) {
-  FusionChange change;
+Seen compare(const Run& run, const std::vector<float>& temperature, const std::vector<base::Rgb8>& visible) {
+  fusion::FusionChange change;
   change.method = run.method;
   change.params = run.params;
-  const FusionSettings settings = with_change(default_settings(), change).value();
-  const PaletteTable& palette = find_palette(run.palette)->table;
-  TemperatureAccumulator accumulator;
+  const fusion::FusionSettings settings = fusion::with_change(fusion::default_settings(), change).value();
+  const fusion::PaletteTable& palette = fusion::find_palette(run.palette)->table;
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(temperature);
-  SceneTemperature facts;
+  fusion::SceneTemperature facts;
   facts.summary = accumulator.summary();
   facts.histogram = [&](std::uint32_t bins) {
-    Histogram histogram{facts.summary.minimum, facts.summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(temperature, histogram);
+    fusion::Histogram histogram{facts.summary.minimum, facts.summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(temperature, histogram);
     return histogram;
   };
-  std::vector<Rgb8> fused(temperature.size());
+  std::vector<base::Rgb8> fused(temperature.size());
   // Half of all changes are beyond a span of 5 K.
   const std::vector<float> baseline(temperature.size(), 27.5F);
-  FusionPlan::prepare(settings, facts, palette).value().fuse({temperature, visible, baseline}, fused);
+  fusion::FusionPlan::prepare(settings, facts, palette).value().fuse({temperature, visible, baseline}, fused);
   const test::FusionReference reference(settings, palette, facts.summary, temperature);
   Seen seen;
   for (std::size_t i = 0; i < fused.size(); ++i) {
@@ -73,14 +73,15 @@ Seen compare(const Run& run, const std::vector<float>& temperature, const std::v
       differs = true;
     }
     if (differs) {
-      const double apart = ciede2000(lab_of(fused[i]), lab_of(Rgb8{rounded[0], rounded[1], rounded[2]}));
+      const double apart =
+          fusion::ciede2000(fusion::lab_of(fused[i]), fusion::lab_of(base::Rgb8{rounded[0], rounded[1], rounded[2]}));
       seen.worst_ciede2000 = std::max(seen.worst_ciede2000, apart);
     }
   }
   return seen;
 }
 
-bool report(const Run& run, const std::vector<float>& temperature, const std::vector<Rgb8>& visible) {
+bool report(const Run& run, const std::vector<float>& temperature, const std::vector<base::Rgb8>& visible) {
   const Seen seen = compare(run, temperature, visible);
   std::printf("| %-24s | %-34s | %-13s | %9zu | %.5f | %7zu | %6zu | %.2f |\n", run.method, run.what, run.palette,
               temperature.size(), seen.worst_levels, seen.other_level, seen.broken, seen.worst_ciede2000);
@@ -134,7 +135,7 @@ bool report_statistics(std::size_t count) {
   std::vector<float> block(kBlock);
   std::mt19937 engine(7);
   std::normal_distribution<float> kelvin(300.0F, 0.05F);
-  TemperatureAccumulator accumulator;
+  fusion::TemperatureAccumulator accumulator;
   // Shifted by 300 the float32 values are small and exact in extended precision.
   long double sum = 0;
   long double squares = 0;
@@ -146,14 +147,14 @@ bool report_statistics(std::size_t count) {
       sum += above;
       squares += above * above;
     }
-    TemperatureAccumulator part;
+    fusion::TemperatureAccumulator part;
     part.add(block);
     accumulator.merge(part);
   }
   const auto n = static_cast<long double>(done);
   const long double mean = 300.0L + sum / n;
   const long double sigma = std::sqrt(squares / n - (sum / n) * (sum / n));
-  const TemperatureSummary summary = accumulator.summary();
+  const fusion::TemperatureSummary summary = accumulator.summary();
   const auto mean_error = static_cast<double>(std::fabs(static_cast<long double>(summary.mean) / mean - 1));
   const auto sigma_error = static_cast<double>(std::fabs(static_cast<long double>(summary.sigma) / sigma - 1));
   std::printf("\n%zu values: relative error of the mean %.1e, of sigma %.1e\n", done, mean_error, sigma_error);
@@ -165,8 +166,8 @@ int run_all(std::size_t count, const std::string& only) {
   std::printf("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
   bool good = true;
   std::mt19937 engine(2026);
-  std::vector<Rgb8> visible(count);
-  for (Rgb8& colour : visible) {
+  std::vector<base::Rgb8> visible(count);
+  for (base::Rgb8& colour : visible) {
     const auto bits = static_cast<std::uint32_t>(engine());
     colour = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
               static_cast<std::uint8_t>(bits >> 16)};

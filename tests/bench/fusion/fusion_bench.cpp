@@ -37,18 +37,18 @@ Scene make_scene(std::size_t count) {
     scene.visible[i] = {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
                         static_cast<std::uint8_t>(bits >> 16)};
   }
-  TemperatureAccumulator accumulator;
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(scene.temperature);
   scene.summary = accumulator.summary();
-  Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(64)};
-  add_to_histogram(scene.temperature, histogram);
+  fusion::Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(64)};
+  fusion::add_to_histogram(scene.temperature, histogram);
   scene.counts = histogram.counts;
   return scene;
 }
 
 /// Settings that make a method work: thresholds in the middle of the range, half of the bins, a fractional power.
-FusionSettings working_settings(const std::string& method) {
-  FusionChange change;
+fusion::FusionSettings working_settings(const std::string& method) {
+  fusion::FusionChange change;
   change.method = method;
   change.palette = "inferno";
   if (method == "thermal_visible_blend") change.params["alpha"] = 0.3;
@@ -59,7 +59,7 @@ FusionSettings working_settings(const std::string& method) {
   if (method == "histogram_bin") change.params["n"] = std::int64_t{32};
   if (method == "histogram_distribution") change.params["k"] = 1.0;
   if (method == "thermal_change") change.params["threshold"] = 1.0;
-  return with_change(default_settings(), change).value();
+  return fusion::with_change(fusion::default_settings(), change).value();
 }
 
 /// Seconds of this thread's own, so that a busy machine does not count.
@@ -93,7 +93,7 @@ struct Difference {
   std::size_t channels = 0;
 };
 
-Difference difference(std::span<const Rgb8> a, std::span<const Rgb8> b) {
+Difference difference(std::span<const base::Rgb8> a, std::span<const base::Rgb8> b) {
   Difference result;
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (const int apart : {a[i].r - b[i].r, a[i].g - b[i].g, a[i].b - b[i].b}) {
@@ -106,23 +106,23 @@ Difference difference(std::span<const Rgb8> a, std::span<const Rgb8> b) {
 
 bool run(std::size_t count, const std::vector<std::string>& wanted) {
   const Scene scene = make_scene(count);
-  const PaletteTable& palette = find_palette("inferno")->table;
-  SceneTemperature facts;
+  const fusion::PaletteTable& palette = fusion::find_palette("inferno")->table;
+  fusion::SceneTemperature facts;
   facts.summary = scene.summary;
   facts.histogram = [&scene](std::uint32_t bins) {
-    Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(scene.temperature, histogram);
+    fusion::Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(scene.temperature, histogram);
     return histogram;
   };
-  std::vector<Rgb8> fused(count), scalar(count), composed(count);
+  std::vector<base::Rgb8> fused(count), scalar(count), composed(count);
   std::vector<std::uint8_t> from(5 * count, 1), to(5 * count, 2);
   bool equal = true;
 
   std::printf("\n%zu vertices; ns per vertex\n%-24s %8s %8s %8s %8s %8s | %8s %8s %8s %8s\n", count, "method", "kernel",
               "memcpy", "double", "plain", "opencv", "/memcpy", "double/", "plain/", "opencv/");
-  for (const Method* method : all_methods()) {
+  for (const fusion::Method* method : fusion::all_methods()) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), method->id) == wanted.end()) continue;
-    const FusionPlan plan = FusionPlan::prepare(working_settings(method->id), facts, palette).value();
+    const fusion::FusionPlan plan = fusion::FusionPlan::prepare(working_settings(method->id), facts, palette).value();
     const Loop as_double = scalar_double_loop(scene, plan, palette);
     const Loop plain = plain_float_blend(scene, plan, palette);
     const Loop opencv = opencv_composition(scene, plan, palette);
@@ -138,7 +138,7 @@ bool run(std::size_t count, const std::vector<std::string>& wanted) {
         continue;
       }
     }
-    const auto call = [](const Loop& loop, std::vector<Rgb8>& out) -> std::function<void()> {
+    const auto call = [](const Loop& loop, std::vector<base::Rgb8>& out) -> std::function<void()> {
       if (!loop) return {};
       return [&loop, &out] { loop(out); };
     };
@@ -172,16 +172,16 @@ bool run(std::size_t count, const std::vector<std::string>& wanted) {
     std::printf("\n");
     std::fflush(stdout);
   }
-  const auto best =
-      best_times({[&] {
-                    Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(64)};
-                    add_to_histogram(scene.temperature, histogram);
-                  },
-                  [&] {
-                    TemperatureAccumulator accumulator;
-                    accumulator.add(scene.temperature);
-                  }},
-                 count);
+  const auto best = best_times(
+      {[&] {
+         fusion::Histogram histogram{scene.summary.minimum, scene.summary.maximum, std::vector<std::uint64_t>(64)};
+         fusion::add_to_histogram(scene.temperature, histogram);
+       },
+       [&] {
+         fusion::TemperatureAccumulator accumulator;
+         accumulator.add(scene.temperature);
+       }},
+      count);
   std::printf("histogram of 64 bins %.3f, summary %.3f\n", best[0] * 1e9 / static_cast<double>(count),
               best[1] * 1e9 / static_cast<double>(count));
   return equal;

@@ -9,7 +9,7 @@ namespace spectra::fusion::bench {
 namespace {
 
 /// The palette as applyColorMap wants it. The order of channels is left as it is, here and everywhere below.
-cv::Mat colour_map(const PaletteTable& palette) {
+cv::Mat colour_map(const fusion::PaletteTable& palette) {
   cv::Mat map(256, 1, CV_8UC3);
   for (int row = 0; row < 256; ++row) {
     const auto& colour = palette[static_cast<std::size_t>(row)];
@@ -27,10 +27,10 @@ struct Work {
 
 }  // namespace
 
-Loop opencv_composition(const Scene& scene, const FusionPlan& plan, const PaletteTable& palette) {
+Loop opencv_composition(const Scene& scene, const fusion::FusionPlan& plan, const fusion::PaletteTable& palette) {
   cv::setNumThreads(1);
   const std::string method = plan.settings().method;
-  const ParameterValues& params = plan.params_in_force();
+  const fusion::ParameterValues& params = plan.params_in_force();
   const auto number = [&params](const char* name) {
     const auto found = params.find(name);
     return found != params.end() && std::holds_alternative<double>(found->second) ? std::get<double>(found->second)
@@ -49,12 +49,12 @@ Loop opencv_composition(const Scene& scene, const FusionPlan& plan, const Palett
   const double k = number("k");
   const double lower = scene.summary.mean - k * scene.summary.sigma;
   const double upper = scene.summary.mean + k * scene.summary.sigma;
-  return [=, &scene](std::span<Rgb8> fused) {
+  return [=, &scene](std::span<base::Rgb8> fused) {
     Work& w = *work;
     const int count = static_cast<int>(fused.size());
     // OpenCV has no view of constant data; nothing below writes to these two.
     const cv::Mat temperature(count, 1, CV_32F, const_cast<float*>(scene.temperature.data()));
-    const cv::Mat visible(count, 1, CV_8UC3, const_cast<Rgb8*>(scene.visible.data()));
+    const cv::Mat visible(count, 1, CV_8UC3, const_cast<base::Rgb8*>(scene.visible.data()));
     cv::Mat out(count, 1, CV_8UC3, fused.data());
     temperature.convertTo(w.level, CV_8U, scale, offset);
     if (method == "thermal_only") {

@@ -9,7 +9,7 @@ namespace {
 
 using Colour = std::array<double, 3>;
 
-Rgb8 rounded(const Colour& colour) {
+base::Rgb8 rounded(const Colour& colour) {
   const auto level = [](double value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0) + 0.5); };
   return {level(colour[0]), level(colour[1]), level(colour[2])};
 }
@@ -20,11 +20,11 @@ Colour mixed(double a, const Colour& over, const Colour& under) {
 
 /// The loop around a per-vertex function of temperature, t and visible colour.
 template <class Shade>
-Loop loop(const Scene& scene, const FusionPlan& plan, Shade shade) {
-  return [&scene, lo = plan.range_minimum(), hi = plan.range_maximum(), shade](std::span<Rgb8> fused) {
+Loop loop(const Scene& scene, const fusion::FusionPlan& plan, Shade shade) {
+  return [&scene, lo = plan.range_minimum(), hi = plan.range_maximum(), shade](std::span<base::Rgb8> fused) {
     for (std::size_t i = 0; i < fused.size(); ++i) {
       const float temperature = scene.temperature[i];
-      const Rgb8 v = scene.visible[i];
+      const base::Rgb8 v = scene.visible[i];
       if (!std::isfinite(temperature)) {
         fused[i] = v;
         continue;
@@ -37,11 +37,11 @@ Loop loop(const Scene& scene, const FusionPlan& plan, Shade shade) {
 
 }  // namespace
 
-Loop scalar_double_loop(const Scene& scene, const FusionPlan& plan, const PaletteTable& palette) {
+Loop scalar_double_loop(const Scene& scene, const fusion::FusionPlan& plan, const fusion::PaletteTable& palette) {
   const std::string& method = plan.settings().method;
-  const ParameterValues& params = plan.params_in_force();
+  const fusion::ParameterValues& params = plan.params_in_force();
   const auto number = [&params](const char* name) { return std::get<double>(params.at(name)); };
-  const auto thermal = [&palette](double t) { return palette_colour(palette, t); };
+  const auto thermal = [&palette](double t) { return fusion::palette_colour(palette, t); };
   if (method == "thermal_only") {
     return loop(scene, plan, [=](float, double t, const Colour&) { return thermal(t); });
   }
@@ -128,10 +128,10 @@ Loop scalar_double_loop(const Scene& scene, const FusionPlan& plan, const Palett
   if (method == "thermal_change") {
     const double span = number("span");
     return [&scene, thermal, span, a = number("alpha"),
-            limit = static_cast<float>(number("threshold"))](std::span<Rgb8> fused) {
+            limit = static_cast<float>(number("threshold"))](std::span<base::Rgb8> fused) {
       for (std::size_t i = 0; i < fused.size(); ++i) {
         const float change = scene.temperature[i] - scene.baseline[i];
-        const Rgb8 v = scene.visible[i];
+        const base::Rgb8 v = scene.visible[i];
         const Colour visible{double(v.r), double(v.g), double(v.b)};
         const double t = std::clamp((double{change} / span + 1) / 2, 0.0, 1.0);
         fused[i] = std::abs(change) > limit ? rounded(mixed(a, thermal(t), visible)) : v;
@@ -141,7 +141,7 @@ Loop scalar_double_loop(const Scene& scene, const FusionPlan& plan, const Palett
   return {};
 }
 
-Loop plain_float_blend(const Scene& scene, const FusionPlan& plan, const PaletteTable& palette) {
+Loop plain_float_blend(const Scene& scene, const fusion::FusionPlan& plan, const fusion::PaletteTable& palette) {
   if (plan.settings().method != "thermal_visible_blend") return {};
   std::vector<std::array<float, 3>> rows;
   for (const auto& row : palette) {
@@ -149,10 +149,10 @@ Loop plain_float_blend(const Scene& scene, const FusionPlan& plan, const Palette
   }
   return [&scene, rows, lo = static_cast<float>(plan.range_minimum()),
           scale = static_cast<float>(255 / (plan.range_maximum() - plan.range_minimum())),
-          a = static_cast<float>(std::get<double>(plan.params_in_force().at("alpha")))](std::span<Rgb8> fused) {
+          a = static_cast<float>(std::get<double>(plan.params_in_force().at("alpha")))](std::span<base::Rgb8> fused) {
     for (std::size_t i = 0; i < fused.size(); ++i) {
       const float temperature = scene.temperature[i];
-      const Rgb8 v = scene.visible[i];
+      const base::Rgb8 v = scene.visible[i];
       if (!std::isfinite(temperature)) {
         fused[i] = v;
         continue;

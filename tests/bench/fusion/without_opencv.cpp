@@ -2,7 +2,7 @@
 
 namespace spectra::fusion::bench {
 
-Loop opencv_composition(const Scene&, const FusionPlan&, const PaletteTable&) {
+Loop opencv_composition(const Scene&, const fusion::FusionPlan&, const fusion::PaletteTable&) {
   return {};
 }
 

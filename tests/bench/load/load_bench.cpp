@@ -84,36 +84,36 @@ std::optional<Measurement> measured(const std::function<std::function<MeshSums()
   return is_read && status == 0 ? std::optional(result) : std::nullopt;
 }
 
-MeshSums sums_of(const fusion::MultispectralMesh& mesh) {
+MeshSums sums_of(const mesh::MultispectralMesh& mesh) {
   MeshSums sums;
   sums.vertex_count = mesh.vertex_count();
   sums.triangle_count = mesh.triangle_count();
-  for (const fusion::Vec3f& p : mesh.positions()) {
+  for (const base::Vec3f& p : mesh.positions()) {
     sums.position_sum += static_cast<double>(p.x) + static_cast<double>(p.y) + static_cast<double>(p.z);
   }
-  for (const fusion::Rgb8& colour : mesh.visible()) sums.colour_sum += std::uint64_t{colour.r} + colour.g + colour.b;
+  for (const base::Rgb8& colour : mesh.visible()) sums.colour_sum += std::uint64_t{colour.r} + colour.g + colour.b;
   for (const auto& [a, b, c] : mesh.triangles()) sums.index_sum += std::uint64_t{a} + b + c;
   return sums;
 }
 
 std::function<MeshSums()> read_with_spectra(const std::string& path) {
-  auto scene = fusion::read_ply(path);
+  auto scene = files::read_ply(path);
   if (!scene) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());
     ::_exit(1);
   }
-  auto mesh = std::make_shared<fusion::MultispectralMesh>(std::move(scene.value().mesh));
+  auto mesh = std::make_shared<mesh::MultispectralMesh>(std::move(scene.value().mesh));
   return [mesh] { return sums_of(*mesh); };
 }
 
 std::function<MeshSums()> read_and_tile(const std::string& path) {
-  auto scene = fusion::read_ply(path);
+  auto scene = files::read_ply(path);
   if (!scene) {
     std::fprintf(stderr, "%s\n", scene.error().message.c_str());
     ::_exit(1);
   }
-  server::WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
-  const auto snapshot = server::SceneSnapshot::build(std::move(scene.value().mesh), 1, pool);
+  jobs::WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));
+  const auto snapshot = map::SceneSnapshot::build(std::move(scene.value().mesh), 1, pool);
   return [snapshot] {
     MeshSums sums;
     sums.vertex_count = snapshot->vertex_count();
@@ -153,7 +153,7 @@ std::function<MeshSums()> read_with_openmesh(const std::string& path) {
 /// A wavy sheet of 1000 x 1000 vertices.
 bool generate_scene(const std::filesystem::path& path) {
   constexpr std::uint32_t kSide = 1000;
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(std::size_t{kSide} * kSide);
   mesh.has_temperature = true;
   for (std::uint32_t v = 0; v < kSide * kSide; ++v) {
@@ -171,7 +171,7 @@ bool generate_scene(const std::filesystem::path& path) {
       mesh.triangles().push_back({v + 1, v + kSide + 1, v + kSide});
     }
   }
-  return fusion::write_ply(path, mesh, mesh.visible()).has_value();
+  return files::write_ply(path, mesh, mesh.visible()).has_value();
 }
 
 struct Job {

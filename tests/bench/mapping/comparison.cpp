@@ -15,18 +15,18 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
-Comparison compare(const UnitMesh& mesh, const fusion::MultispectralMesh& truth) {
+Comparison compare(const mapping::UnitMesh& mesh, const mesh::MultispectralMesh& truth) {
   constexpr double kFarthest = 0.5, kSameSurface = 0.05, kWarm = 25;
-  const fusion::NearestSurface surface(truth.positions(), truth.triangles());
+  const mesh::NearestSurface surface(truth.positions(), truth.triangles());
   Comparison found;
   found.vertices = mesh.positions.size();
   std::vector<double> distances, differences, absolute, warm, sigmas;
   std::size_t within = 0;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const fusion::Vec3f& p = mesh.positions[i];
-    const fusion::Vec3f at{static_cast<float>(static_cast<double>(p.x) - truth.origin.x),
-                           static_cast<float>(static_cast<double>(p.y) - truth.origin.y),
-                           static_cast<float>(static_cast<double>(p.z) - truth.origin.z)};
+    const base::Vec3f& p = mesh.positions[i];
+    const base::Vec3f at{static_cast<float>(static_cast<double>(p.x) - truth.origin.x),
+                         static_cast<float>(static_cast<double>(p.y) - truth.origin.y),
+                         static_cast<float>(static_cast<double>(p.z) - truth.origin.z)};
     const auto hit = surface.find(at, kFarthest);
     distances.push_back(hit ? hit->distance : kFarthest);
     if (!hit || hit->distance > kSameSurface || std::isnan(mesh.celsius[i])) continue;

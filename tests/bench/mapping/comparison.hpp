@@ -24,7 +24,7 @@ struct Comparison {
 
 /// Compares every vertex with the nearest point of the truth, at most half a metre away; farther ones count as half a metre. Temperatures of
 /// vertices beyond 5 cm count in nothing.
-Comparison compare(const UnitMesh& mesh, const fusion::MultispectralMesh& truth);
+Comparison compare(const mapping::UnitMesh& mesh, const mesh::MultispectralMesh& truth);
 
 /// Median, for example, is 0.5. 0 of nothing.
 double quantile(std::vector<double> values, double share);

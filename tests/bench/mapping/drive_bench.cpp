@@ -19,7 +19,7 @@ using namespace spectra;
 using namespace spectra::mapping;
 
 int main(int argc, char** argv) {
-  DriveOptions options;
+  mapping::DriveOptions options;
   double voxel_m = 0.01;
   bool with_rules = false, is_checked = false, is_good = true;
   for (int i = 1; i < argc; ++i) {
@@ -37,17 +37,17 @@ int main(int argc, char** argv) {
     else if (std::strcmp(argv[i], "--rules") == 0)
       with_rules = true;
   }
-  const SimulatedDrive drive(options);
-  server::WorkerPool pool(1);
-  std::vector<Frame> frames(drive.frame_count());
+  const mapping::SimulatedDrive drive(options);
+  jobs::WorkerPool pool(1);
+  std::vector<mapping::Frame> frames(drive.frame_count());
   pool.for_each(frames.size(), [&](std::size_t i) { frames[i] = drive.frame(i); });
 
-  const auto run = [&](const char* name, const std::function<void(MapperSettings&)>& change) {
-    MapperSettings settings;
+  const auto run = [&](const char* name, const std::function<void(mapping::MapperSettings&)>& change) {
+    mapping::MapperSettings settings;
     settings.voxel_m = voxel_m;
     change(settings);
-    Mapper mapper(drive.calibration(), settings, pool);
-    FaultLog faults;
+    mapping::Mapper mapper(drive.calibration(), settings, pool);
+    mapping::FaultLog faults;
     std::vector<double> depth_ms, heat_ms;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const double begin = bench::cpu_ms();
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
       (drive.is_thermal(i) ? heat_ms : depth_ms).push_back(bench::cpu_ms() - begin);
     }
     const double begin = bench::cpu_ms();
-    const UnitMesh mesh = mapper.whole_mesh();
+    const mapping::UnitMesh mesh = mapper.whole_mesh();
     const double mesh_ms = bench::cpu_ms() - begin;
     const Comparison found = compare(mesh, drive.truth());
     print(name, found);
@@ -67,25 +67,26 @@ int main(int argc, char** argv) {
         "ms, %.1f bytes a voxel, %zu "
         "blocks\n",
         quantile(depth_ms, 0.5), quantile(depth_ms, 0.95), quantile(heat_ms, 0.5), quantile(heat_ms, 0.95), mesh_ms,
-        static_cast<double>(mapper.map().size_bytes()) / static_cast<double>(mapper.map().block_count() * kBlockVoxels),
+        static_cast<double>(mapper.map().size_bytes()) /
+            static_cast<double>(mapper.map().block_count() * mapping::kBlockVoxels),
         mapper.map().block_count());
-    for (const FrameFault& fault : faults.all()) {
+    for (const mapping::FrameFault& fault : faults.all()) {
       if (fault.count > 0) std::printf("  %s (%zu times)\n", fault.what.c_str(), fault.count);
     }
   };
   print_head();
-  run("all", [](MapperSettings&) {});
+  run("all", [](mapping::MapperSettings&) {});
   if (!with_rules) return is_checked && !is_good ? 1 : 0;
-  run("plain mean", [](MapperSettings& s) {
-    HeatRules& r = s.heat;
+  run("plain mean", [](mapping::MapperSettings& s) {
+    mapping::HeatRules& r = s.heat;
     r.occlusion = r.edges = r.angle = r.weights = r.frame_offset = r.shutter = false;
     r.process_kelvin = 0;
   });
-  run("without occlusion", [](MapperSettings& s) { s.heat.occlusion = false; });
-  run("without edges", [](MapperSettings& s) { s.heat.edges = false; });
-  run("without angle", [](MapperSettings& s) { s.heat.angle = false; });
-  run("without weights", [](MapperSettings& s) { s.heat.weights = false; });
-  run("without offset", [](MapperSettings& s) { s.heat.frame_offset = false; });
-  run("without shutter", [](MapperSettings& s) { s.heat.shutter = false; });
+  run("without occlusion", [](mapping::MapperSettings& s) { s.heat.occlusion = false; });
+  run("without edges", [](mapping::MapperSettings& s) { s.heat.edges = false; });
+  run("without angle", [](mapping::MapperSettings& s) { s.heat.angle = false; });
+  run("without weights", [](mapping::MapperSettings& s) { s.heat.weights = false; });
+  run("without offset", [](mapping::MapperSettings& s) { s.heat.frame_offset = false; });
+  run("without shutter", [](mapping::MapperSettings& s) { s.heat.shutter = false; });
   return 0;
 }

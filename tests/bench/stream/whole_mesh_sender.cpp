@@ -29,7 +29,7 @@ using namespace spectra;
 
 constexpr int kSpeed = 7;
 
-fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
+fusion::SceneTemperature temperature_of(const mesh::MultispectralMesh& mesh) {
   fusion::TemperatureAccumulator accumulator;
   accumulator.add(mesh.temperature_celsius());
   fusion::SceneTemperature temperature;
@@ -38,12 +38,12 @@ fusion::SceneTemperature temperature_of(const fusion::MultispectralMesh& mesh) {
 }
 
 /// The mesh with its positions; colours are written into its second attribute before each encoding.
-std::unique_ptr<draco::Mesh> draco_mesh(const fusion::MultispectralMesh& mesh) {
+std::unique_ptr<draco::Mesh> draco_mesh(const mesh::MultispectralMesh& mesh) {
   auto result = std::make_unique<draco::Mesh>();
   const auto count = static_cast<std::uint32_t>(mesh.vertex_count());
   result->set_num_points(count);
   draco::GeometryAttribute position;
-  position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false, sizeof(fusion::Vec3f), 0);
+  position.Init(draco::GeometryAttribute::POSITION, nullptr, 3, draco::DT_FLOAT32, false, sizeof(base::Vec3f), 0);
   draco::GeometryAttribute colour;
   colour.Init(draco::GeometryAttribute::COLOR, nullptr, 3, draco::DT_UINT8, true, 3, 0);
   const int position_id = result->AddAttribute(position, true, count);
@@ -53,7 +53,7 @@ std::unique_ptr<draco::Mesh> draco_mesh(const fusion::MultispectralMesh& mesh) {
   }
   result->SetNumFaces(mesh.triangle_count());
   for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
-    const fusion::Triangle& t = mesh.triangles()[i];
+    const base::Triangle& t = mesh.triangles()[i];
     result->SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
   }
   return result;
@@ -86,15 +86,15 @@ int listening_socket() {
 
 int main(int argument_count, char** arguments) {
   if (argument_count != 3) return 2;
-  const auto scene = fusion::read_ply(arguments[1]);
+  const auto scene = files::read_ply(arguments[1]);
   const double step = std::atof(arguments[2]);
   if (!scene || !(step > 0)) return 1;
-  const fusion::MultispectralMesh& mesh = scene.value().mesh;
+  const mesh::MultispectralMesh& mesh = scene.value().mesh;
   const fusion::SceneTemperature temperature = temperature_of(mesh);
   const std::unique_ptr<draco::Mesh> encoded_mesh = draco_mesh(mesh);
 
-  fusion::Vec3f low = mesh.positions()[0], high = low;
-  for (const fusion::Vec3f& p : mesh.positions()) {
+  base::Vec3f low = mesh.positions()[0], high = low;
+  for (const base::Vec3f& p : mesh.positions()) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
@@ -118,9 +118,9 @@ int main(int argument_count, char** arguments) {
     const auto settings = fusion::with_change(fusion::default_settings(), change);
     if (!settings) return 1;
     const auto plan = fusion::FusionPlan::prepare(settings.value(), temperature);
-    std::vector<fusion::Rgb8> fused(mesh.vertex_count());
+    std::vector<base::Rgb8> fused(mesh.vertex_count());
     plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
-    std::memcpy(encoded_mesh->attribute(1)->buffer()->data(), fused.data(), fused.size() * sizeof(fusion::Rgb8));
+    std::memcpy(encoded_mesh->attribute(1)->buffer()->data(), fused.data(), fused.size() * sizeof(base::Rgb8));
 
     draco::ExpertEncoder encoder(*encoded_mesh);
     encoder.SetSpeedOptions(kSpeed, kSpeed);

@@ -32,7 +32,6 @@
 namespace {
 
 using namespace spectra;
-using namespace spectra::server;
 using bench::cpu_ms;
 
 struct Options {
@@ -63,12 +62,12 @@ double resident_bytes() {
   return resident * 4096;
 }
 
-fusion::MultispectralMesh input(const Options& options) {
+mesh::MultispectralMesh input(const Options& options) {
   if (options.path.empty()) {
     const auto side = static_cast<std::uint32_t>(std::lround(std::sqrt(options.vertex_count)));
     return testing::terrain({.columns = side, .rows = side, .is_shuffled = !options.is_ordered});
   }
-  auto loaded = fusion::read_ply(options.path);
+  auto loaded = files::read_ply(options.path);
   if (!loaded) {
     std::fprintf(stderr, "%s\n", loaded.error().message.c_str());
     std::exit(1);
@@ -76,16 +75,16 @@ fusion::MultispectralMesh input(const Options& options) {
   return std::move(loaded.value().mesh);
 }
 
-Times simplify_whole_mesh(const fusion::MultispectralMesh& mesh) {
+Times simplify_whole_mesh(const mesh::MultispectralMesh& mesh) {
   std::vector<unsigned> indices(3 * mesh.triangle_count());
   return timed([&] {
     meshopt_simplify(indices.data(), mesh.triangles()[0].data(), indices.size(), &mesh.positions()[0].x,
-                     mesh.vertex_count(), sizeof(fusion::Vec3f), indices.size() / 4, 1, meshopt_SimplifyLockBorder,
+                     mesh.vertex_count(), sizeof(base::Vec3f), indices.size() / 4, 1, meshopt_SimplifyLockBorder,
                      nullptr);
   });
 }
 
-void print_levels(const SceneSnapshot& scene) {
+void print_levels(const map::SceneSnapshot& scene) {
   std::printf("\n%-6s %6s %10s %10s %10s   %-27s %-22s %-23s %s\n", "level", "tiles", "vertices", "largest",
               "triangles", "geometric error, m", "colour error, levels", "temperature error, degC", "lost detail, m");
   for (int level = 0; level < scene.level_count(); ++level) {
@@ -114,20 +113,20 @@ void print_levels(const SceneSnapshot& scene) {
   }
 }
 
-void print_wire_bytes(const SceneSnapshot& scene) {
-  const float step = lattice_step(static_cast<double>(scene.suggested_position_step_m()));
+void print_wire_bytes(const map::SceneSnapshot& scene) {
+  const float step = stream::lattice_step(static_cast<double>(scene.suggested_position_step_m()));
   auto settings = fusion::default_settings();
   const auto plan = fusion::FusionPlan::prepare(settings, scene.temperature()).value();
   std::size_t coarse_bytes = 0, leaf_bytes = 0;
-  std::map<const Tile*, std::size_t> bytes_of;
+  std::map<const map::Tile*, std::size_t> bytes_of;
   for (const auto& tile : scene.tiles()) {
-    const auto geometry = encoded_tile(*tile, step, 7);
+    const auto geometry = stream::encoded_tile(*tile, step, 7);
     if (!geometry) {
       std::fprintf(stderr, "a tile of level %d cannot be encoded: %s\n", int{tile->id.level},
                    geometry.error().message.c_str());
       std::exit(1);
     }
-    const auto colours = encoded_tile_colours(*tile, geometry.value(), plan, {}, 8, 7).value();
+    const auto colours = stream::encoded_tile_colours(*tile, geometry.value(), plan, {}, 8, 7).value();
     const std::size_t bytes = geometry.value().payload->size() + colours->size();
     if (tile->id.level == 0) {
       std::printf("\nroot on the wire (step %g m, speed 7, 8-bit colours): geometry %zu + colours %zu = %zu bytes\n",
@@ -140,15 +139,15 @@ void print_wire_bytes(const SceneSnapshot& scene) {
               static_cast<double>(coarse_bytes) / static_cast<double>(leaf_bytes));
 
   // What a viewer holds who looks at the whole scene from the front, a third from above.
-  const ViewTree tree(scene);
+  const stream::ViewTree tree(scene);
   const auto& [low, high] = scene.bounds();
-  const fusion::Vec3f centre{(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
-  const float radius = static_cast<float>(std::sqrt(squared_distance(low, high)) / 2);
+  const base::Vec3f centre{(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
+  const float radius = static_cast<float>(std::sqrt(mesh::squared_distance(low, high)) / 2);
   for (const auto& viewport : {std::array{900, 640}, std::array{1920, 1080}}) {
-    const fusion::Vec3f eye{centre.x, centre.y + 0.7f * radius, centre.z + 1.5f * radius};
-    const Camera camera{.eye = eye, .target = centre, .up = {0, 1, 0}, .viewport = viewport};
+    const base::Vec3f eye{centre.x, centre.y + 0.7f * radius, centre.z + 1.5f * radius};
+    const stream::Camera camera{.eye = eye, .target = centre, .up = {0, 1, 0}, .viewport = viewport};
     std::size_t bytes = 0, drawn = 0;
-    for (const SelectedTile& tile : selected_tiles(tree, camera, 1)) {
+    for (const stream::SelectedTile& tile : stream::selected_tiles(tree, camera, 1)) {
       bytes += bytes_of.at(tree.nodes()[tile.node].tile.get());
       if (tile.is_target) drawn += tree.nodes()[tile.node].tile->positions.size();
     }
@@ -157,12 +156,12 @@ void print_wire_bytes(const SceneSnapshot& scene) {
 }
 
 void run(const Options& options) {
-  WorkerPool pool(options.thread_count);
-  std::shared_ptr<const SceneSnapshot> scene;
+  jobs::WorkerPool pool(options.thread_count);
+  std::shared_ptr<const map::SceneSnapshot> scene;
   for (int round = 0; round < options.round_count; ++round) {
     scene.reset();
     const double before = resident_bytes();
-    std::optional<fusion::MultispectralMesh> mesh(input(options));
+    std::optional<mesh::MultispectralMesh> mesh(input(options));
     const auto count = static_cast<double>(mesh->vertex_count());
     std::printf("%.0f vertices, %zu triangles, %u threads\n", count, mesh->triangle_count(), options.thread_count);
     Times single;
@@ -172,7 +171,7 @@ void run(const Options& options) {
                   single.cpu_ms);
     }
     const Times tree =
-        timed([&] { scene = SceneSnapshot::build(std::move(*mesh), 1, pool, 32'000, LevelsOfDetail::All); });
+        timed([&] { scene = map::SceneSnapshot::build(std::move(*mesh), 1, pool, 32'000, map::LevelsOfDetail::All); });
     std::printf("%-42s %8.0f ms, processors %8.0f ms\n", "cut, statistics and tile tree", tree.wall_ms, tree.cpu_ms);
     if (single.wall_ms > 0) {
       std::printf("ratio %.2f (processors %.2f)\n", tree.wall_ms / single.wall_ms, tree.cpu_ms / single.cpu_ms);

@@ -17,7 +17,6 @@
 namespace {
 
 using namespace spectra;
-using namespace spectra::server;
 using bench::cpu_ms;
 
 double median(std::vector<double> values) {
@@ -27,10 +26,10 @@ double median(std::vector<double> values) {
 }
 
 /// A bumpy patch of 10,000 vertices, `extent` metres wide around `middle`.
-BlockPut patch(const fusion::Vec3f& middle, float extent, float celsius) {
+map::BlockPut patch(const base::Vec3f& middle, float extent, float celsius) {
   constexpr std::uint32_t kSide = 100;
-  BlockPut put{.id = "patch", .scene = {}, .observed_at = {}};
-  fusion::MultispectralMesh& mesh = put.scene.mesh;
+  map::BlockPut put{.id = "patch", .scene = {}, .observed_at = {}};
+  mesh::MultispectralMesh& mesh = put.scene.mesh;
   mesh.resize_vertices(std::size_t{kSide} * kSide);
   mesh.has_visible = mesh.has_temperature = true;
   for (std::uint32_t v = 0; v < kSide * kSide; ++v) {
@@ -55,19 +54,20 @@ struct Cost {
 };
 
 Cost cost_of(std::uint64_t vertex_count, int rounds) {
-  WorkerPool pool(2);
-  LivingMap map({.levels = LevelsOfDetail::All, .leaf_vertex_count = kLiveLeafVertexCount, .first_level = 12});
+  jobs::WorkerPool pool(2);
+  map::LivingMap map(
+      {.levels = map::LevelsOfDetail::All, .leaf_vertex_count = map::kLiveLeafVertexCount, .first_level = 12});
   std::uint32_t revision = 0;
-  std::vector<BlockPut> whole(1);
+  std::vector<map::BlockPut> whole(1);
   whole[0].id = "scene";
-  whole[0].scene.mesh = fusion::demo_scene({.vertex_count = vertex_count});
+  whole[0].scene.mesh = demo::demo_scene({.vertex_count = vertex_count});
   map.apply({.put = std::move(whole), .removed = {}}, ++revision, pool);
   // As dense as the scene, whose vertices are about 12 m / sqrt(their number) apart.
   const float extent = 100 * 12 / std::sqrt(static_cast<float>(vertex_count));
   std::vector<double> leaves, coarse;
   std::size_t tile_count = 0, coarse_count = 0;
   for (int round = 0; round < rounds; ++round) {
-    std::vector<BlockPut> block;
+    std::vector<map::BlockPut> block;
     block.push_back(patch({0, 1.2F, 0.5F}, extent, 24 + static_cast<float>(round % 5)));
     const double before = cpu_ms();
     tile_count = map.apply({.put = std::move(block), .removed = {}}, ++revision, pool)->tiles().size();

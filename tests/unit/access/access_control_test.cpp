@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 using Refusal = AccessControl::Refusal;
@@ -214,4 +214,4 @@ TEST(AttemptLimit, ManyAddressesTogetherAreBoundedToo) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::access

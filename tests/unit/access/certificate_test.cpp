@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 using std::chrono::days;
@@ -51,4 +51,4 @@ TEST(Certificate, HasNoFactsWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::access

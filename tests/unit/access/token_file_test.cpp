@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace spectra::server {
+namespace spectra::access {
 namespace {
 
 namespace fs = std::filesystem;
@@ -99,4 +99,4 @@ TEST(NewToken, SaysItsRoleAndIsNeverTheSame) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::access

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 TEST(RemainingTime, IsToldByTheShareThatIsDone) {
@@ -53,4 +53,4 @@ TEST(ProgressText, LeavesNothingInAFilesNameThatATerminalWouldObey) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::app

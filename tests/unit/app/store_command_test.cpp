@@ -10,7 +10,7 @@
 #include "server/app/commands.hpp"
 #include "tests/unit/store/store_fixture.hpp"
 
-namespace spectra::server {
+namespace spectra::app {
 namespace {
 
 struct Outcome {
@@ -92,4 +92,4 @@ TEST(StoreCommand, LeavesNothingBehindWhenThereIsNothingToSalvage) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::app

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 namespace {
 
 struct Input {
@@ -271,4 +271,4 @@ TEST(EncodedColours, RefusesNoColoursAndBitsThatDoNotExist) {
 }
 
 }  // namespace
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

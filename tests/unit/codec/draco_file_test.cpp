@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace spectra::protocol {
+namespace spectra::protocol::codec {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -308,4 +308,4 @@ TEST(DracoFile, RefusesASceneThatIsTooLargeForItsStep) {
 }
 
 }  // namespace
-}  // namespace spectra::protocol
+}  // namespace spectra::protocol::codec

@@ -10,16 +10,16 @@
 #include <string_view>
 #include <vector>
 
-namespace spectra::fusion {
+namespace spectra::demo {
 namespace {
 
-const MultispectralMesh& default_scene() {
-  static const MultispectralMesh scene = demo_scene({});
+const mesh::MultispectralMesh& default_scene() {
+  static const mesh::MultispectralMesh scene = demo_scene({});
   return scene;
 }
 
 /// FNV-1a over the bytes of everything in the scene.
-std::uint64_t fingerprint(const MultispectralMesh& scene) {
+std::uint64_t fingerprint(const mesh::MultispectralMesh& scene) {
   std::uint64_t hash = 0xCBF29CE484222325ULL;
   const auto take = [&hash](const void* data, std::size_t size) {
     const auto* bytes = static_cast<const unsigned char*>(data);
@@ -31,24 +31,24 @@ std::uint64_t fingerprint(const MultispectralMesh& scene) {
     const float value = std::isnan(celsius) ? -1000.0F : celsius;
     take(&value, sizeof value);
   }
-  take(scene.triangles().data(), scene.triangles().size() * sizeof(Triangle));
+  take(scene.triangles().data(), scene.triangles().size() * sizeof(base::Triangle));
   return hash;
 }
 
-float square_distance(const Vec3f& a, const Vec3f& b) {
+float square_distance(const base::Vec3f& a, const base::Vec3f& b) {
   const float dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
   return dx * dx + dy * dy + dz * dz;
 }
 
-std::size_t nearest_vertex(const MultispectralMesh& scene, const Vec3f& to) {
+std::size_t nearest_vertex(const mesh::MultispectralMesh& scene, const base::Vec3f& to) {
   const auto positions = scene.positions();
-  const auto nearest = std::min_element(positions.begin(), positions.end(), [&](const Vec3f& a, const Vec3f& b) {
-    return square_distance(a, to) < square_distance(b, to);
-  });
+  const auto nearest = std::min_element(
+      positions.begin(), positions.end(),
+      [&](const base::Vec3f& a, const base::Vec3f& b) { return square_distance(a, to) < square_distance(b, to); });
   return static_cast<std::size_t>(nearest - positions.begin());
 }
 
-Vec3f landmark_position(std::string_view name) {
+base::Vec3f landmark_position(std::string_view name) {
   for (const DemoLandmark& landmark : demo_landmarks()) {
     if (landmark.name == name) return landmark.position;
   }
@@ -63,7 +63,7 @@ double spread(std::vector<double> values) {
 }
 
 TEST(DemoScene, IsTheSameForTheSameSeed) {
-  const MultispectralMesh first = demo_scene({20'000, 7}), second = demo_scene({20'000, 7});
+  const mesh::MultispectralMesh first = demo_scene({20'000, 7}), second = demo_scene({20'000, 7});
   EXPECT_EQ(fingerprint(first), fingerprint(second));
   EXPECT_NE(fingerprint(first), fingerprint(demo_scene({20'000, 8})));
 }
@@ -86,7 +86,7 @@ TEST(DemoScene, BringsAbsurdCountsIntoItsRange) {
 }
 
 TEST(DemoScene, HasFinitePositionsInTheRoom) {
-  for (const Vec3f& p : default_scene().positions()) {
+  for (const base::Vec3f& p : default_scene().positions()) {
     ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
     ASSERT_LT(std::abs(p.x), 4.5F);
     ASSERT_LT(std::abs(p.z), 3.5F);
@@ -96,9 +96,9 @@ TEST(DemoScene, HasFinitePositionsInTheRoom) {
 }
 
 TEST(DemoScene, HasUsableTrianglesAndNoLooseVertices) {
-  const MultispectralMesh& scene = default_scene();
+  const mesh::MultispectralMesh& scene = default_scene();
   std::vector<bool> is_used(scene.vertex_count());
-  for (const Triangle& t : scene.triangles()) {
+  for (const base::Triangle& t : scene.triangles()) {
     for (const std::uint32_t v : t) {
       ASSERT_LT(v, scene.vertex_count());
       is_used[v] = true;
@@ -134,7 +134,7 @@ TEST(DemoScene, HasTheTemperaturesOfAnOfficeWithPeopleAndMachines) {
 
 TEST(DemoScene, HasItsLandmarksForEverySeed) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const MultispectralMesh scene = demo_scene({300'000, seed});
+    const mesh::MultispectralMesh scene = demo_scene({300'000, seed});
     for (const DemoLandmark& landmark : demo_landmarks()) {
       const std::size_t vertex = nearest_vertex(scene, landmark.position);
       EXPECT_LT(square_distance(scene.positions()[vertex], landmark.position), 0.02F * 0.02F) << landmark.name;
@@ -145,16 +145,16 @@ TEST(DemoScene, HasItsLandmarksForEverySeed) {
 }
 
 TEST(DemoScene, HasLetteringForTheEyeOnly) {
-  const MultispectralMesh& scene = default_scene();
+  const mesh::MultispectralMesh& scene = default_scene();
   for (const std::string_view name : {"exit_sign", "danger_sign"}) {
-    const Vec3f middle = landmark_position(name);
+    const base::Vec3f middle = landmark_position(name);
     std::vector<double> grey, celsius;
     for (std::size_t i = 0; i < scene.vertex_count(); ++i) {
-      const Vec3f& p = scene.positions()[i];
+      const base::Vec3f& p = scene.positions()[i];
       if (std::abs(p.x - middle.x) > 0.15F || std::abs(p.y - middle.y) > 0.06F || std::abs(p.z - middle.z) > 0.01F) {
         continue;
       }
-      const Rgb8& c = scene.visible()[i];
+      const base::Rgb8& c = scene.visible()[i];
       grey.push_back(0.299 * c.r + 0.587 * c.g + 0.114 * c.b);
       celsius.push_back(static_cast<double>(scene.temperature_celsius()[i]));
     }
@@ -165,14 +165,14 @@ TEST(DemoScene, HasLetteringForTheEyeOnly) {
 }
 
 TEST(DemoScene, HidesThePersonFromTheEye) {
-  const MultispectralMesh& scene = default_scene();
+  const mesh::MultispectralMesh& scene = default_scene();
   for (const std::string_view name : {"face", "hand"}) {
     const std::size_t vertex = nearest_vertex(scene, landmark_position(name));
-    const Rgb8& c = scene.visible()[vertex];
+    const base::Rgb8& c = scene.visible()[vertex];
     EXPECT_LT(std::max({c.r, c.g, c.b}) - std::min({c.r, c.g, c.b}), 60) << name << " is not dust-grey";
     EXPECT_GT(scene.temperature_celsius()[vertex], 30) << name;
   }
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::demo

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace spectra::fusion::demo {
+namespace spectra::demo {
 namespace {
 
 TEST(Lettering, HasInkOnStrokesOnly) {
@@ -43,4 +43,4 @@ TEST(Lettering, CentresALine) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion::demo
+}  // namespace spectra::demo

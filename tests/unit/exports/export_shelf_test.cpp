@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::exports {
 namespace {
 
 TEST(ExportShelf, BoundsWhatIsMadeAtATime) {
@@ -36,4 +36,4 @@ TEST(ExportShelf, MakesNoMoreWhileTooMuchIsSent) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::exports

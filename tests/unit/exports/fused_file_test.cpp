@@ -15,19 +15,19 @@
 #include "fusion/settings.hpp"
 #include "server/map/scene_store.hpp"
 
-namespace spectra::server {
+namespace spectra::exports {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-fusion::MultispectralMesh two_triangles() {
-  fusion::MultispectralMesh mesh;
+mesh::MultispectralMesh two_triangles() {
+  mesh::MultispectralMesh mesh;
   mesh.name = "two";
   mesh.has_visible = true;
   mesh.has_temperature = true;
   mesh.origin = {500'000.25, 4'000'000.5, 12};
   mesh.resize_vertices(4);
-  const std::array<fusion::Vec3f, 4> positions{{{0, 0, 0}, {1, 0, -2}, {0, 3, 0}, {1, 1, 0}}};
+  const std::array<base::Vec3f, 4> positions{{{0, 0, 0}, {1, 0, -2}, {0, 3, 0}, {1, 1, 0}}};
   const std::array<float, 4> temperatures{10, 20, kNaN, 30};
   std::copy(positions.begin(), positions.end(), mesh.positions().begin());
   std::copy(temperatures.begin(), temperatures.end(), mesh.temperature_celsius().begin());
@@ -35,7 +35,7 @@ fusion::MultispectralMesh two_triangles() {
   return mesh;
 }
 
-const std::vector<fusion::Rgb8> kColours{{1, 2, 3}, {4, 5, 6}, {250, 0, 255}, {7, 8, 9}};
+const std::vector<base::Rgb8> kColours{{1, 2, 3}, {4, 5, 6}, {250, 0, 255}, {7, 8, 9}};
 
 tinygltf::Model read_glb(const std::string& bytes) {
   tinygltf::Model model;
@@ -83,15 +83,15 @@ TEST(GlbFile, HoldsPositionsColoursTemperaturesAndTriangles) {
                                         65535}));
   EXPECT_TRUE(model.accessors[static_cast<std::size_t>(primitive.attributes.at("COLOR_0"))].normalized);
   EXPECT_EQ(values_of<float>(model, primitive.attributes.at("_TEMPERATURE"), 1),
-            (std::vector<float>{10, 20, kGlbMissingCelsius, 30}));
+            (std::vector<float>{10, 20, files::kGlbMissingCelsius, 30}));
   EXPECT_EQ(values_of<std::uint32_t>(model, primitive.indices, 1), (std::vector<std::uint32_t>{0, 1, 2, 1, 3, 2}));
   EXPECT_EQ(model.nodes.at(0).translation, (std::vector<double>{500'000.25, 12, -4'000'000.5}));
 }
 
 TEST(GlbFile, GivesEveryColourBackToAViewerThatEncodesItForTheScreen) {
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(256);
-  std::vector<fusion::Rgb8> colours;
+  std::vector<base::Rgb8> colours;
   for (unsigned i = 0; i < 256; ++i) {
     const auto value = static_cast<std::uint8_t>(i);
     colours.push_back({value, value, value});
@@ -107,22 +107,22 @@ TEST(GlbFile, GivesEveryColourBackToAViewerThatEncodesItForTheScreen) {
 }
 
 TEST(GlbFile, IsTurnedToHaveYUp) {
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(1);
   mesh.positions()[0] = {1, 2, 3};
-  const std::vector<fusion::Rgb8> colours(1);
-  const auto turned = [&](fusion::UpAxis up) {
+  const std::vector<base::Rgb8> colours(1);
+  const auto turned = [&](base::UpAxis up) {
     mesh.up = up;
     const auto model = read_glb(scene_file(mesh, colours, {SceneFileFormat::Glb}).value().bytes);
     return values_of<float>(model, model.meshes.at(0).primitives.at(0).attributes.at("POSITION"), 3);
   };
   // Each is a turn, not a mirror image: what was right-handed stays so.
-  EXPECT_EQ(turned(fusion::UpAxis::X), (std::vector<float>{-2, 1, 3}));
-  EXPECT_EQ(turned(fusion::UpAxis::MinusX), (std::vector<float>{2, -1, 3}));
-  EXPECT_EQ(turned(fusion::UpAxis::Y), (std::vector<float>{1, 2, 3}));
-  EXPECT_EQ(turned(fusion::UpAxis::MinusY), (std::vector<float>{1, -2, -3}));
-  EXPECT_EQ(turned(fusion::UpAxis::Z), (std::vector<float>{1, 3, -2}));
-  EXPECT_EQ(turned(fusion::UpAxis::MinusZ), (std::vector<float>{1, -3, 2}));
+  EXPECT_EQ(turned(base::UpAxis::X), (std::vector<float>{-2, 1, 3}));
+  EXPECT_EQ(turned(base::UpAxis::MinusX), (std::vector<float>{2, -1, 3}));
+  EXPECT_EQ(turned(base::UpAxis::Y), (std::vector<float>{1, 2, 3}));
+  EXPECT_EQ(turned(base::UpAxis::MinusY), (std::vector<float>{1, -2, -3}));
+  EXPECT_EQ(turned(base::UpAxis::Z), (std::vector<float>{1, 3, -2}));
+  EXPECT_EQ(turned(base::UpAxis::MinusZ), (std::vector<float>{1, -3, 2}));
 }
 
 TEST(GlbFile, HasNoInfinity) {
@@ -134,7 +134,7 @@ TEST(GlbFile, HasNoInfinity) {
   const auto model = read_glb(scene_file(mesh, kColours, {SceneFileFormat::Glb}).value().bytes);
   const auto& primitive = model.meshes.at(0).primitives.at(0);
   EXPECT_EQ(values_of<float>(model, primitive.attributes.at("_TEMPERATURE"), 1),
-            (std::vector<float>{kLargest, -kLargest, kGlbMissingCelsius, 30}));
+            (std::vector<float>{kLargest, -kLargest, files::kGlbMissingCelsius, 30}));
 }
 
 TEST(GlbFile, OfAPointCloudWithoutTemperatureHasPointsOnly) {
@@ -149,7 +149,7 @@ TEST(GlbFile, OfAPointCloudWithoutTemperatureHasPointsOnly) {
 }
 
 TEST(GlbFile, OfAnEmptySceneIsAFileAllTheSame) {
-  const fusion::MultispectralMesh empty;
+  const mesh::MultispectralMesh empty;
   const auto model = read_glb(scene_file(empty, {}, {SceneFileFormat::Glb}).value().bytes);
   EXPECT_TRUE(model.meshes.empty());
 }
@@ -176,13 +176,13 @@ TEST(SceneFile, SaysWhereItCannotBeWritten) {
 }
 
 TEST(RoundForFile, MovesEveryVertexByItsStepAtMostInAMapOfSeveralBlocks) {
-  WorkerPool pool(2);
-  SceneStore scenes;
-  MapChange change;
+  jobs::WorkerPool pool(2);
+  map::SceneStore scenes;
+  map::MapChange change;
   for (const char* id : {"b", "a"}) {
-    fusion::LoadedScene block;
+    files::LoadedScene block;
     block.mesh = two_triangles();
-    for (fusion::Vec3f& p : block.mesh.positions()) p.x += id[0] == 'b' ? 10.3F : 0.1F;
+    for (base::Vec3f& p : block.mesh.positions()) p.x += id[0] == 'b' ? 10.3F : 0.1F;
     change.put.push_back({.id = id, .scene = std::move(block), .observed_at = {}});
   }
   const auto scene = scenes.change(std::move(change), pool);
@@ -219,4 +219,4 @@ TEST(FusedColours, AreThePlansForEveryVertex) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::exports

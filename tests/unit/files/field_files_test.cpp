@@ -17,7 +17,7 @@
 #include "fusion/statistics/temperature_statistics.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::note_count;
@@ -52,14 +52,14 @@ void expect_in(const std::string& part, const std::string& text) {
   EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
 }
 
-TemperatureSummary summary_of(const LoadedScene& scene) {
-  TemperatureAccumulator accumulator;
+fusion::TemperatureSummary summary_of(const LoadedScene& scene) {
+  fusion::TemperatureAccumulator accumulator;
   accumulator.add(scene.mesh.temperature_celsius());
   return accumulator.summary();
 }
 
 void expect_usual_temperatures(const LoadedScene& scene) {
-  const TemperatureSummary summary = summary_of(scene);
+  const fusion::TemperatureSummary summary = summary_of(scene);
   EXPECT_TRUE(scene.mesh.has_temperature);
   EXPECT_NEAR(static_cast<double>(summary.minimum), 18, 0.2);
   EXPECT_NEAR(static_cast<double>(summary.maximum), 32.517, 0.01);
@@ -67,8 +67,8 @@ void expect_usual_temperatures(const LoadedScene& scene) {
 
 void expect_usual_colours(const LoadedScene& scene) {
   ASSERT_TRUE(scene.mesh.has_visible);
-  EXPECT_EQ(scene.mesh.visible()[0], (Rgb8{60, 100, 80}));
-  EXPECT_EQ(scene.mesh.visible()[scene.mesh.vertex_count() - 1], (Rgb8{170, 199, 80}));
+  EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{60, 100, 80}));
+  EXPECT_EQ(scene.mesh.visible()[scene.mesh.vertex_count() - 1], (base::Rgb8{170, 199, 80}));
 }
 
 void expect_usual_scene(const std::string& name, std::size_t triangle_count = 242) {
@@ -89,7 +89,7 @@ TEST(FieldFiles, VerticesWithoutAPositionAreLeftOut) {
     EXPECT_EQ(note_count(scene, "left_out_vertices"), 2U);
     ASSERT_EQ(scene.mesh.left_out.size(), 2U);
     EXPECT_EQ(scene.mesh.left_out[0].input_index, 5U);
-    for (const Vec3f& p : scene.mesh.positions()) EXPECT_TRUE(std::isfinite(p.x + p.y + p.z));
+    for (const base::Vec3f& p : scene.mesh.positions()) EXPECT_TRUE(std::isfinite(p.x + p.y + p.z));
     expect_usual_colours(scene);
     expect_usual_temperatures(scene);
   }
@@ -233,7 +233,7 @@ TEST(FieldFiles, OtherUnitsOfLengthAreScaled) {
     options.metres_per_unit = 0.001;
     const LoadedScene scene = field_scene(name, options);
     double furthest = 0;
-    for (const Vec3f& p : scene.mesh.positions()) furthest = std::max(furthest, static_cast<double>(p.x));
+    for (const base::Vec3f& p : scene.mesh.positions()) furthest = std::max(furthest, static_cast<double>(p.x));
     EXPECT_NEAR(scene.mesh.origin.x + furthest, 3, 1e-3) << name;
     expect_usual_scene(name);
   }
@@ -285,18 +285,19 @@ TEST(FieldFiles, SaturatedPixelsAreNotMissing) {
 }
 
 /// What read_ply(), FusionPlan and write_ply() make of the scene.
-std::string fused_in_memory(const LoadedScene& loaded, const FusionSettings& settings) {
-  const MultispectralMesh& mesh = loaded.mesh;
-  SceneTemperature temperature;
+std::string fused_in_memory(const LoadedScene& loaded, const fusion::FusionSettings& settings) {
+  const mesh::MultispectralMesh& mesh = loaded.mesh;
+  fusion::SceneTemperature temperature;
   temperature.summary = summary_of(loaded);
   temperature.histogram = [&](std::uint32_t bins) {
-    Histogram histogram{temperature.summary.minimum, temperature.summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(mesh.temperature_celsius(), histogram);
+    fusion::Histogram histogram{temperature.summary.minimum, temperature.summary.maximum,
+                                std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
     return histogram;
   };
-  const auto plan = FusionPlan::prepare(settings, temperature);
+  const auto plan = fusion::FusionPlan::prepare(settings, temperature);
   EXPECT_TRUE(plan);
-  std::vector<Rgb8> fused(mesh.vertex_count());
+  std::vector<base::Rgb8> fused(mesh.vertex_count());
   plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
   std::ostringstream out;
   EXPECT_TRUE(write_ply(out, mesh, fused));
@@ -314,9 +315,9 @@ TEST(FieldFiles, AreFusedInBlocksAsInMemory) {
       options.metres_per_unit = scale;
       const auto scene = read_ply(entry.path(), options);
       for (const char* method : {"histogram_bin", "thermal_visible_blend"}) {
-        FusionChange change;
+        fusion::FusionChange change;
         change.method = method;
-        const FusionSettings settings = with_change(default_settings(), change).value();
+        const fusion::FusionSettings settings = fusion::with_change(fusion::default_settings(), change).value();
         const auto fused = fuse_ply(entry.path(), out, settings, options);
         ASSERT_EQ(fused.has_value(), scene.has_value());
         if (!scene) {
@@ -338,12 +339,13 @@ TEST(FieldFiles, AreFusedInBlocksAsInMemory) {
 TEST(FieldFiles, FuseWritesWhatIsLeftOutInItsPlace) {
   const test::TemporaryFolder folder;
   const auto out = folder.path() / "fused.ply";
-  FusionChange change;
+  fusion::FusionChange change;
   change.method = "thermal_only";
-  ASSERT_TRUE(fuse_ply(field_path("01b-nan-positions-mesh.ply"), out, with_change(default_settings(), change).value()));
+  ASSERT_TRUE(fuse_ply(field_path("01b-nan-positions-mesh.ply"), out,
+                       fusion::with_change(fusion::default_settings(), change).value()));
   const auto again = read_ply(out);
   ASSERT_TRUE(again);
-  const MultispectralMesh& mesh = again.value().mesh;
+  const mesh::MultispectralMesh& mesh = again.value().mesh;
   const LoadedScene before = field_scene("01b-nan-positions-mesh.ply");
   EXPECT_EQ(mesh.vertex_count(), 142U);
   EXPECT_EQ(mesh.triangles(), before.mesh.triangles());
@@ -358,4 +360,4 @@ TEST(FieldFiles, FuseWritesWhatIsLeftOutInItsPlace) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

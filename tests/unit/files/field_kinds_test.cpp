@@ -16,7 +16,7 @@
 #include "fusion/files/temperature_name.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::kFaces;
@@ -85,9 +85,9 @@ TEST(FieldKinds, HolesTakeTheirFacesWithThem) {
     EXPECT_EQ(note_count(scene, "left_out_vertices"), 2U);
     EXPECT_EQ(note_count(scene, "left_out_faces"), 2U);
     EXPECT_EQ(note_count(scene, "unreferenced_vertices"), 0U);
-    EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {0, 2, 3}}));
-    EXPECT_EQ(scene.mesh.visible()[3], (Rgb8{5, 5, 5}));
-    EXPECT_EQ(scene.mesh.positions()[3], (Vec3f{0, 0, 1}));
+    EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {0, 2, 3}}));
+    EXPECT_EQ(scene.mesh.visible()[3], (base::Rgb8{5, 5, 5}));
+    EXPECT_EQ(scene.mesh.positions()[3], (base::Vec3f{0, 0, 1}));
   }
 }
 
@@ -103,22 +103,23 @@ TEST(FieldKinds, HolesOfDoublePositionsKeepTheOthersExact) {
   file.le(std::uint8_t{3}).le(1U).le(2U).le(3U);
   const LoadedScene scene = loaded(file.bytes());
   ASSERT_EQ(scene.mesh.vertex_count(), 3U);
-  EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}}));
+  EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 2}}));
   EXPECT_EQ(scene.mesh.origin.x + static_cast<double>(scene.mesh.positions()[1].x), 412346.125);
 }
 
 /// A bumpy square of 20 x 20 double points at map coordinates, and more points.
-std::string map_square(const std::vector<Vec3d>& more, const std::string& faces = {}, const std::string& lines = {}) {
+std::string map_square(const std::vector<base::Vec3d>& more, const std::string& faces = {},
+                       const std::string& lines = {}) {
   std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(400 + more.size()) +
                      "\nproperty double x\nproperty double y\nproperty double z\nproperty float temperature\n" + faces +
                      "end_header\n";
-  std::vector<Vec3d> points;
+  std::vector<base::Vec3d> points;
   for (int i = 0; i < 400; ++i) {
     points.push_back({500'000.123 + 0.15 * (i % 20), 4'200'000.456 + 0.15 * (i / 20), 100.01 * (1 + 1e-4 * (i % 7))});
   }
   points.insert(points.end(), more.begin(), more.end());
   char line[120];
-  for (const Vec3d& p : points) {
+  for (const base::Vec3d& p : points) {
     std::snprintf(line, sizeof line, "%.17g %.17g %.17g %d\n", p.x, p.y, p.z, p.x > 1000 ? 20 : 0);
     text += line;
   }
@@ -130,7 +131,7 @@ double place_x(const LoadedScene& scene, std::size_t vertex) {
 }
 
 TEST(FieldKinds, AStrayDoesNotTakeTheOriginAwayFromTheScene) {
-  for (const Vec3d& stray : {Vec3d{}, Vec3d{500'000, 4'200'000, -1e7}, Vec3d{1e30, 0, 0}}) {
+  for (const base::Vec3d& stray : {base::Vec3d{}, base::Vec3d{500'000, 4'200'000, -1e7}, base::Vec3d{1e30, 0, 0}}) {
     const LoadedScene scene = loaded(map_square({stray}));
     ASSERT_EQ(scene.mesh.vertex_count(), 401U);
     EXPECT_NEAR(place_x(scene, 3), 500'000.573, 1e-6) << stray.x;
@@ -142,9 +143,10 @@ TEST(FieldKinds, AStrayDoesNotTakeTheOriginAwayFromTheScene) {
 
 TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
   const double largest = static_cast<double>(std::numeric_limits<float>::max());
-  for (const Vec3d& place : {Vec3d{}, Vec3d{-9999, -9999, -9999}, Vec3d{largest, largest, largest}}) {
+  for (const base::Vec3d& place :
+       {base::Vec3d{}, base::Vec3d{-9999, -9999, -9999}, base::Vec3d{largest, largest, largest}}) {
     for (const bool are_most : {false, true}) {
-      const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(are_most ? 2000 : 20, place)));
+      const LoadedScene scene = loaded(map_square(std::vector<base::Vec3d>(are_most ? 2000 : 20, place)));
       ASSERT_EQ(scene.mesh.vertex_count(), 400U) << place.x;
       EXPECT_NEAR(place_x(scene, 3), 500'000.573, 1e-6) << place.x;
       EXPECT_EQ(*std::min_element(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end()),
@@ -154,12 +156,12 @@ TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
       EXPECT_EQ(scene.mesh.left_out.size(), are_most ? 2000U : 20U);
     }
   }
-  EXPECT_NE(
-      note_text(loaded(map_square(std::vector<Vec3d>(20, {-9999, 0.1, 7}))), "hole_vertices").find("-9999 0.1 7,"),
-      std::string::npos);
+  EXPECT_NE(note_text(loaded(map_square(std::vector<base::Vec3d>(20, {-9999, 0.1, 7}))), "hole_vertices")
+                .find("-9999 0.1 7,"),
+            std::string::npos);
   ReadOptions millimetres;
   millimetres.metres_per_unit = 0.001;
-  const LoadedScene small = loaded(map_square(std::vector<Vec3d>(20, {-9999, 0, 0})), millimetres);
+  const LoadedScene small = loaded(map_square(std::vector<base::Vec3d>(20, {-9999, 0, 0})), millimetres);
   EXPECT_EQ(note_count(small, "hole_vertices"), 20U);
   EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
 }
@@ -219,8 +221,9 @@ TEST(FieldKinds, HeightsWrittenAsANumberForNoneAreHoles) {
 }
 
 TEST(FieldKinds, ASpotThatIsMeasuredOftenIsNoHole) {
-  for (const Vec3d& place : {Vec3d{500'001.5, 4'200'001.25, 100.02}, Vec3d{500'004, 4'200'004, 100}}) {
-    const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(20, place)));
+  for (const base::Vec3d& place :
+       {base::Vec3d{500'001.5, 4'200'001.25, 100.02}, base::Vec3d{500'004, 4'200'004, 100}}) {
+    const LoadedScene scene = loaded(map_square(std::vector<base::Vec3d>(20, place)));
     EXPECT_EQ(scene.mesh.vertex_count(), 420U) << place.x;
   }
 }
@@ -238,9 +241,10 @@ TEST(FieldKinds, ACrowdedPlaceThatFacesUseIsSaid) {
 
 TEST(FieldKinds, HolesWrittenAsANumberTakeTheirFacesWithThem) {
   const std::string faces = "element face 2\n" + std::string(kFaces);
-  const LoadedScene scene = loaded(map_square(std::vector<Vec3d>(20, {-1, -1, -1}), faces, "3 0 1 20\n4 1 2 400 20\n"));
+  const LoadedScene scene =
+      loaded(map_square(std::vector<base::Vec3d>(20, {-1, -1, -1}), faces, "3 0 1 20\n4 1 2 400 20\n"));
   EXPECT_EQ(scene.mesh.vertex_count(), 400U);
-  EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 20}}));
+  EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 20}}));
   EXPECT_EQ(note_count(scene, "left_out_faces"), 1U);
 }
 
@@ -286,7 +290,7 @@ TEST(FieldKinds, ColoursOfAnyTypeAreScaledByTheirLargest) {
   struct Case {
     std::string type;
     std::string values;
-    Rgb8 colour;
+    base::Rgb8 colour;
   };
   const std::vector<Case> cases = {{"ushort", "65535 257 128", {255, 1, 0}}, {"uint16", "255 254 0", {255, 254, 0}},
                                    {"int", "256 257 25700", {1, 1, 100}},    {"uint64", "65535 0 32896", {255, 0, 128}},
@@ -297,30 +301,31 @@ TEST(FieldKinds, ColoursOfAnyTypeAreScaledByTheirLargest) {
     for (const char* name : {"red", "green", "blue"}) properties += "property " + type + " " + name + "\n";
     const LoadedScene scene = loaded(text_file(properties, {"0 0 0 " + values, "1 0 0 0 0 0"}));
     EXPECT_EQ(scene.mesh.visible()[0], colour) << type << " " << values;
-    EXPECT_EQ(scene.mesh.visible()[1], (Rgb8{0, 0, 0})) << type << " " << values;
+    EXPECT_EQ(scene.mesh.visible()[1], (base::Rgb8{0, 0, 0})) << type << " " << values;
     EXPECT_EQ(note_count(scene, "converted_colours"), 2U) << type << " " << values;
     EXPECT_EQ(note_count(scene, "clamped_colours"), 0U) << type << " " << values;
   }
   const LoadedScene odd = loaded(text_file("property float red\nproperty float green\nproperty float blue\n",
                                            {"0 0 0 nan 1 0", "1 0 0 -1 0.5 1"}));
-  EXPECT_EQ(odd.mesh.visible()[0], (Rgb8{128, 255, 0}));
-  EXPECT_EQ(odd.mesh.visible()[1], (Rgb8{0, 128, 255}));
+  EXPECT_EQ(odd.mesh.visible()[0], (base::Rgb8{128, 255, 0}));
+  EXPECT_EQ(odd.mesh.visible()[1], (base::Rgb8{0, 128, 255}));
   EXPECT_EQ(note_count(odd, "clamped_colours"), 2U);
 }
 
 TEST(FieldKinds, PackedColoursAreUnpacked) {
   const LoadedScene whole = loaded(text_file("property int rgb\n", {"0 0 0 3957840", "1 0 0 -12819376"}));
-  EXPECT_EQ(whole.mesh.visible()[0], (Rgb8{60, 100, 80}));
-  EXPECT_EQ(whole.mesh.visible()[1], (Rgb8{60, 100, 80}));  // With an opaque alpha.
+  EXPECT_EQ(whole.mesh.visible()[0], (base::Rgb8{60, 100, 80}));
+  EXPECT_EQ(whole.mesh.visible()[1], (base::Rgb8{60, 100, 80}));  // With an opaque alpha.
   for (const std::uint32_t bits : {0x003C6450U, 0xFF3C6450U, 0xFFBC6450U, 0x7FBC6450U}) {
     PlyBytes file;
     file.text("ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + std::string(kXyz) +
               "property float rgb\nend_header\n");
     file.le(0.0F).le(0.0F).le(0.0F).le(bits);
     const LoadedScene scene = loaded(file.bytes());
-    EXPECT_EQ(scene.mesh.visible()[0], (Rgb8{static_cast<std::uint8_t>(bits >> 16), 0x64, 0x50})) << bits;
+    EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{static_cast<std::uint8_t>(bits >> 16), 0x64, 0x50})) << bits;
   }
-  EXPECT_EQ(loaded(text_file("property float rgba\n", {"0 0 0 5.5461155e-39"})).mesh.visible()[0], (Rgb8{60, 100, 80}));
+  EXPECT_EQ(loaded(text_file("property float rgba\n", {"0 0 0 5.5461155e-39"})).mesh.visible()[0],
+            (base::Rgb8{60, 100, 80}));
 }
 
 TEST(FieldKinds, FacesLendColoursAndTemperatureToTheirCorners) {
@@ -331,9 +336,9 @@ TEST(FieldKinds, FacesLendColoursAndTemperatureToTheirCorners) {
                                              "10 3 0 1 2 20 30 20\n21 3 0 2 3 40 50 30\n30 3 1 2 3 60 70 nan\n"));
   const auto colours = scene.mesh.visible();
   const auto celsius = scene.mesh.temperature_celsius();
-  EXPECT_EQ(colours[0], (Rgb8{16, 30, 40}));  // 15.5 is rounded up.
-  EXPECT_EQ(colours[2], (Rgb8{20, 40, 50}));
-  EXPECT_EQ(colours[4], (Rgb8{128, 128, 128}));
+  EXPECT_EQ(colours[0], (base::Rgb8{16, 30, 40}));  // 15.5 is rounded up.
+  EXPECT_EQ(colours[2], (base::Rgb8{20, 40, 50}));
+  EXPECT_EQ(colours[4], (base::Rgb8{128, 128, 128}));
   EXPECT_EQ(celsius[0], 25.0F);
   EXPECT_EQ(celsius[1], 20.0F);
   EXPECT_EQ(celsius[3], 30.0F);
@@ -568,7 +573,7 @@ TEST(FieldKinds, HeadersOfAllEditorsAreRead) {
   for (const std::string& file : files) {
     const LoadedScene scene = loaded(file);
     ASSERT_EQ(scene.mesh.vertex_count(), 2U) << file;
-    EXPECT_EQ(scene.mesh.positions()[1], (Vec3f{4, 5, 6}));
+    EXPECT_EQ(scene.mesh.positions()[1], (base::Vec3f{4, 5, 6}));
     EXPECT_EQ(scene.mesh.temperature_celsius()[1], 30.0F);
   }
 }
@@ -628,7 +633,7 @@ TEST(FieldKinds, OtherFilesAreCalledByTheirNames) {
   for (const auto& [bytes, name] : files) {
     const auto scene = test::read_bytes(bytes);
     ASSERT_FALSE(scene);
-    EXPECT_EQ(scene.error().code, ErrorCode::BadHeader);
+    EXPECT_EQ(scene.error().code, base::ErrorCode::BadHeader);
     EXPECT_NE(scene.error().message.find(name), std::string::npos) << scene.error().message;
   }
 }
@@ -672,7 +677,8 @@ TEST(FieldKinds, StripsTurnAndEndAsTheyShould) {
         loaded(text_file("", {"0 0 0", "0 1 0", "1 0 0", "1 1 0", "nan 0 0"},
                          "element tristrips 2\nproperty list int " + std::string(type) + " vertex_indices\n",
                          "9 0 1 2 3 " + end + " 3 2 1 0\n6 0 1 1 2 4 0\n"));
-    EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}, {2, 1, 3}, {3, 2, 1}, {1, 2, 0}})) << type;
+    EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 2}, {2, 1, 3}, {3, 2, 1}, {1, 2, 0}}))
+        << type;
     EXPECT_EQ(note_count(scene, "triangulated_strips"), 3U) << type;
     EXPECT_EQ(note_count(scene, "left_out_faces"), 2U) << type;
   }
@@ -705,7 +711,7 @@ TEST(FieldKinds, GzipIsUnpackedWithinBounds) {
 
   const auto cut = test::read_bytes(std::string_view(packed).substr(0, packed.size() / 2));
   ASSERT_FALSE(cut);
-  EXPECT_EQ(cut.error().code, ErrorCode::Truncated);
+  EXPECT_EQ(cut.error().code, base::ErrorCode::Truncated);
   EXPECT_NE(cut.error().message.find("gzip"), std::string::npos) << cut.error().message;
   std::string damaged = packed;
   damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 0x55);
@@ -727,9 +733,9 @@ TEST(FieldKinds, AGzipBombIsRefusedInLittleMemory) {
   const test::AllocationMeter meter;
   const auto scene = test::read_bytes(packed);
   ASSERT_FALSE(scene);
-  EXPECT_EQ(scene.error().code, ErrorCode::TooLarge);
+  EXPECT_EQ(scene.error().code, base::ErrorCode::TooLarge);
   EXPECT_LT(meter.peak_bytes(), 4'000'000U);
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -16,18 +16,18 @@
 namespace spectra::test {
 
 /// Reads a scene from bytes, through a file in memory.
-inline fusion::Result<fusion::LoadedScene> read_bytes(std::string_view bytes, const fusion::ReadOptions& options = {}) {
+inline base::Result<files::LoadedScene> read_bytes(std::string_view bytes, const files::ReadOptions& options = {}) {
   const int descriptor = ::memfd_create("scene.ply", MFD_CLOEXEC);
   if (descriptor < 0 || ::write(descriptor, bytes.data(), bytes.size()) != static_cast<ssize_t>(bytes.size())) {
     ADD_FAILURE() << "no file in memory";
   }
-  auto scene = fusion::read_ply("/proc/self/fd/" + std::to_string(descriptor), options);
+  auto scene = files::read_ply("/proc/self/fd/" + std::to_string(descriptor), options);
   ::close(descriptor);
   return scene;
 }
 
 /// The same where an error is a failed test.
-inline fusion::LoadedScene loaded(std::string_view bytes, const fusion::ReadOptions& options = {}) {
+inline files::LoadedScene loaded(std::string_view bytes, const files::ReadOptions& options = {}) {
   auto scene = read_bytes(bytes, options);
   if (!scene) {
     ADD_FAILURE() << scene.error().message;
@@ -37,9 +37,9 @@ inline fusion::LoadedScene loaded(std::string_view bytes, const fusion::ReadOpti
 }
 
 /// The count of a note, 0 when there is none.
-inline std::uint64_t note_count(const fusion::LoadedScene& scene, std::string_view id) {
+inline std::uint64_t note_count(const files::LoadedScene& scene, std::string_view id) {
   const auto note = std::find_if(scene.notes.begin(), scene.notes.end(),
-                                 [id](const fusion::Note& candidate) { return candidate.id == id; });
+                                 [id](const files::Note& candidate) { return candidate.id == id; });
   return note == scene.notes.end() ? 0 : note->count;
 }
 

@@ -14,32 +14,33 @@
 #include "fusion/registry.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
-FusionSettings settings_of(const std::string& method) {
-  FusionChange change;
+fusion::FusionSettings settings_of(const std::string& method) {
+  fusion::FusionChange change;
   change.method = method;
-  return with_change(default_settings(), change).value();
+  return fusion::with_change(fusion::default_settings(), change).value();
 }
 
 /// What read_ply(), FusionPlan and write_ply() make of the file.
-std::string fused_in_memory(const std::filesystem::path& in, const FusionSettings& settings) {
+std::string fused_in_memory(const std::filesystem::path& in, const fusion::FusionSettings& settings) {
   const auto scene = read_ply(in);
   EXPECT_TRUE(scene);
-  const MultispectralMesh& mesh = scene.value().mesh;
-  TemperatureAccumulator temperatures;
+  const mesh::MultispectralMesh& mesh = scene.value().mesh;
+  fusion::TemperatureAccumulator temperatures;
   temperatures.add(mesh.temperature_celsius());
-  SceneTemperature temperature;
+  fusion::SceneTemperature temperature;
   temperature.summary = temperatures.summary();
   temperature.histogram = [&](std::uint32_t bins) {
-    Histogram histogram{temperature.summary.minimum, temperature.summary.maximum, std::vector<std::uint64_t>(bins)};
-    add_to_histogram(mesh.temperature_celsius(), histogram);
+    fusion::Histogram histogram{temperature.summary.minimum, temperature.summary.maximum,
+                                std::vector<std::uint64_t>(bins)};
+    fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
     return histogram;
   };
-  const auto plan = FusionPlan::prepare(settings, temperature);
+  const auto plan = fusion::FusionPlan::prepare(settings, temperature);
   EXPECT_TRUE(plan);
-  std::vector<Rgb8> fused(mesh.vertex_count());
+  std::vector<base::Rgb8> fused(mesh.vertex_count());
   plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
   std::ostringstream out;
   EXPECT_TRUE(write_ply(out, mesh, fused));
@@ -84,7 +85,7 @@ std::string wavy_scene(const std::string& coordinate, double offset, bool faces_
 TEST(PlyFuse, HasTheBytesOfTheWholeMeshInMemory) {
   const test::TemporaryFolder folder;
   const auto in = folder.write("in.ply", wavy_scene("float", 0));
-  for (const Method* method : all_methods()) expect_same_bytes(folder, in, method->id);
+  for (const fusion::Method* method : fusion::all_methods()) expect_same_bytes(folder, in, method->id);
   expect_same_bytes(folder, folder.write("far.ply", wavy_scene("float", 5000)), "thermal_visible_blend");
   expect_same_bytes(folder, folder.write("utm.ply", wavy_scene("double", 447'000.1)), "histogram_bin");
   expect_same_bytes(folder, folder.write("faces.ply", wavy_scene("float", 0, true)), "thermal_only");
@@ -120,8 +121,8 @@ TEST(PlyFuse, WritesHolesInTheirPlace) {
   ASSERT_TRUE(out);
   ASSERT_EQ(out.value().mesh.left_out.size(), 30U);
   EXPECT_EQ(out.value().mesh.left_out[1].input_index, 7U);
-  EXPECT_EQ(out.value().mesh.left_out[1].position, (Vec3d{0, 0, 0}));
-  EXPECT_EQ(out.value().mesh.left_out[1].visible, (Rgb8{9, 8, 7}));
+  EXPECT_EQ(out.value().mesh.left_out[1].position, (base::Vec3d{0, 0, 0}));
+  EXPECT_EQ(out.value().mesh.left_out[1].visible, (base::Rgb8{9, 8, 7}));
 }
 
 TEST(PlyFuse, ReportsWhatItDid) {
@@ -149,7 +150,7 @@ TEST(PlyFuse, LeavesNothingBehindWhenTheInputIsBad) {
   const auto bad = folder.write("in.ply", wavy_scene("float", 0).substr(0, 60'000));
   const auto result = fuse_ply(bad, folder.path() / "out.ply", settings_of("thermal_only"));
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::Truncated);
+  EXPECT_EQ(result.error().code, base::ErrorCode::Truncated);
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "out.ply"));
 }
 
@@ -158,7 +159,7 @@ TEST(PlyFuse, NamesTheOutputWhenThatFails) {
   const auto in = folder.write("in.ply", wavy_scene("float", 0));
   const auto result = fuse_ply(in, "/dev/full", settings_of("thermal_only"));
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::FileUnwritable);
+  EXPECT_EQ(result.error().code, base::ErrorCode::FileUnwritable);
   EXPECT_EQ(result.error().message.rfind("/dev/full", 0), 0U) << result.error().message;
 }
 
@@ -175,4 +176,4 @@ TEST(PlyFuse, NeedsMemoryOfFixedSize) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

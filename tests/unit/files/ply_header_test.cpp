@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 TEST(PlyHeader, ReadsElementsAndProperties) {
@@ -37,35 +37,35 @@ TEST(PlyHeader, BodyBeginsAfterTheLastLineEnd) {
 
 struct BadHeaderCase {
   const char* text;
-  ErrorCode code;
+  base::ErrorCode code;
   const char* says;
 };
 
 TEST(PlyHeader, SaysWhatIsWrong) {
   const BadHeaderCase cases[] = {
-      {"", ErrorCode::BadHeader, "empty"},
-      {"solid thing\n", ErrorCode::BadHeader, "not a PLY file"},
-      {"plyx\n", ErrorCode::BadHeader, "not a PLY file"},
-      {"ply\nformat ascii 1.0\n", ErrorCode::BadHeader, "before end_header"},
-      {"ply\nend_header\n", ErrorCode::BadHeader, "no format"},
-      {"ply\nformat ascii 2.0\nend_header\n", ErrorCode::Unsupported, "'2.0'"},
-      {"ply\nformat utf8 1.0\nend_header\n", ErrorCode::Unsupported, "'utf8'"},
-      {"ply\nformat ascii\nend_header\n", ErrorCode::BadHeader, "line 2"},
-      {"ply\nformat ascii 1.0\nformat ascii 1.0\n", ErrorCode::BadHeader, "second format"},
-      {"ply\nformat ascii 1.0\nvertex 3\n", ErrorCode::BadHeader, "'vertex'"},
-      {"ply\nformat ascii 1.0\nproperty float x\n", ErrorCode::BadHeader, "before any element"},
-      {"ply\nformat ascii 1.0\nelement vertex\n", ErrorCode::BadHeader, "name and a count"},
-      {"ply\nformat ascii 1.0\nelement vertex -1\n", ErrorCode::BadHeader, "'-1'"},
-      {"ply\nformat ascii 1.0\nelement vertex 3x\n", ErrorCode::BadHeader, "'3x'"},
-      {"ply\nformat ascii 1.0\nelement vertex 18446744073709551616\n", ErrorCode::BadHeader, "2^64"},
-      {"ply\nformat ascii 1.0\nelement a 1\nelement a 1\n", ErrorCode::BadHeader, "second element 'a'"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty int i\nproperty float i\n", ErrorCode::BadHeader,
+      {"", base::ErrorCode::BadHeader, "empty"},
+      {"solid thing\n", base::ErrorCode::BadHeader, "not a PLY file"},
+      {"plyx\n", base::ErrorCode::BadHeader, "not a PLY file"},
+      {"ply\nformat ascii 1.0\n", base::ErrorCode::BadHeader, "before end_header"},
+      {"ply\nend_header\n", base::ErrorCode::BadHeader, "no format"},
+      {"ply\nformat ascii 2.0\nend_header\n", base::ErrorCode::Unsupported, "'2.0'"},
+      {"ply\nformat utf8 1.0\nend_header\n", base::ErrorCode::Unsupported, "'utf8'"},
+      {"ply\nformat ascii\nend_header\n", base::ErrorCode::BadHeader, "line 2"},
+      {"ply\nformat ascii 1.0\nformat ascii 1.0\n", base::ErrorCode::BadHeader, "second format"},
+      {"ply\nformat ascii 1.0\nvertex 3\n", base::ErrorCode::BadHeader, "'vertex'"},
+      {"ply\nformat ascii 1.0\nproperty float x\n", base::ErrorCode::BadHeader, "before any element"},
+      {"ply\nformat ascii 1.0\nelement vertex\n", base::ErrorCode::BadHeader, "name and a count"},
+      {"ply\nformat ascii 1.0\nelement vertex -1\n", base::ErrorCode::BadHeader, "'-1'"},
+      {"ply\nformat ascii 1.0\nelement vertex 3x\n", base::ErrorCode::BadHeader, "'3x'"},
+      {"ply\nformat ascii 1.0\nelement vertex 18446744073709551616\n", base::ErrorCode::BadHeader, "2^64"},
+      {"ply\nformat ascii 1.0\nelement a 1\nelement a 1\n", base::ErrorCode::BadHeader, "second element 'a'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty int i\nproperty float i\n", base::ErrorCode::BadHeader,
        "second property 'i'"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty half h\n", ErrorCode::BadHeader, "'half'"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty float\n", ErrorCode::BadHeader, "property line"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty list uchar int\n", ErrorCode::BadHeader, "property line"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty list float int l\n", ErrorCode::BadHeader, "'float'"},
-      {"ply\nformat ascii 1.0\n\x1b[31m\n", ErrorCode::BadHeader, "'?[31m'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty half h\n", base::ErrorCode::BadHeader, "'half'"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty float\n", base::ErrorCode::BadHeader, "property line"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty list uchar int\n", base::ErrorCode::BadHeader, "property line"},
+      {"ply\nformat ascii 1.0\nelement a 1\nproperty list float int l\n", base::ErrorCode::BadHeader, "'float'"},
+      {"ply\nformat ascii 1.0\n\x1b[31m\n", base::ErrorCode::BadHeader, "'?[31m'"},
   };
   for (const BadHeaderCase& bad : cases) {
     const auto header = parse_ply_header(bad.text);
@@ -84,4 +84,4 @@ TEST(PlyHeader, IsBoundedInSize) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -11,7 +11,7 @@
 #include "fusion/files/ply_reader.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::PlyBytes;
@@ -19,7 +19,7 @@ using test::PlyBytes;
 struct HostileFile {
   std::string name;
   std::string bytes;
-  std::optional<ErrorCode> code;  ///< nullopt: reads well.
+  std::optional<base::ErrorCode> code;  ///< nullopt: reads well.
   std::string says;
 };
 
@@ -59,7 +59,7 @@ std::string binary_position(float x) {
 }
 
 std::vector<HostileFile> hostile_files() {
-  using Code = ErrorCode;
+  using Code = base::ErrorCode;
   const std::string many_bytes(100'000, '\xff');
   const std::string zeros(100'000, '\0');
   std::vector<HostileFile> files = {
@@ -237,7 +237,8 @@ TEST(HostilePly, IsNoticedWhereverItIsCutOff) {
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto scene = test::read_bytes(whole.substr(0, size));
     ASSERT_FALSE(scene) << size;
-    EXPECT_TRUE(scene.error().code == ErrorCode::Truncated || scene.error().code == ErrorCode::BadHeader) << size;
+    EXPECT_TRUE(scene.error().code == base::ErrorCode::Truncated || scene.error().code == base::ErrorCode::BadHeader)
+        << size;
   }
 }
 
@@ -259,4 +260,4 @@ TEST(HostilePly, BearsEveryFlippedByte) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -10,7 +10,7 @@
 #include "fusion/files/ply_stream.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::kFaces;
@@ -29,19 +29,19 @@ std::string ascii_head(std::uint64_t vertices, std::string_view properties, std:
 }
 
 void expect_sample(const LoadedScene& scene) {
-  const MultispectralMesh& mesh = scene.mesh;
+  const mesh::MultispectralMesh& mesh = scene.mesh;
   ASSERT_EQ(mesh.vertex_count(), 4U);
-  EXPECT_EQ(mesh.positions()[1], (Vec3f{1, 0.5F, -2}));
-  EXPECT_EQ(mesh.positions()[3], (Vec3f{0.25F, 1, 0}));
+  EXPECT_EQ(mesh.positions()[1], (base::Vec3f{1, 0.5F, -2}));
+  EXPECT_EQ(mesh.positions()[3], (base::Vec3f{0.25F, 1, 0}));
   EXPECT_TRUE(mesh.has_visible);
-  EXPECT_EQ(mesh.visible()[0], (Rgb8{1, 2, 3}));
-  EXPECT_EQ(mesh.visible()[2], (Rgb8{255, 0, 128}));
+  EXPECT_EQ(mesh.visible()[0], (base::Rgb8{1, 2, 3}));
+  EXPECT_EQ(mesh.visible()[2], (base::Rgb8{255, 0, 128}));
   EXPECT_TRUE(mesh.has_temperature);
   EXPECT_EQ(mesh.temperature_celsius()[0], 36.5F);
   EXPECT_TRUE(std::isnan(mesh.temperature_celsius()[1]));
   EXPECT_EQ(mesh.temperature_celsius()[3], -40.0F);
   EXPECT_EQ(note_count(scene, "missing_temperatures"), 1U);
-  EXPECT_EQ(mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 2}, {0, 2, 3}}));
   EXPECT_FALSE(mesh.is_point_cloud());
 }
 
@@ -62,7 +62,7 @@ std::string binary_sample(bool big_endian) {
     for (const int value : colours[i]) file.ordered(big_endian, static_cast<std::uint8_t>(value));
     file.ordered(big_endian, temperatures[i]);
   }
-  for (const Triangle& triangle : {Triangle{0, 1, 2}, Triangle{0, 2, 3}}) {
+  for (const base::Triangle& triangle : {base::Triangle{0, 1, 2}, base::Triangle{0, 2, 3}}) {
     file.ordered(big_endian, std::uint8_t{3});
     for (const std::uint32_t index : triangle) file.ordered(big_endian, static_cast<std::int32_t>(index));
   }
@@ -125,9 +125,9 @@ TEST(PlyReader, ReadsEveryScalarTypeAndSkipsWhatItDoesNotKnow) {
 
     const LoadedScene scene = loaded(file.bytes());
     ASSERT_EQ(scene.mesh.vertex_count(), 3U);
-    EXPECT_EQ(scene.mesh.positions()[2], (Vec3f{2, 1, 0.5F}));
+    EXPECT_EQ(scene.mesh.positions()[2], (base::Vec3f{2, 1, 0.5F}));
     EXPECT_EQ(scene.mesh.temperature_celsius()[2], 22.0F);
-    EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{2, 1, 0}}));
+    EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{2, 1, 0}}));
     EXPECT_FALSE(scene.mesh.has_visible);
     EXPECT_TRUE(scene.mesh.double_positions);
     EXPECT_EQ(note_count(scene, "skipped_vertex_properties"), 4U);
@@ -144,7 +144,7 @@ TEST(PlyReader, SkipsTheSameInAscii) {
       "element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float uv\nend_header\n"
       "2 not_read 1.5 8\n0 0 0 0 9\n1 5 1 0 0 9\n3 5 5 5 0 1 0 9\n3 0 1 2 2 0.1 0.2\n");
   ASSERT_EQ(scene.mesh.vertex_count(), 3U);
-  EXPECT_EQ(scene.mesh.positions()[2], (Vec3f{0, 1, 0}));
+  EXPECT_EQ(scene.mesh.positions()[2], (base::Vec3f{0, 1, 0}));
   EXPECT_EQ(scene.mesh.triangle_count(), 1U);
 }
 
@@ -163,7 +163,7 @@ TEST(PlyReader, FindsColoursUnderTheirNames) {
                             "property uchar Red\nproperty uchar Green\nproperty uchar Blue\nproperty uchar Alpha\n"}) {
     const LoadedScene scene = loaded(ascii_head(1, std::string(kXyz) + names) + "0 0 0 10 20 30 40\n");
     EXPECT_TRUE(scene.mesh.has_visible) << names;
-    EXPECT_EQ(scene.mesh.visible()[0], (Rgb8{10, 20, 30})) << names;
+    EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{10, 20, 30})) << names;
     EXPECT_EQ(note_count(scene, "skipped_vertex_properties"), 1U) << names;
   }
 }
@@ -171,24 +171,25 @@ TEST(PlyReader, FindsColoursUnderTheirNames) {
 TEST(PlyReader, IsGreyWithoutAllThreeChannels) {
   const LoadedScene scene = loaded(ascii_head(1, std::string(kXyz) + "property uchar red\n") + "0 0 0 10\n");
   EXPECT_FALSE(scene.mesh.has_visible);
-  EXPECT_EQ(scene.mesh.visible()[0], (Rgb8{128, 128, 128}));
+  EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{128, 128, 128}));
   EXPECT_EQ(note_count(scene, "skipped_vertex_properties"), 1U);
 }
 
 TEST(PlyReader, ConvertsColoursOfOtherTypes) {
   const std::string floats = "property float red\nproperty float green\nproperty float blue\n";
   const LoadedScene scaled = loaded(ascii_head(1, std::string(kXyz) + floats) + "0 0 0 0 0.5 1\n");
-  EXPECT_EQ(scaled.mesh.visible()[0], (Rgb8{0, 128, 255}));
+  EXPECT_EQ(scaled.mesh.visible()[0], (base::Rgb8{0, 128, 255}));
   EXPECT_EQ(note_count(scaled, "converted_colours"), 1U);
 
   const std::string ints = "property int red\nproperty int green\nproperty int blue\n";
-  EXPECT_EQ(loaded(ascii_head(1, std::string(kXyz) + ints) + "0 0 0 1 2 255\n").mesh.visible()[0], (Rgb8{1, 2, 255}));
+  EXPECT_EQ(loaded(ascii_head(1, std::string(kXyz) + ints) + "0 0 0 1 2 255\n").mesh.visible()[0],
+            (base::Rgb8{1, 2, 255}));
 
   PlyBytes binary;
   binary.text("ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + std::string(kXyz) +
               "property ushort red\nproperty ushort green\nproperty ushort blue\nend_header\n");
   binary.le(0.0F).le(0.0F).le(0.0F).le(std::uint16_t{7}).le(std::uint16_t{8}).le(std::uint16_t{9});
-  EXPECT_EQ(loaded(binary.bytes()).mesh.visible()[0], (Rgb8{7, 8, 9}));
+  EXPECT_EQ(loaded(binary.bytes()).mesh.visible()[0], (base::Rgb8{7, 8, 9}));
 }
 
 TEST(PlyReader, FindsTheTemperatureUnderItsNames) {
@@ -241,14 +242,15 @@ TEST(PlyReader, KeepsWhatIsBeyondTheRangeOfTheSensor) {
 TEST(PlyReader, CutsPolygonsIntoFans) {
   const LoadedScene scene =
       loaded(ascii_head(5, kXyz, 2) + "0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 1 0\n5 0 1 2 3 4\n4 0 1 3 4\n");
-  EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 1, 3}, {0, 3, 4}}));
+  EXPECT_EQ(scene.mesh.triangles(),
+            (std::vector<base::Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 1, 3}, {0, 3, 4}}));
   EXPECT_EQ(note_count(scene, "triangulated_polygons"), 2U);
 }
 
 TEST(PlyReader, LeavesOutFacesWithoutAreaAndSaysSo) {
   const LoadedScene scene = loaded(ascii_head(5, kXyz, 6) +
                                    "0 0 0\n1 0 0\n0 1 0\n5 5 5\n6 6 6\n0\n1 0\n2 0 1\n3 0 1 1\n3 0 1 2\n4 0 1 1 2\n");
-  EXPECT_EQ(scene.mesh.triangles(), (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}}));
+  EXPECT_EQ(scene.mesh.triangles(), (std::vector<base::Triangle>{{0, 1, 2}, {0, 1, 2}}));
   EXPECT_EQ(note_count(scene, "incomplete_faces"), 3U);
   EXPECT_EQ(note_count(scene, "degenerate_faces"), 2U);
   EXPECT_EQ(note_count(scene, "unreferenced_vertices"), 2U);
@@ -278,29 +280,29 @@ TEST(PlyReader, NamesTheSceneAfterTheFile) {
 
 TEST(PlyReader, SaysWhatIsNoFile) {
   const test::TemporaryFolder folder;
-  EXPECT_EQ(read_ply(folder.path() / "none.ply").error().code, ErrorCode::FileNotFound);
-  EXPECT_EQ(read_ply(folder.path()).error().code, ErrorCode::FileUnreadable);
-  EXPECT_EQ(read_ply("/dev/null").error().code, ErrorCode::FileUnreadable);
+  EXPECT_EQ(read_ply(folder.path() / "none.ply").error().code, base::ErrorCode::FileNotFound);
+  EXPECT_EQ(read_ply(folder.path()).error().code, base::ErrorCode::FileUnreadable);
+  EXPECT_EQ(read_ply("/dev/null").error().code, base::ErrorCode::FileUnreadable);
   EXPECT_NE(read_ply(folder.path() / "none.ply").error().message.find("none.ply"), std::string::npos);
 }
 
 TEST(SceneOrigin, StaysZeroForASceneAroundZero) {
   const LoadedScene scene = loaded(ascii_head(2, kXyz) + "-3 -1 0\n5 1 10\n");
-  EXPECT_EQ(scene.mesh.origin, Vec3d{});
+  EXPECT_EQ(scene.mesh.origin, base::Vec3d{});
 }
 
 TEST(SceneOrigin, IsTheOneThatIsGiven) {
   // Two parts of one map: what they share is the same, though each by itself would have an origin of its own.
-  const auto part = [](const std::string& other, const Vec3d& origin) {
+  const auto part = [](const std::string& other, const base::Vec3d& origin) {
     const std::string text =
         "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
         "500010.1230000001 4000000.7 1.1\n" +
         other + "\n";
-    fusion::ReadOptions options;
+    files::ReadOptions options;
     options.origin = origin;
     return loaded(text, options);
   };
-  const Vec3d origin{500000, 4000000, 0};
+  const base::Vec3d origin{500000, 4000000, 0};
   const auto one = part("500000 4000000 0", origin), two = part("500030 4000900 2", origin);
   EXPECT_EQ(one.mesh.origin, origin);
   EXPECT_EQ(two.mesh.origin, origin);
@@ -316,12 +318,12 @@ TEST(SceneOrigin, LosesNothingOfFloatCoordinatesFarAway) {
   file.text("ply\nformat binary_little_endian 1.0\nelement vertex 3\n" + std::string(kXyz) + "end_header\n");
   for (std::size_t i = 0; i < 3; ++i) file.le(xs[i]).le(ys[i]).le(zs[i]);
   const LoadedScene scene = loaded(file.bytes());
-  const Vec3d& origin = scene.mesh.origin;
+  const base::Vec3d& origin = scene.mesh.origin;
   EXPECT_NE(origin.x, 0);
   EXPECT_EQ(origin.y, 0);
   EXPECT_EQ(std::fmod(origin.x, 128), 0);
   for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3f& p = scene.mesh.positions()[i];
+    const base::Vec3f& p = scene.mesh.positions()[i];
     EXPECT_EQ(origin.x + static_cast<double>(p.x), static_cast<double>(xs[i]));
     EXPECT_EQ(origin.y + static_cast<double>(p.y), static_cast<double>(ys[i]));
     EXPECT_EQ(origin.z + static_cast<double>(p.z), static_cast<double>(zs[i]));
@@ -331,8 +333,8 @@ TEST(SceneOrigin, LosesNothingOfFloatCoordinatesFarAway) {
 
 TEST(SceneOrigin, KeepsMillimetresOfDoubleCoordinatesOnTheEarth) {
   // UTM and earth-centred coordinates of a scene of 200 m.
-  const Vec3d corners[] = {{447'000.0005, 5'411'000.1234, 312.0}, {4'157'222.543, 664'789.307, 4'774'952.099}};
-  for (const Vec3d& corner : corners) {
+  const base::Vec3d corners[] = {{447'000.0005, 5'411'000.1234, 312.0}, {4'157'222.543, 664'789.307, 4'774'952.099}};
+  for (const base::Vec3d& corner : corners) {
     PlyBytes file;
     file.text(
         "ply\nformat binary_little_endian 1.0\nelement vertex 21\nproperty double x\nproperty double y\n"
@@ -343,7 +345,7 @@ TEST(SceneOrigin, KeepsMillimetresOfDoubleCoordinatesOnTheEarth) {
     const LoadedScene scene = loaded(file.bytes());
     EXPECT_TRUE(scene.mesh.double_positions);
     for (int i = 0; i <= 20; ++i) {
-      const Vec3f& p = scene.mesh.positions()[static_cast<std::size_t>(i)];
+      const base::Vec3f& p = scene.mesh.positions()[static_cast<std::size_t>(i)];
       const double tolerance = 256 * 0x1p-24;
       EXPECT_NEAR(scene.mesh.origin.x + static_cast<double>(p.x), corner.x + 10.0001 * i, tolerance);
       EXPECT_NEAR(scene.mesh.origin.y + static_cast<double>(p.y), corner.y + 3.0003 * i, tolerance);
@@ -393,9 +395,9 @@ TEST(PlyReader, NeedsFewBytesPerVertex) {
   const test::AllocationMeter meter;
   const auto scene = read_ply(path);
   ASSERT_TRUE(scene);
-  EXPECT_EQ(scene.value().mesh.triangles().back(), (Triangle{159'599, 159'999, 159'998}));
-  EXPECT_EQ(scene.value().mesh.positions()[159'999], (Vec3f{399, 399, 159'999.0F * 0.001F}));
-  EXPECT_EQ(scene.value().mesh.visible()[16'000], (Rgb8{128, 62, 3}));
+  EXPECT_EQ(scene.value().mesh.triangles().back(), (base::Triangle{159'599, 159'999, 159'998}));
+  EXPECT_EQ(scene.value().mesh.positions()[159'999], (base::Vec3f{399, 399, 159'999.0F * 0.001F}));
+  EXPECT_EQ(scene.value().mesh.visible()[16'000], (base::Rgb8{128, 62, 3}));
   // 24 of the mesh, 24 of two triangles, and the reader's buffers.
   EXPECT_LT(meter.peak_bytes(), 160'000U * 49 + 1'500'000U);
 }
@@ -411,20 +413,20 @@ TEST(PlyStream, HandsOnBlocksInOrderAndAgain) {
   ASSERT_TRUE(scene);
   for (int pass = 0; pass < 2; ++pass) {
     std::uint64_t next_vertex = 0;
-    std::vector<Triangle> triangles;
+    std::vector<base::Triangle> triangles;
     PlyHandlers handlers;
-    handlers.vertices = [&](const PlyVertexBlock& block) -> Result<void> {
+    handlers.vertices = [&](const PlyVertexBlock& block) -> base::Result<void> {
       EXPECT_EQ(block.first_vertex, next_vertex);
       for (std::size_t i = 0; i < block.positions.size(); ++i, ++next_vertex) {
         EXPECT_EQ(block.visible[i], scene.value().mesh.visible()[next_vertex]);
         EXPECT_EQ(block.temperature_celsius[i], scene.value().mesh.temperature_celsius()[next_vertex]);
         EXPECT_EQ(block.positions[i].z, static_cast<double>(scene.value().mesh.positions()[next_vertex].z));
       }
-      return success();
+      return base::success();
     };
-    handlers.triangles = [&](std::span<const Triangle> block) -> Result<void> {
+    handlers.triangles = [&](std::span<const base::Triangle> block) -> base::Result<void> {
       triangles.insert(triangles.end(), block.begin(), block.end());
-      return success();
+      return base::success();
     };
     const auto facts = stream.value().read(handlers);
     ASSERT_TRUE(facts);
@@ -450,14 +452,14 @@ TEST(PlyStream, EndsWithTheErrorOfAHandler) {
   auto stream = PlyStream::open(folder.write("grid.ply", grid_scene(10)));
   ASSERT_TRUE(stream);
   PlyHandlers handlers;
-  handlers.triangles = [](std::span<const Triangle>) -> Result<void> {
-    return failure(ErrorCode::FileUnwritable, "the disk is full", "out.ply");
+  handlers.triangles = [](std::span<const base::Triangle>) -> base::Result<void> {
+    return base::failure(base::ErrorCode::FileUnwritable, "the disk is full", "out.ply");
   };
   const auto facts = stream.value().read(handlers);
   ASSERT_FALSE(facts);
-  EXPECT_EQ(facts.error().code, ErrorCode::FileUnwritable);
+  EXPECT_EQ(facts.error().code, base::ErrorCode::FileUnwritable);
   EXPECT_EQ(facts.error().field, "out.ply");
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

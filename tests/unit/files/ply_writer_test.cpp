@@ -18,11 +18,11 @@
 #include "fusion/files/ply_reader.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
-MultispectralMesh sample_mesh() {
-  MultispectralMesh mesh;
+mesh::MultispectralMesh sample_mesh() {
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(3);
   mesh.positions()[0] = {0.1F, -2.5F, 1e-30F};
   mesh.positions()[1] = {1, 0, 0};
@@ -34,9 +34,9 @@ MultispectralMesh sample_mesh() {
   return mesh;
 }
 
-const std::vector<Rgb8> kColours = {{1, 2, 3}, {4, 5, 6}, {255, 254, 253}};
+const std::vector<base::Rgb8> kColours = {{1, 2, 3}, {4, 5, 6}, {255, 254, 253}};
 
-std::string written(const MultispectralMesh& mesh) {
+std::string written(const mesh::MultispectralMesh& mesh) {
   std::ostringstream out;
   EXPECT_TRUE(write_ply(out, mesh, kColours));
   return out.str();
@@ -54,9 +54,9 @@ TEST(PlyWriter, WritesWhatItSays) {
       "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
       "property uchar blue\nproperty float temperature\nelement face 1\n"
       "property list uchar int vertex_indices\nend_header\n");
-  const MultispectralMesh mesh = sample_mesh();
+  const mesh::MultispectralMesh mesh = sample_mesh();
   for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3f& p = mesh.positions()[i];
+    const base::Vec3f& p = mesh.positions()[i];
     expected.le(p.x).le(p.y).le(p.z).le(kColours[i].r).le(kColours[i].g).le(kColours[i].b);
     expected.le(mesh.temperature_celsius()[i]);
   }
@@ -65,7 +65,7 @@ TEST(PlyWriter, WritesWhatItSays) {
 }
 
 TEST(PlyWriter, RoundTripsAndLeavesOutWhatIsNotThere) {
-  MultispectralMesh mesh = sample_mesh();
+  mesh::MultispectralMesh mesh = sample_mesh();
   const LoadedScene scene = test::loaded(written(mesh));
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(scene.mesh.positions()[i], mesh.positions()[i]);
@@ -83,7 +83,7 @@ TEST(PlyWriter, RoundTripsAndLeavesOutWhatIsNotThere) {
 }
 
 TEST(PlyWriter, AddsTheOriginAndKeepsDoubles) {
-  MultispectralMesh mesh = sample_mesh();
+  mesh::MultispectralMesh mesh = sample_mesh();
   mesh.origin = {4'157'216, 664'768, -8};
   mesh.double_positions = true;
   const std::string bytes = written(mesh);
@@ -111,7 +111,7 @@ TEST(PlyWriter, RefusesColoursOfAnotherNumber) {
   std::ostringstream out;
   const auto result = write_ply(out, sample_mesh(), std::span(kColours).first(2));
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::Inconsistent);
+  EXPECT_EQ(result.error().code, base::ErrorCode::Inconsistent);
 }
 
 TEST(PlyWriter, SaysWhenAStreamFails) {
@@ -119,7 +119,7 @@ TEST(PlyWriter, SaysWhenAStreamFails) {
   out.setstate(std::ios::badbit);
   const auto result = write_ply(out, sample_mesh(), kColours);
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::FileUnwritable);
+  EXPECT_EQ(result.error().code, base::ErrorCode::FileUnwritable);
 }
 
 TEST(PlyWriter, ReplacesAFileAndKeepsItsPermissions) {
@@ -182,7 +182,7 @@ TEST(PlyWriter, NamesTheFileItCannotWrite) {
                                             std::filesystem::path("/dev/full"), std::filesystem::path("/dev/none")}) {
     const auto result = write_ply(path, sample_mesh(), kColours);
     ASSERT_FALSE(result) << path;
-    EXPECT_EQ(result.error().code, ErrorCode::FileUnwritable);
+    EXPECT_EQ(result.error().code, base::ErrorCode::FileUnwritable);
     EXPECT_NE(result.error().message.find(path.string()), std::string::npos) << result.error().message;
     EXPECT_EQ(result.error().field, path.string());
   }
@@ -201,7 +201,7 @@ TEST(PlyWriter, LeavesTheOldFileAndNothingElseWhenTheDiskIsFull) {
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
   std::signal(SIGXFSZ, handler);
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::FileUnwritable);
+  EXPECT_EQ(result.error().code, base::ErrorCode::FileUnwritable);
   EXPECT_NE(result.error().message.find(path.string()), std::string::npos);
   EXPECT_EQ(test::file_bytes(path), "old");
   EXPECT_EQ(entry_count(folder.path()), 1U);
@@ -258,14 +258,14 @@ TEST(OutputFile, AbandonedLeavesWhatWasThereBefore) {
 TEST(PlyEncoder, RefusesOtherNumbersThanItsHeaderHas) {
   PlyLayout layout;
   layout.vertex_count = 2;
-  PlyEncoder encoder(layout, [](std::span<const std::byte>) -> Result<void> { return success(); });
-  const Vec3f position;
-  const Rgb8 colour;
+  PlyEncoder encoder(layout, [](std::span<const std::byte>) -> base::Result<void> { return base::success(); });
+  const base::Vec3f position;
+  const base::Rgb8 colour;
   ASSERT_TRUE(encoder.vertices({&position, 1}, {&colour, 1}, {}));
   const auto result = encoder.finish();
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, ErrorCode::Inconsistent);
+  EXPECT_EQ(result.error().code, base::ErrorCode::Inconsistent);
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

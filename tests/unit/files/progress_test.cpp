@@ -14,7 +14,7 @@
 #include "fusion/mesh/topology.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 /// What was told, phase by phase.
@@ -26,7 +26,7 @@ struct Told {
 /// Keeps all that is told to it.
 class Listener {
  public:
-  Progress progress() {
+  base::Progress progress() {
     return [this](std::string_view phase, double share) {
       if (told_.empty() || told_.back().phase != phase) told_.push_back({std::string(phase), {}});
       told_.back().shares.push_back(share);
@@ -50,8 +50,8 @@ class Listener {
 };
 
 /// A square of `side` x `side` vertices, with temperatures.
-MultispectralMesh sheet(std::uint32_t side) {
-  MultispectralMesh mesh;
+mesh::MultispectralMesh sheet(std::uint32_t side) {
+  mesh::MultispectralMesh mesh;
   mesh.has_temperature = true;
   mesh.resize_vertices(std::size_t{side} * side);
   for (std::uint32_t y = 0; y < side; ++y) {
@@ -71,13 +71,13 @@ MultispectralMesh sheet(std::uint32_t side) {
 class ProgressOfFiles : public testing::Test {
  protected:
   void SetUp() override {
-    const MultispectralMesh mesh = sheet(250);
+    const mesh::MultispectralMesh mesh = sheet(250);
     ASSERT_TRUE(write_ply(scene_, mesh, mesh.visible(), {}, written_.progress()));
   }
-  static FusionSettings settings(const std::string& method) {
-    FusionChange change;
+  static fusion::FusionSettings settings(const std::string& method) {
+    fusion::FusionChange change;
     change.method = method;
-    return with_change(default_settings(), change).value();
+    return fusion::with_change(fusion::default_settings(), change).value();
   }
   const test::TemporaryFolder folder_;
   const std::filesystem::path scene_ = folder_.path() / "scene.ply";
@@ -118,10 +118,10 @@ TEST_F(ProgressOfFiles, IsToldByTheBytesThatAreWritten) {
 
 TEST(Progress, OfModellingAndOfTopologyGoesAhead) {
   Listener listener;
-  const auto mesh = demo_scene({40'000, 1}, listener.progress());
-  topology_facts(mesh, listener.progress());
+  const auto mesh = demo::demo_scene({40'000, 1}, listener.progress());
+  mesh::topology_facts(mesh, listener.progress());
   EXPECT_EQ(listener.phases(), (std::vector<std::string>{"modelling", "examining the topology"}));
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

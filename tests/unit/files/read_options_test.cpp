@@ -9,7 +9,7 @@
 
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::kXyz;
@@ -112,7 +112,7 @@ TEST(ReadOptions, NameThePropertyOfTheTemperature) {
   EXPECT_EQ(first_celsius(loaded(cloud("float temperature\nproperty int Quality", {"20 30"}), options)), 30.0F);
   const auto missing = test::read_bytes(cloud("float temperature", {"20"}), options);
   ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(missing.error().code, base::ErrorCode::Unsupported);
   EXPECT_NE(missing.error().message.find("'Quality'"), std::string::npos) << missing.error().message;
 }
 
@@ -140,10 +140,10 @@ TEST(ReadOptions, AreRefusedWhenTheyCannotBeMeant) {
   for (std::size_t i = 0; i < bad.size(); ++i) {
     const auto scene = test::read_bytes(cloud("float temperature", {"20"}), bad[i]);
     ASSERT_FALSE(scene) << i;
-    EXPECT_LT(static_cast<int>(scene.error().code), static_cast<int>(ErrorCode::FileNotFound)) << i;
+    EXPECT_LT(static_cast<int>(scene.error().code), static_cast<int>(base::ErrorCode::FileNotFound)) << i;
     EXPECT_FALSE(scene.error().field.empty()) << i;
   }
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

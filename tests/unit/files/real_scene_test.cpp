@@ -11,7 +11,7 @@
 #include "fusion/mesh/topology.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 struct RealScene {
@@ -36,7 +36,7 @@ TEST_P(RealScenes, AreReadWholeAndCheaply) {
   const test::AllocationMeter meter;
   const auto scene = read_ply(path_);
   ASSERT_TRUE(scene) << scene.error().message;
-  const MultispectralMesh& mesh = scene.value().mesh;
+  const mesh::MultispectralMesh& mesh = scene.value().mesh;
   EXPECT_EQ(mesh.vertex_count(), GetParam().vertices);
   EXPECT_EQ(mesh.triangle_count(), GetParam().triangles);
   EXPECT_EQ(mesh.has_temperature, GetParam().has_temperature);
@@ -57,7 +57,7 @@ TEST_P(RealScenes, ComeBackByteByByte) {
 TEST_P(RealScenes, HaveATopology) {
   const auto scene = read_ply(path_);
   ASSERT_TRUE(scene);
-  const TopologyFacts facts = topology_facts(scene.value().mesh);
+  const mesh::TopologyFacts facts = mesh::topology_facts(scene.value().mesh);
   EXPECT_GT(facts.boundary_edge_count, 0U);
   EXPECT_GT(facts.component_count, 0U);
   EXPECT_EQ(facts.unreferenced_vertex_count, test::note_count(scene.value(), "unreferenced_vertices"));
@@ -76,4 +76,4 @@ INSTANTIATE_TEST_SUITE_P(, RealScenes,
                          });
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -13,7 +13,7 @@
 #include "fusion/files/up_search.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::note_count;
@@ -25,12 +25,12 @@ std::string told(std::vector<std::string> comments) {
 
 TEST(UpAxis, HasSixNames) {
   for (const std::string_view name : {"x", "y", "z", "-x", "-y", "-z"}) {
-    ASSERT_TRUE(up_axis(name)) << name;
-    EXPECT_EQ(to_string(*up_axis(name)), name);
+    ASSERT_TRUE(base::up_axis(name)) << name;
+    EXPECT_EQ(to_string(*base::up_axis(name)), name);
   }
-  for (const std::string_view name : {"", "X", "+z", "up", "auto", "zz"}) EXPECT_FALSE(up_axis(name)) << name;
-  EXPECT_EQ(direction_of(UpAxis::MinusY), (Vec3f{0, -1, 0}));
-  EXPECT_EQ(direction_of(UpAxis::X), (Vec3f{1, 0, 0}));
+  for (const std::string_view name : {"", "X", "+z", "up", "auto", "zz"}) EXPECT_FALSE(base::up_axis(name)) << name;
+  EXPECT_EQ(base::direction_of(base::UpAxis::MinusY), (base::Vec3f{0, -1, 0}));
+  EXPECT_EQ(base::direction_of(base::UpAxis::X), (base::Vec3f{1, 0, 0}));
 }
 
 TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
@@ -101,35 +101,35 @@ LoadedScene sheet(double width, double height, std::size_t thin, bool has_triang
   return scene;
 }
 
-UpAxis up_of(LoadedScene scene, const ReadOptions& options = {}) {
+base::UpAxis up_of(LoadedScene scene, const ReadOptions& options = {}) {
   survey(scene, options);
-  EXPECT_EQ(note_count(scene, "up_found"), scene.mesh.up != UpAxis::Z && !options.up ? 1U : 0U);
+  EXPECT_EQ(note_count(scene, "up_found"), scene.mesh.up != base::UpAxis::Z && !options.up ? 1U : 0U);
   return scene.mesh.up;
 }
 
 TEST(SceneSurvey, SeesWhichWayIsUpInMapsOnly) {
   for (const bool has_triangles : {true, false}) {
-    EXPECT_EQ(up_of(sheet(2000, 90, 1, has_triangles)), UpAxis::Y);
-    EXPECT_EQ(up_of(sheet(2000, 90, 0, has_triangles)), UpAxis::X);
-    EXPECT_EQ(up_of(sheet(2000, 90, 2, has_triangles)), UpAxis::Z);
-    EXPECT_EQ(up_of(sheet(20, 0.9, 1, has_triangles)), UpAxis::Z) << "a wall";
-    EXPECT_EQ(up_of(sheet(2000, 900, 1, has_triangles)), UpAxis::Z) << "not flat";
+    EXPECT_EQ(up_of(sheet(2000, 90, 1, has_triangles)), base::UpAxis::Y);
+    EXPECT_EQ(up_of(sheet(2000, 90, 0, has_triangles)), base::UpAxis::X);
+    EXPECT_EQ(up_of(sheet(2000, 90, 2, has_triangles)), base::UpAxis::Z);
+    EXPECT_EQ(up_of(sheet(20, 0.9, 1, has_triangles)), base::UpAxis::Z) << "a wall";
+    EXPECT_EQ(up_of(sheet(2000, 900, 1, has_triangles)), base::UpAxis::Z) << "not flat";
   }
 }
 
 TEST(SceneSurvey, TakesUpAsItIsTold) {
   ReadOptions wanted;
-  wanted.up = UpAxis::MinusX;
-  EXPECT_EQ(up_of(sheet(2000, 90, 1), wanted), UpAxis::MinusX);
-  wanted.up = UpAxis::Z;
-  EXPECT_EQ(up_of(sheet(2000, 90, 1), wanted), UpAxis::Z);
+  wanted.up = base::UpAxis::MinusX;
+  EXPECT_EQ(up_of(sheet(2000, 90, 1), wanted), base::UpAxis::MinusX);
+  wanted.up = base::UpAxis::Z;
+  EXPECT_EQ(up_of(sheet(2000, 90, 1), wanted), base::UpAxis::Z);
   LoadedScene map = sheet(2000, 90, 1);
   map.comments = {"comment up z"};
-  EXPECT_EQ(up_of(std::move(map)), UpAxis::Z);
+  EXPECT_EQ(up_of(std::move(map)), base::UpAxis::Z);
   LoadedScene wall = sheet(20, 0.9, 2);
   wall.comments = {"comment Y-up"};
   survey(wall);
-  EXPECT_EQ(wall.mesh.up, UpAxis::Y);
+  EXPECT_EQ(wall.mesh.up, base::UpAxis::Y);
   ASSERT_EQ(note_count(wall, "up_found"), 1U);
   EXPECT_EQ(wall.notes.back().message, "y is taken for up, as the file's comments say; --up z takes z");
 }
@@ -219,11 +219,11 @@ TEST(SceneSurvey, BearsScenesOfNothing) {
     LoadedScene scene;
     scene.mesh.resize_vertices(count);
     survey(scene);
-    EXPECT_EQ(scene.mesh.up, UpAxis::Z);
+    EXPECT_EQ(scene.mesh.up, base::UpAxis::Z);
     EXPECT_TRUE(scene.notes.empty());
     EXPECT_TRUE(scene.core_bounds);
   }
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

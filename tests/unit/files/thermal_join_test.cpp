@@ -15,7 +15,7 @@
 #include "fusion/mesh/nearest_surface.hpp"
 #include "loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::files {
 namespace {
 
 using test::note_count;
@@ -38,7 +38,7 @@ std::string visible_with(std::string lines, const std::string& more) {
   return lines;
 }
 
-Result<LoadedScene> joined(const std::string& visible, const std::string& thermal, double distance = 0) {
+base::Result<LoadedScene> joined(const std::string& visible, const std::string& thermal, double distance = 0) {
   const test::TemporaryFolder folder;
   return read_ply_with_thermal(folder.write("v.ply", visible), folder.write("t.ply", thermal), {}, distance);
 }
@@ -110,7 +110,7 @@ TEST(ThermalJoin, TellsHowFarItIs) {
   ReadOptions options;
   options.progress = [&](std::string_view phase, double share) {
     const std::lock_guard lock(mutex);
-    if (phase == kJoiningPhase) shares.push_back(share);
+    if (phase == base::kJoiningPhase) shares.push_back(share);
   };
   ASSERT_TRUE(read_ply_with_thermal(folder.write("v.ply", visible_file(grid(150, 1, ""), 22'500)),
                                     folder.write("t.ply", thermal_file(grid(75, 2, " 20"), 5625)), options, 0));
@@ -167,7 +167,7 @@ TEST(ThermalJoin, RefusesWhatCannotBeJoined) {
   const std::string good = visible_file("0 0 0\n", 1);
   const auto no_temperature = joined(good, good);
   ASSERT_FALSE(no_temperature);
-  EXPECT_EQ(no_temperature.error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(no_temperature.error().code, base::ErrorCode::Unsupported);
   EXPECT_EQ(no_temperature.error().message,
             "t.ply: the thermal file has no temperature: none of its properties can be one");
   const auto other_name = joined(good, "ply\nformat ascii 1.0\nelement vertex 1\n" + std::string(test::kXyz) +
@@ -180,16 +180,16 @@ TEST(ThermalJoin, RefusesWhatCannotBeJoined) {
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const auto bad = joined(good, thermal_file("0 0 0 1\n", 1), distance);
     ASSERT_FALSE(bad);
-    EXPECT_EQ(bad.error().code, ErrorCode::OutOfRange);
+    EXPECT_EQ(bad.error().code, base::ErrorCode::OutOfRange);
   }
   const test::TemporaryFolder folder;
   const auto missing = read_ply_with_thermal(folder.write("v.ply", good), folder.path() / "t.ply");
   ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().code, ErrorCode::FileNotFound);
+  EXPECT_EQ(missing.error().code, base::ErrorCode::FileNotFound);
 }
 
 /// A bumpy square, seen as a mesh; `count` vertices a side, `metres_per_unit`, moved by `shift`.
-std::string square_file(int side, double size, double scale, Vec3d shift, bool has_temperature, bool has_faces) {
+std::string square_file(int side, double size, double scale, base::Vec3d shift, bool has_temperature, bool has_faces) {
   std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(side * side) + "\n" +
                      std::string(test::kXyz) + (has_temperature ? "property float temperature\n" : "");
   if (has_faces) {
@@ -218,7 +218,7 @@ std::string square_file(int side, double size, double scale, Vec3d shift, bool h
 std::string refusal(const std::string& visible, const std::string& thermal) {
   const auto scene = joined(visible, thermal);
   if (scene) return "not refused";
-  EXPECT_EQ(scene.error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(scene.error().code, base::ErrorCode::Unsupported);
   return scene.error().message;
 }
 
@@ -228,7 +228,7 @@ TEST(ThermalJoin, ReadsTheSurfaceBetweenThermalVertices) {
   const auto& mesh = scene.value().mesh;
   EXPECT_EQ(note_count(scene.value(), "thermal_joined_nearest"), mesh.vertex_count());
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
-    const Vec3f& p = mesh.positions()[v];
+    const base::Vec3f& p = mesh.positions()[v];
     // A nearest vertex would be off by up to half a spacing in both directions: 0.37 degrees.
     ASSERT_NEAR(mesh.temperature_celsius()[v], 20 + p.x + 2 * p.y, 0.12) << v;
   }
@@ -295,7 +295,7 @@ TEST(ThermalJoin, DoesNotReachBeyondTheBorderOfTheThermalSurface) {
   ASSERT_TRUE(scene) << scene.error().message;
   const auto& mesh = scene.value().mesh;
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
-    const Vec3f& p = mesh.positions()[v];
+    const base::Vec3f& p = mesh.positions()[v];
     const float beyond = std::max(p.x, p.y) - 2;
     if (beyond < 1e-3F) {
       EXPECT_TRUE(std::isfinite(mesh.temperature_celsius()[v])) << v;
@@ -380,17 +380,17 @@ TEST(ThermalJoin, JoinsTwoReconstructionsOfOneCastle) {
 TEST(NearestSurface, AgreesWithLookingAtAll) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> coordinate(-10, 10);
-  const auto random_point = [&] { return Vec3f{coordinate(random), coordinate(random), coordinate(random)}; };
+  const auto random_point = [&] { return base::Vec3f{coordinate(random), coordinate(random), coordinate(random)}; };
   for (const std::uint32_t count : {1U, 2U, 7U, 8U, 9U, 17U, 500U}) {
-    std::vector<Vec3f> points(count);
-    for (Vec3f& point : points) point = random_point();
-    std::vector<Triangle> triangles;
+    std::vector<base::Vec3f> points(count);
+    for (base::Vec3f& point : points) point = random_point();
+    std::vector<base::Triangle> triangles;
     for (std::uint32_t i = 0; i + 5 < count; i += 3) triangles.push_back({i, i + 1, i + 4});
     for (const bool has_triangles : {false, true}) {
-      const NearestSurface nearest(points, has_triangles ? std::span(triangles) : std::span<Triangle>());
-      std::vector<Triangle> elements;
+      const mesh::NearestSurface nearest(points, has_triangles ? std::span(triangles) : std::span<base::Triangle>());
+      std::vector<base::Triangle> elements;
       std::vector<bool> is_used(count);
-      for (const Triangle& t : triangles) {
+      for (const base::Triangle& t : triangles) {
         if (!has_triangles) break;
         elements.push_back(t);
         for (const std::uint32_t corner : t) is_used[corner] = true;
@@ -399,9 +399,9 @@ TEST(NearestSurface, AgreesWithLookingAtAll) {
         if (!is_used[v]) elements.push_back({v, v, v});
       }
       for (int query = 0; query < 100; ++query) {
-        const Vec3f position = random_point();
+        const base::Vec3f position = random_point();
         const double limit = query % 2 == 0 ? 1e9 : 3;
-        const auto distance = [&](const Triangle& t, const std::array<double, 3>& weights) {
+        const auto distance = [&](const base::Triangle& t, const std::array<double, 3>& weights) {
           std::array<double, 3> foot{};
           for (std::size_t i = 0; i < 3; ++i) {
             foot[0] += weights[i] * double{points[t[i]].x};
@@ -411,8 +411,9 @@ TEST(NearestSurface, AgreesWithLookingAtAll) {
           return std::hypot(foot[0] - double{position.x}, foot[1] - double{position.y}, foot[2] - double{position.z});
         };
         double best = std::numeric_limits<double>::infinity();
-        for (const Triangle& t : elements) {
-          best = std::min(best, distance(t, nearest_on_triangle(position, points[t[0]], points[t[1]], points[t[2]])));
+        for (const base::Triangle& t : elements) {
+          best = std::min(best,
+                          distance(t, mesh::nearest_on_triangle(position, points[t[0]], points[t[1]], points[t[2]])));
         }
         const auto hit = nearest.find(position, limit);
         ASSERT_EQ(hit.has_value(), best <= limit);
@@ -425,9 +426,9 @@ TEST(NearestSurface, AgreesWithLookingAtAll) {
 }
 
 TEST(NearestSurface, FindsThePointOfATriangle) {
-  const Vec3f a{0, 0, 0}, b{4, 0, 0}, c{0, 4, 0};
-  const auto expect = [&](Vec3f place, std::array<double, 3> weights) {
-    const auto found = nearest_on_triangle(place, a, b, c);
+  const base::Vec3f a{0, 0, 0}, b{4, 0, 0}, c{0, 4, 0};
+  const auto expect = [&](base::Vec3f place, std::array<double, 3> weights) {
+    const auto found = mesh::nearest_on_triangle(place, a, b, c);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(found[i], weights[i], 1e-12);
   };
   expect({1, 1, 5}, {0.5, 0.25, 0.25});
@@ -435,31 +436,31 @@ TEST(NearestSurface, FindsThePointOfATriangle) {
   expect({-1, -2, 0}, {1, 0, 0});
   expect({9, -1, 0}, {0, 1, 0});
   expect({3, 3, 0}, {0, 0.5, 0.5});
-  EXPECT_EQ(nearest_on_triangle({1, 2, 3}, b, b, b), (std::array<double, 3>{1, 0, 0}));
-  const auto thin = nearest_on_triangle({3, 1, 0}, a, b, {2, 0, 0});
+  EXPECT_EQ(mesh::nearest_on_triangle({1, 2, 3}, b, b, b), (std::array<double, 3>{1, 0, 0}));
+  const auto thin = mesh::nearest_on_triangle({3, 1, 0}, a, b, {2, 0, 0});
   EXPECT_NEAR(thin[1] * 4 + thin[2] * 2, 3, 1e-12) << "all three on a line";
 }
 
 TEST(NearestSurface, BearsManyPointsAtOnePlace) {
-  std::vector<Vec3f> points(20'000, Vec3f{1, 2, 3});
-  EXPECT_EQ(NearestSurface(points, {}).median_spacing(), 0);
+  std::vector<base::Vec3f> points(20'000, base::Vec3f{1, 2, 3});
+  EXPECT_EQ(mesh::NearestSurface(points, {}).median_spacing(), 0);
   points.push_back({2, 2, 3});
-  const NearestSurface nearest(points, {});
+  const mesh::NearestSurface nearest(points, {});
   EXPECT_EQ(nearest.find({1, 2, 3}, 0)->distance, 0);
   EXPECT_EQ(nearest.find({2.25F, 2, 3}, 1)->corners[0], 20'000U);
   EXPECT_FALSE(nearest.find({5, 2, 3}, 1));
-  EXPECT_FALSE(NearestSurface({}, {}).find({5, 2, 3}, 1));
+  EXPECT_FALSE(mesh::NearestSurface({}, {}).find({5, 2, 3}, 1));
 }
 
 TEST(NearestSurface, KnowsTheSpacingOfAGrid) {
-  std::vector<Vec3f> points;
+  std::vector<base::Vec3f> points;
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 60; ++x) points.push_back({static_cast<float>(x) * 0.5F, static_cast<float>(y) * 0.5F, 0});
   }
-  EXPECT_NEAR(NearestSurface(points, {}).median_spacing(), 0.5, 1e-12);
-  const std::vector<Triangle> triangles{{0, 1, 60}, {1, 61, 60}};
-  EXPECT_NEAR(NearestSurface(points, triangles).median_spacing(), 0.5, 1e-12);
+  EXPECT_NEAR(mesh::NearestSurface(points, {}).median_spacing(), 0.5, 1e-12);
+  const std::vector<base::Triangle> triangles{{0, 1, 60}, {1, 61, 60}};
+  EXPECT_NEAR(mesh::NearestSurface(points, triangles).median_spacing(), 0.5, 1e-12);
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::files

@@ -40,7 +40,7 @@ TEST(AddingAMethod, TheKernelOfThePageFollowsItsFormula) {
   std::mt19937 engine(4);
   std::uniform_real_distribution<float> celsius(10, 40);
   std::vector<float> temperature;
-  std::vector<Rgb8> visible;
+  std::vector<base::Rgb8> visible;
   for (int i = 0; i < 1000; ++i) {
     temperature.push_back(i % 10 ? celsius(engine) : std::numeric_limits<float>::quiet_NaN());
     const auto bits = static_cast<std::uint32_t>(engine());
@@ -54,7 +54,7 @@ TEST(AddingAMethod, TheKernelOfThePageFollowsItsFormula) {
   const Method method = methods::thermal_multiply();
   const PreparedMethod prepared =
       method.prepare({{"strength", 0.7}}, MethodContext{lo, hi, scene, palette, std::nullopt});
-  std::vector<Rgb8> fused(visible.size());
+  std::vector<base::Rgb8> fused(visible.size());
   prepared.kernel->fuse({temperature, visible}, fused);
   for (std::size_t i = 0; i < fused.size(); ++i) {
     if (!std::isfinite(temperature[i])) {

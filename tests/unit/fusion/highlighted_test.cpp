@@ -81,7 +81,7 @@ TEST(Mark, TellsVerticesThatAreHighlightedFromOthersAndFromMissingOnes) {
   const auto marks = [&](const std::string& method, ParameterValues params, std::optional<RangeSetting> range = {}) {
     // What is missing has a colour of its own, and is not highlighted by that.
     const auto plan =
-        FusionPlan::prepare(settings_with(method, std::move(params), range, MissingDisplay(Rgb8{255, 0, 0})),
+        FusionPlan::prepare(settings_with(method, std::move(params), range, MissingDisplay(base::Rgb8{255, 0, 0})),
                             scene_of(temperature))
             .value();
     std::vector<std::uint8_t> marked(temperature.size(), 7);

@@ -37,7 +37,7 @@ TEST(Parameter, NumberOutsideItsBoundsIsRefusedWithNameAndLimits) {
   for (const double bad : {-0.001, 4.001, kNan, kInfinity, -kInfinity}) {
     const auto result = validated(number, bad);
     ASSERT_TRUE(result.has_error()) << bad;
-    EXPECT_EQ(result.error().code, ErrorCode::OutOfRange);
+    EXPECT_EQ(result.error().code, base::ErrorCode::OutOfRange);
     EXPECT_EQ(result.error().field, "strength");
     EXPECT_NE(result.error().message.find("strength"), std::string::npos);
     EXPECT_NE(result.error().message.find("of at least 0 and of at most 4"), std::string::npos)
@@ -58,25 +58,25 @@ TEST(Parameter, IntegerAcceptsWholeNumbersOnly) {
   const Parameter integer = parameter(ParameterKind::Integer);
   EXPECT_EQ(validated(integer, 3.0).value(), ParameterValue{std::int64_t{3}});
   EXPECT_EQ(validated(integer, std::int64_t{4}).value(), ParameterValue{std::int64_t{4}});
-  EXPECT_EQ(validated(integer, 2.5).error().code, ErrorCode::WrongType);
-  EXPECT_EQ(validated(integer, std::int64_t{5}).error().code, ErrorCode::OutOfRange);
-  EXPECT_EQ(validated(integer, kNan).error().code, ErrorCode::OutOfRange);
+  EXPECT_EQ(validated(integer, 2.5).error().code, base::ErrorCode::WrongType);
+  EXPECT_EQ(validated(integer, std::int64_t{5}).error().code, base::ErrorCode::OutOfRange);
+  EXPECT_EQ(validated(integer, kNan).error().code, base::ErrorCode::OutOfRange);
   Parameter unbounded = parameter(ParameterKind::Integer);
   unbounded.max = kInfinity;
-  EXPECT_EQ(validated(unbounded, 1e300).error().code, ErrorCode::OutOfRange);
+  EXPECT_EQ(validated(unbounded, 1e300).error().code, base::ErrorCode::OutOfRange);
 }
 
 TEST(Parameter, WrongTypeIsRefused) {
   const auto code = [](ParameterKind kind, const ParameterValue& value) {
     return validated(parameter(kind), value).error().code;
   };
-  EXPECT_EQ(code(ParameterKind::Number, std::string("1")), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Number, true), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Number, Automatic{}), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Integer, true), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Toggle, 1.0), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Choice, std::int64_t{0}), ErrorCode::WrongType);
-  EXPECT_EQ(code(ParameterKind::Temperature, std::string("warm")), ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Number, std::string("1")), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Number, true), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Number, Automatic{}), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Integer, true), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Toggle, 1.0), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Choice, std::int64_t{0}), base::ErrorCode::WrongType);
+  EXPECT_EQ(code(ParameterKind::Temperature, std::string("warm")), base::ErrorCode::WrongType);
 }
 
 TEST(Parameter, ChoiceNamesItsOptions) {
@@ -91,7 +91,7 @@ TEST(Parameter, TemperatureIsANumberOrAutomatic) {
   threshold.kind = ParameterKind::Temperature;
   EXPECT_EQ(validated(threshold, Automatic{}).value(), ParameterValue{Automatic{}});
   EXPECT_EQ(validated(threshold, -273.15).value(), ParameterValue{-273.15});
-  EXPECT_EQ(validated(threshold, kInfinity).error().code, ErrorCode::OutOfRange);
+  EXPECT_EQ(validated(threshold, kInfinity).error().code, base::ErrorCode::OutOfRange);
 }
 
 TEST(Parameter, ReadsCommandLineText) {
@@ -120,12 +120,12 @@ TEST(Parameter, RefusesTextThatIsNoValue) {
   for (const char* text : {"", " 1", "1 ", "1x", "--1", "+-1", "++1", "0x10", "auto"}) {
     const auto result = parse_parameter(parameter(ParameterKind::Number), text);
     ASSERT_TRUE(result.has_error()) << text;
-    EXPECT_EQ(result.error().code, ErrorCode::WrongType) << text;
+    EXPECT_EQ(result.error().code, base::ErrorCode::WrongType) << text;
   }
   for (const char* text : {"nan", "inf", "-inf", "1e999", "5"}) {
     const auto result = parse_parameter(parameter(ParameterKind::Number), text);
     ASSERT_TRUE(result.has_error()) << text;
-    EXPECT_EQ(result.error().code, ErrorCode::OutOfRange) << text;
+    EXPECT_EQ(result.error().code, base::ErrorCode::OutOfRange) << text;
   }
   EXPECT_TRUE(parse_parameter(parameter(ParameterKind::Toggle), "TRUE?").has_error());
 }

@@ -63,7 +63,7 @@ TEST(HistogramBin, AutomaticallyShowsAtMostATenth) {
 
 TEST(MonochromeThreshold, AutomaticHueIsTheOneTheSceneHasLeastOf) {
   SceneTemperature scene = scene_of({10, 20, 50});
-  const auto hue_among = [&](std::vector<Rgb8> colours) {
+  const auto hue_among = [&](std::vector<base::Rgb8> colours) {
     scene.hues = [colours] {
       Hues hues;
       add_to_hues(colours, hues);
@@ -88,14 +88,14 @@ TEST(MonochromeThreshold, AutomaticHueIsTheOneTheSceneHasLeastOf) {
 
 TEST(FusionPlan, WhatIsBeyondTheSensorsRangeIsNotMissing) {
   const std::vector<float> temperature = {10, 12, 20, 28, 30, kInfinity, -kInfinity};
-  const std::vector<Rgb8> visible(temperature.size(), Rgb8{9, 90, 200});
+  const std::vector<base::Rgb8> visible(temperature.size(), base::Rgb8{9, 90, 200});
   SceneTemperature scene = scene_of(temperature);
   EXPECT_EQ(scene.summary.finite_count, 5U);
   EXPECT_EQ(scene.summary.missing_count, 0U);
   EXPECT_EQ(scene.summary.over_range_count, 1U);
   EXPECT_EQ(scene.summary.under_range_count, 1U);
   EXPECT_EQ(scene.summary.maximum, 30);
-  const Rgb8 violet{200, 0, 255};
+  const base::Rgb8 violet{200, 0, 255};
   const auto colours_of = [&](const std::string& method, ParameterValues params = {}) {
     return fused(FusionPlan::prepare(settings_with(method, std::move(params), {}, violet), scene).value(), temperature,
                  visible);
@@ -135,16 +135,16 @@ TEST(FusionPlan, LowAboveAutomaticHighIsAnErrorWhenItBecomesKnown) {
   const FusionSettings settings = settings_with("thermal_highlighting", {{"low", 48.0}});
   const auto plan = FusionPlan::prepare(settings, scene_of({10, 20, 20, 50}));  // high = 47.5
   ASSERT_TRUE(plan.has_error());
-  EXPECT_EQ(plan.error().code, ErrorCode::Inconsistent);
+  EXPECT_EQ(plan.error().code, base::ErrorCode::Inconsistent);
   EXPECT_EQ(plan.error().field, "low");
   EXPECT_TRUE(FusionPlan::prepare(settings, scene_of({10, 90})).has_value());
 }
 
 TEST(FusionPlan, MissingTemperatureShowsVisibleOrTheFixedColourInEveryMethod) {
   const std::vector<float> temperature = {10, kNan, -kNan, kNan, 50};
-  const std::vector<Rgb8> visible = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {0, 0, 0}, {255, 255, 255}};
+  const std::vector<base::Rgb8> visible = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {0, 0, 0}, {255, 255, 255}};
   const SceneTemperature scene = scene_of(temperature);
-  const Rgb8 violet{200, 0, 255};
+  const base::Rgb8 violet{200, 0, 255};
   for (const Method* method : all_methods()) {
     SCOPED_TRACE(method->id);
     for (const bool invert : {false, true}) {
@@ -168,7 +168,7 @@ TEST(FusionPlan, MissingTemperatureShowsVisibleOrTheFixedColourInEveryMethod) {
 
 TEST(FusionPlan, SceneWithoutTemperatureShowsTheVisiblePicture) {
   const std::vector<float> temperature(3, kNan);
-  const std::vector<Rgb8> visible = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  const std::vector<base::Rgb8> visible = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   const SceneTemperature scene = scene_of(temperature);
   for (const Method* method : all_methods()) {
     const auto plan = FusionPlan::prepare(settings_with(method->id), scene);
@@ -186,7 +186,7 @@ TEST(FusionPlan, SceneWithoutTemperatureShowsTheVisiblePicture) {
 TEST(FusionPlan, ThresholdsAreComparedInTheStorageType) {
   // float(30.1) lies above the double 30.1; in float32 they are equal, and equality shows the visible colour.
   const std::vector<float> temperature = {30.1F, 20, 40};
-  const std::vector<Rgb8> visible(3, Rgb8{9, 9, 9});
+  const std::vector<base::Rgb8> visible(3, base::Rgb8{9, 9, 9});
   for (const char* method : {"colour_mapped_threshold", "monochrome_threshold"}) {
     for (const bool invert : {false, true}) {
       const auto settings = settings_with(method, {{"threshold", 30.1}, {"alpha", 1.0}, {"invert", invert}});
@@ -200,12 +200,12 @@ TEST(FusionPlan, ThresholdsAreComparedInTheStorageType) {
 
 TEST(FusionPlan, UniformSceneTakesTheMiddleOfThePalette) {
   const std::vector<float> temperature(2, 21.5F);
-  const std::vector<Rgb8> visible(2);
+  const std::vector<base::Rgb8> visible(2);
   FusionChange change;
   change.method = "thermal_only";
   change.palette = "white_hot";
   const auto plan = FusionPlan::prepare(with_change(default_settings(), change).value(), scene_of(temperature)).value();
-  EXPECT_EQ(fused(plan, temperature, visible)[0], (Rgb8{128, 128, 128}));
+  EXPECT_EQ(fused(plan, temperature, visible)[0], (base::Rgb8{128, 128, 128}));
 }
 
 TEST(FusionPlan, HistogramIsAskedForOnlyByTheMethodThatNeedsOne) {
@@ -230,7 +230,7 @@ TEST(FusionPlan, EmptySpansAreAllowed) {
 
 TEST(HistogramDistribution, ZeroSigmaHighlightsNothingEvenInverted) {
   const std::vector<float> temperature(4, 30.0F);
-  const std::vector<Rgb8> visible(4, Rgb8{10, 20, 30});
+  const std::vector<base::Rgb8> visible(4, base::Rgb8{10, 20, 30});
   for (const bool invert : {false, true}) {
     const auto plan =
         FusionPlan::prepare(settings_with("histogram_distribution", {{"invert", invert}}), scene_of(temperature))
@@ -243,7 +243,7 @@ TEST(HistogramDistribution, ZeroSigmaHighlightsNothingEvenInverted) {
 TEST(HistogramBin, StatisticsIgnoreTheHandSetRange) {
   std::vector<float> temperature(100, 20.0F);
   temperature.push_back(60.0F);
-  const std::vector<Rgb8> visible(temperature.size(), Rgb8{1, 1, 1});
+  const std::vector<base::Rgb8> visible(temperature.size(), base::Rgb8{1, 1, 1});
   const auto settings =
       settings_with("histogram_bin", {{"bins", std::int64_t{4}}, {"n", std::int64_t{1}}}, RangeSetting::manual(0, 10));
   const auto colours = fused(FusionPlan::prepare(settings, scene_of(temperature)).value(), temperature, visible);

@@ -34,9 +34,9 @@ inline FusionSettings settings_with(const std::string& method, ParameterValues p
 }
 
 /// Fused colours of vertices under a plan.
-inline std::vector<Rgb8> fused(const FusionPlan& plan, std::span<const float> temperature,
-                               std::span<const Rgb8> visible) {
-  std::vector<Rgb8> result(temperature.size());
+inline std::vector<base::Rgb8> fused(const FusionPlan& plan, std::span<const float> temperature,
+                                     std::span<const base::Rgb8> visible) {
+  std::vector<base::Rgb8> result(temperature.size());
   plan.fuse(temperature, visible, result);
   return result;
 }

@@ -56,33 +56,33 @@ TEST(FusionSettings, AnEmptyChangeChangesNothing) {
 }
 
 TEST(FusionSettings, RefusalsNameTheField) {
-  const auto expect_error = [](const FusionChange& change, ErrorCode code, const std::string& field) {
+  const auto expect_error = [](const FusionChange& change, base::ErrorCode code, const std::string& field) {
     const auto result = with_change(default_settings(), change);
     ASSERT_TRUE(result.has_error()) << field;
     EXPECT_EQ(result.error().code, code) << result.error().message;
     EXPECT_EQ(result.error().field, field);
   };
-  expect_error(to_method("nothing"), ErrorCode::UnknownMethod, "method");
-  expect_error(to_method("thermal_visible_blend", {{"hue", 1.0}}), ErrorCode::UnknownParameter, "hue");
-  expect_error(to_method("thermal_visible_blend", {{"alpha", 1.5}}), ErrorCode::OutOfRange, "alpha");
-  expect_error(to_method("thermal_visible_blend", {{"alpha", true}}), ErrorCode::WrongType, "alpha");
+  expect_error(to_method("nothing"), base::ErrorCode::UnknownMethod, "method");
+  expect_error(to_method("thermal_visible_blend", {{"hue", 1.0}}), base::ErrorCode::UnknownParameter, "hue");
+  expect_error(to_method("thermal_visible_blend", {{"alpha", 1.5}}), base::ErrorCode::OutOfRange, "alpha");
+  expect_error(to_method("thermal_visible_blend", {{"alpha", true}}), base::ErrorCode::WrongType, "alpha");
   FusionChange palette;
   palette.palette = "grey";
-  expect_error(palette, ErrorCode::UnknownPalette, "palette");
+  expect_error(palette, base::ErrorCode::UnknownPalette, "palette");
   FusionChange range;
   range.range = RangeSetting::manual(30, 20);
-  expect_error(range, ErrorCode::Inconsistent, "range");
+  expect_error(range, base::ErrorCode::Inconsistent, "range");
   range.range = RangeSetting::manual(std::nan(""), 20);
-  expect_error(range, ErrorCode::OutOfRange, "range");
+  expect_error(range, base::ErrorCode::OutOfRange, "range");
   range.range = RangeSetting::manual(0, std::numeric_limits<double>::infinity());
-  expect_error(range, ErrorCode::OutOfRange, "range");
+  expect_error(range, base::ErrorCode::OutOfRange, "range");
 }
 
 TEST(FusionSettings, LowAboveHighIsAnErrorOnlyWhenBothSidesAreOn) {
   const ParameterValues crossed = {{"low", 30.0}, {"high", 20.0}};
   const auto both = with_change(default_settings(), to_method("thermal_highlighting", crossed));
   ASSERT_TRUE(both.has_error());
-  EXPECT_EQ(both.error().code, ErrorCode::Inconsistent);
+  EXPECT_EQ(both.error().code, base::ErrorCode::Inconsistent);
   EXPECT_EQ(both.error().field, "low");
   ParameterValues hot = crossed;
   hot["sides"] = std::string("hot");
@@ -146,7 +146,7 @@ TEST(FusionSettings, AgePartsMergeAndAHalfLifeHasItsLimits) {
     change.age = {std::nullopt, wrong};
     const auto refused = with_change(minute, change);
     ASSERT_FALSE(refused.has_value()) << wrong;
-    EXPECT_EQ(refused.error().code, ErrorCode::OutOfRange);
+    EXPECT_EQ(refused.error().code, base::ErrorCode::OutOfRange);
     EXPECT_EQ(refused.error().field, "age.half_life_s");
     EXPECT_NE(refused.error().message.find("at least 1 and of at most 10000000"), std::string::npos);
   }
@@ -177,7 +177,7 @@ TEST(FusionSettings, CacheKeysAreEqualExactlyForEqualSettings) {
   change.range = RangeSetting::manual(0, 0);
   all.push_back(with_change(default_settings(), change).value());
   change = {};
-  change.missing = MissingDisplay{Rgb8{0, 0, 0}};
+  change.missing = MissingDisplay{base::Rgb8{0, 0, 0}};
   all.push_back(with_change(default_settings(), change).value());
   for (std::size_t a = 0; a < all.size(); ++a) {
     for (std::size_t b = 0; b < all.size(); ++b) {

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-namespace spectra::server {
+namespace spectra::jobs {
 namespace {
 
 TEST(WorkerPool, RunsPostedJobs) {
@@ -172,4 +172,4 @@ TEST(WorkerPool, DropsWaitingJobsWhenDestroyed) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::jobs

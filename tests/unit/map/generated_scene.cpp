@@ -20,14 +20,14 @@ float unit(std::mt19937& random) {
   return static_cast<float>(random() >> 8) * 0x1p-24f;
 }
 
-fusion::Rgb8 colour(std::mt19937& random) {
+base::Rgb8 colour(std::mt19937& random) {
   const auto bits = static_cast<std::uint32_t>(random());
   return {static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8), static_cast<std::uint8_t>(bits >> 16)};
 }
 
 }  // namespace
 
-fusion::MultispectralMesh terrain(const TerrainOptions& options) {
+mesh::MultispectralMesh terrain(const TerrainOptions& options) {
   std::mt19937 random(options.seed);
   const std::uint32_t lone_count = options.has_lone_vertices ? 1 + options.columns * options.rows / 50 : 0;
   const std::uint32_t count = options.columns * options.rows + lone_count;
@@ -35,7 +35,7 @@ fusion::MultispectralMesh terrain(const TerrainOptions& options) {
   std::iota(place.begin(), place.end(), 0u);
   if (options.is_shuffled) shuffle(place, random);
 
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(count);
   mesh.name = "terrain";
   mesh.origin = {500000.25, 4000000.5, 12};
@@ -50,7 +50,7 @@ fusion::MultispectralMesh terrain(const TerrainOptions& options) {
     mesh.visible()[place[i]] = colour(random);
     mesh.temperature_celsius()[place[i]] = is_missing ? std::numeric_limits<float>::quiet_NaN() : temperature;
   }
-  std::vector<fusion::Triangle>& triangles = mesh.triangles();
+  std::vector<base::Triangle>& triangles = mesh.triangles();
   for (std::uint32_t row = 0; row + 1 < options.rows; ++row) {
     for (std::uint32_t column = 0; column + 1 < options.columns; ++column) {
       const std::uint32_t a = row * options.columns + column, b = a + options.columns;
@@ -62,12 +62,12 @@ fusion::MultispectralMesh terrain(const TerrainOptions& options) {
   return mesh;
 }
 
-fusion::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed) {
+mesh::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::vector<std::uint32_t> place(std::size_t{columns} * rows);
   std::iota(place.begin(), place.end(), 0u);
   shuffle(place, random);
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(place.size());
   mesh.name = "torus";
   mesh.has_visible = mesh.has_temperature = true;
@@ -94,13 +94,13 @@ fusion::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::
   return mesh;
 }
 
-fusion::MultispectralMesh soup_of(const fusion::MultispectralMesh& mesh) {
-  fusion::MultispectralMesh soup;
+mesh::MultispectralMesh soup_of(const mesh::MultispectralMesh& mesh) {
+  mesh::MultispectralMesh soup;
   soup.resize_vertices(3 * mesh.triangle_count());
   soup.has_visible = mesh.has_visible;
   soup.has_temperature = mesh.has_temperature;
   for (std::size_t t = 0; t < mesh.triangle_count(); ++t) {
-    fusion::Triangle triangle{};
+    base::Triangle triangle{};
     for (unsigned corner = 0; corner < 3; ++corner) {
       const std::size_t v = 3 * t + corner;
       const std::uint32_t source = mesh.triangles()[t][corner];
@@ -114,9 +114,9 @@ fusion::MultispectralMesh soup_of(const fusion::MultispectralMesh& mesh) {
   return soup;
 }
 
-fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed) {
+mesh::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed) {
   std::mt19937 random(seed);
-  fusion::MultispectralMesh mesh;
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(count);
   mesh.name = "points";
   mesh.has_visible = mesh.has_temperature = true;
@@ -129,8 +129,8 @@ fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed) {
   return mesh;
 }
 
-fusion::MultispectralMesh copy_of(const fusion::MultispectralMesh& mesh) {
-  fusion::MultispectralMesh copy;
+mesh::MultispectralMesh copy_of(const mesh::MultispectralMesh& mesh) {
+  mesh::MultispectralMesh copy;
   copy.resize_vertices(mesh.vertex_count());
   std::ranges::copy(mesh.positions(), copy.positions().begin());
   std::ranges::copy(mesh.visible(), copy.visible().begin());

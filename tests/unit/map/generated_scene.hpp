@@ -15,18 +15,18 @@ struct TerrainOptions {
   bool has_lone_vertices = false;
   bool has_missing_temperature = true;
 };
-fusion::MultispectralMesh terrain(const TerrainOptions& options);
+mesh::MultispectralMesh terrain(const TerrainOptions& options);
 
 /// A rough closed surface: a ring of columns x rows vertices, in scan order.
-fusion::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed);
+mesh::MultispectralMesh torus(std::uint32_t columns, std::uint32_t rows, std::uint32_t seed);
 
 /// The same triangles, each with three vertices of its own.
-fusion::MultispectralMesh soup_of(const fusion::MultispectralMesh& mesh);
+mesh::MultispectralMesh soup_of(const mesh::MultispectralMesh& mesh);
 
 /// Points all over a cube of one metre, with colours and temperatures.
-fusion::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed);
+mesh::MultispectralMesh point_cloud(std::uint32_t count, std::uint32_t seed);
 
 /// The same again: meshes are not copyable.
-fusion::MultispectralMesh copy_of(const fusion::MultispectralMesh& mesh);
+mesh::MultispectralMesh copy_of(const mesh::MultispectralMesh& mesh);
 
 }  // namespace spectra::testing

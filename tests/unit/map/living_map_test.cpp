@@ -9,15 +9,15 @@
 
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::MultispectralMesh;
+using mesh::MultispectralMesh;
 
 constexpr LivingMap::Options kOptions{.leaf_vertex_count = 1000, .first_level = 6};
 
-BlockPut put(const std::string& id, MultispectralMesh mesh, std::vector<fusion::Note> notes = {}) {
-  fusion::LoadedScene scene;
+BlockPut put(const std::string& id, mesh::MultispectralMesh mesh, std::vector<files::Note> notes = {}) {
+  files::LoadedScene scene;
   scene.mesh = std::move(mesh);
   scene.mesh.name = id + ".ply";
   scene.notes = std::move(notes);
@@ -25,9 +25,9 @@ BlockPut put(const std::string& id, MultispectralMesh mesh, std::vector<fusion::
 }
 
 /// A terrain that lies `x` metres along.
-MultispectralMesh terrain(std::uint32_t seed, float x, float warmer = 0) {
-  MultispectralMesh mesh = testing::terrain({.columns = 40, .rows = 40, .seed = seed});
-  for (fusion::Vec3f& p : mesh.positions()) p.x += x;
+mesh::MultispectralMesh terrain(std::uint32_t seed, float x, float warmer = 0) {
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 40, .rows = 40, .seed = seed});
+  for (base::Vec3f& p : mesh.positions()) p.x += x;
   for (float& t : mesh.temperature_celsius()) t += warmer;
   return mesh;
 }
@@ -53,7 +53,7 @@ class LivingMapTest : public ::testing::Test {
     return scene;
   }
 
-  WorkerPool pool_{2};
+  jobs::WorkerPool pool_{2};
   LivingMap map_{kOptions};
   std::uint32_t revision_ = 0;
 };
@@ -122,7 +122,7 @@ TEST_F(LivingMapTest, CoarseTilesFollowAfterTheLeaves) {
 }
 
 TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
-  const MultispectralMesh one = terrain(1, 0), other = terrain(2, 39);
+  const mesh::MultispectralMesh one = terrain(1, 0), other = terrain(2, 39);
   std::vector<BlockPut> blocks;
   blocks.push_back(put("z", terrain(1, 0)));
   blocks.push_back(put("a", terrain(2, 39)));
@@ -135,7 +135,7 @@ TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
   EXPECT_EQ(back->name, "z.ply");
   EXPECT_FALSE(scene->block_mesh("y"));
   // In the whole mesh blocks stand in the order of their names, and every vertex of a leaf says where.
-  const MultispectralMesh whole = scene->whole_mesh();
+  const mesh::MultispectralMesh whole = scene->whole_mesh();
   EXPECT_EQ(whole.positions()[0], other.positions()[0]);
   EXPECT_EQ(whole.positions()[other.vertex_count()], one.positions()[0]);
   for (const auto& tile : scene->tiles()) {
@@ -146,17 +146,17 @@ TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
 }
 
 TEST_F(LivingMapTest, IsNamedByTheBlockThatCameFirst) {
-  MultispectralMesh mesh = terrain(1, 0);
-  mesh.up = fusion::UpAxis::MinusY;
+  mesh::MultispectralMesh mesh = terrain(1, 0);
+  mesh.up = base::UpAxis::MinusY;
   apply(put("m", std::move(mesh)));
   const auto scene = apply(put("a", terrain(2, 39)));
   EXPECT_EQ(scene->name(), "m.ply");
-  EXPECT_EQ(scene->up(), fusion::UpAxis::MinusY);
+  EXPECT_EQ(scene->up(), base::UpAxis::MinusY);
 }
 
 TEST_F(LivingMapTest, SaysANoteOfAKindOnceHoweverManyBlocksHaveIt) {
-  const fusion::Note holes{"holes", 3, "3 vertices have no position", false};
-  const fusion::Note urgent{"unit_told", 1, "this is in feet", true};
+  const files::Note holes{"holes", 3, "3 vertices have no position", false};
+  const files::Note urgent{"unit_told", 1, "this is in feet", true};
   EXPECT_EQ(apply(put("a", terrain(1, 0), {holes}))->notes()[0].message, holes.message);
   apply(put("b", terrain(2, 39), {holes, urgent}));
   const auto scene = apply(put("c", terrain(3, 78), {holes}));
@@ -191,7 +191,7 @@ TEST_F(LivingMapTest, AutomaticValuesFollowWhenTheyHaveMovedFarEnough) {
   // Where most lie moves while mean and extremes hardly do.
   const auto before = last;
   const auto squeezed = [](std::uint32_t i) {
-    MultispectralMesh mesh = terrain(i, 39.0F * static_cast<float>(i));
+    mesh::MultispectralMesh mesh = terrain(i, 39.0F * static_cast<float>(i));
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
       mesh.temperature_celsius()[v] = v % 2 == 0 ? 18.0F : 22.0F;
     }
@@ -208,12 +208,12 @@ TEST_F(LivingMapTest, RefusesWhatCannotBeOneMap) {
     return refused ? static_cast<int>(refused->code) : 0;
   };
   EXPECT_EQ(code({"more", 10, true}), 0);
-  EXPECT_EQ(code({"points", 10, false}), static_cast<int>(fusion::ErrorCode::Unsupported));
+  EXPECT_EQ(code({"points", 10, false}), static_cast<int>(base::ErrorCode::Unsupported));
   EXPECT_EQ(code({"points", 10, false}, {"mesh"}), 0);
   EXPECT_EQ(code({"mesh", 10, false}), 0) << "it takes the place of the only other one";
-  EXPECT_EQ(code({"nothing", 0, true}), static_cast<int>(fusion::ErrorCode::Unsupported));
-  EXPECT_EQ(code({"large", 0xffffffff, true}), static_cast<int>(fusion::ErrorCode::TooLarge));
+  EXPECT_EQ(code({"nothing", 0, true}), static_cast<int>(base::ErrorCode::Unsupported));
+  EXPECT_EQ(code({"large", 0xffffffff, true}), static_cast<int>(base::ErrorCode::TooLarge));
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::map

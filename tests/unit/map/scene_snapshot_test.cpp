@@ -18,19 +18,19 @@
 #include "server/map/tile_place.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::MultispectralMesh;
-using fusion::Vec3f;
+using base::Vec3f;
+using mesh::MultispectralMesh;
 using testing::copy_of;
 
 constexpr std::uint32_t kLeafSize = 1000;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-std::shared_ptr<const SceneSnapshot> snapshot_of(const MultispectralMesh& mesh, std::uint32_t leaf_size = kLeafSize,
-                                                 unsigned thread_count = 2) {
-  WorkerPool pool(thread_count);
+std::shared_ptr<const SceneSnapshot> snapshot_of(const mesh::MultispectralMesh& mesh,
+                                                 std::uint32_t leaf_size = kLeafSize, unsigned thread_count = 2) {
+  jobs::WorkerPool pool(thread_count);
   return SceneSnapshot::build(copy_of(mesh), 1, pool, leaf_size);
 }
 
@@ -39,7 +39,7 @@ bool is_same_float(float a, float b) {
 }
 
 /// Everything that holds of the leaves of every scene.
-void expect_exact_leaves(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
+void expect_exact_leaves(const mesh::MultispectralMesh& mesh, const SceneSnapshot& scene) {
   ASSERT_EQ(scene.vertex_count(), mesh.vertex_count());
   ASSERT_EQ(scene.triangle_count(), mesh.triangle_count());
   EXPECT_EQ(scene.is_point_cloud(), mesh.is_point_cloud());
@@ -87,7 +87,7 @@ void expect_exact_leaves(const MultispectralMesh& mesh, const SceneSnapshot& sce
       } else {
         EXPECT_TRUE(is_drawn[v]) << "a copy without a triangle";
       }
-      const Vec3f& p = tile->positions[v];
+      const base::Vec3f& p = tile->positions[v];
       EXPECT_EQ(p, mesh.positions()[source]);
       EXPECT_EQ(tile->visible[v], mesh.visible()[source]);
       EXPECT_TRUE(is_same_float(tile->temperature_celsius[v], mesh.temperature_celsius()[source]));
@@ -109,7 +109,7 @@ void expect_exact_leaves(const MultispectralMesh& mesh, const SceneSnapshot& sce
   EXPECT_EQ(scene.level_count(), ids.empty() ? 0 : deepest - top.level + 1);
 }
 
-void expect_same_mesh(const MultispectralMesh& a, const MultispectralMesh& b) {
+void expect_same_mesh(const mesh::MultispectralMesh& a, const mesh::MultispectralMesh& b) {
   EXPECT_TRUE(std::ranges::equal(a.positions(), b.positions()));
   EXPECT_TRUE(std::ranges::equal(a.visible(), b.visible()));
   EXPECT_TRUE(std::ranges::equal(a.temperature_celsius(), b.temperature_celsius(), is_same_float));
@@ -121,7 +121,7 @@ void expect_same_mesh(const MultispectralMesh& a, const MultispectralMesh& b) {
   EXPECT_EQ(a.double_positions, b.double_positions);
 }
 
-void expect_all(const MultispectralMesh& mesh) {
+void expect_all(const mesh::MultispectralMesh& mesh) {
   const auto scene = snapshot_of(mesh);
   expect_exact_leaves(mesh, *scene);
   expect_same_mesh(scene->whole_mesh(), mesh);
@@ -129,8 +129,8 @@ void expect_all(const MultispectralMesh& mesh) {
   EXPECT_TRUE(std::isfinite(scene->suggested_position_step_m()));
 }
 
-MultispectralMesh points(const std::vector<Vec3f>& positions) {
-  MultispectralMesh mesh;
+mesh::MultispectralMesh points(const std::vector<base::Vec3f>& positions) {
+  mesh::MultispectralMesh mesh;
   mesh.resize_vertices(positions.size());
   std::ranges::copy(positions, mesh.positions().begin());
   return mesh;
@@ -150,8 +150,8 @@ TEST(SceneSnapshot, TellsHowFarItsMakingIs) {
       const std::lock_guard lock(mutex);
       shares.push_back(share);
     };
-    WorkerPool pool(2);
-    fusion::LoadedScene scene;
+    jobs::WorkerPool pool(2);
+    files::LoadedScene scene;
     scene.mesh = testing::terrain({});
     SceneSnapshot::build(std::move(scene), 1, pool, kLeafSize, levels, progress);
     ASSERT_GT(shares.size(), 5U);
@@ -169,7 +169,7 @@ TEST(SceneSnapshot, LeavesOfAPointCloudAreExact) {
 }
 
 TEST(SceneSnapshot, LeavesHaveTheSizeAskedFor) {
-  for (const MultispectralMesh& mesh :
+  for (const mesh::MultispectralMesh& mesh :
        {testing::terrain({.columns = 300, .rows = 200}), testing::point_cloud(60'000, 5)}) {
     const auto scene = snapshot_of(mesh);
     std::size_t small_count = 0;
@@ -197,7 +197,7 @@ TEST(SceneSnapshot, SmallSceneIsOneRoot) {
 }
 
 TEST(SceneSnapshot, SameForAnyThreadCount) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 300, .rows = 300, .has_lone_vertices = true});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 300, .rows = 300, .has_lone_vertices = true});
   const auto one = snapshot_of(mesh, kLeafSize, 1);
   for (const unsigned thread_count : {2u, 5u}) {
     const auto other = snapshot_of(mesh, kLeafSize, thread_count);
@@ -215,7 +215,7 @@ TEST(SceneSnapshot, SameForAnyThreadCount) {
 }
 
 TEST(SceneSnapshot, StatisticsAreThoseOfAllVertices) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 130, .has_lone_vertices = true});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 130, .has_lone_vertices = true});
   const auto scene = snapshot_of(mesh);
   fusion::TemperatureAccumulator direct;
   direct.add(mesh.temperature_celsius());
@@ -231,7 +231,7 @@ TEST(SceneSnapshot, StatisticsAreThoseOfAllVertices) {
 }
 
 TEST(SceneSnapshot, HistogramIsThatOfAllVerticesForEveryThread) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 130, .has_lone_vertices = true});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 130, .has_lone_vertices = true});
   auto scene = snapshot_of(mesh);
   const fusion::SceneTemperature temperature = scene->temperature();
   scene.reset();
@@ -255,7 +255,7 @@ TEST(SceneSnapshot, HistogramIsThatOfAllVerticesForEveryThread) {
 }
 
 TEST(SceneSnapshot, ExtremesAreTheFirstOfTheirKind) {
-  MultispectralMesh mesh = testing::terrain({});
+  mesh::MultispectralMesh mesh = testing::terrain({});
   const std::span<float> t = mesh.temperature_celsius();
   t[4000] = t[123] = t[9000] = 80;
   t[777] = t[600] = -40;
@@ -275,7 +275,7 @@ TEST(SceneSnapshot, ExtremesAreTheFirstOfTheirKind) {
 }
 
 TEST(SceneSnapshot, NoTemperatureMeansNoExtremes) {
-  MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
   std::ranges::fill(mesh.temperature_celsius(), kNan);
   const auto scene = snapshot_of(mesh);
   EXPECT_FALSE(scene->hottest() || scene->coldest());
@@ -284,16 +284,16 @@ TEST(SceneSnapshot, NoTemperatureMeansNoExtremes) {
 }
 
 TEST(SceneSnapshot, ProbeEqualsBruteForce) {
-  for (const MultispectralMesh& mesh :
+  for (const mesh::MultispectralMesh& mesh :
        {testing::terrain({.has_lone_vertices = true}), testing::point_cloud(10'000, 9)}) {
     const auto scene = snapshot_of(mesh);
     std::mt19937 random(4);
     for (int i = 0; i < 200; ++i) {
-      const Bounds& b = scene->bounds();
+      const base::Bounds& b = scene->bounds();
       const auto between = [&](float low, float high) {
         return low + (high - low) * (static_cast<float>(random() % 1400) * 0.001f - 0.2f);
       };
-      const Vec3f p{between(b.min.x, b.max.x), between(b.min.y, b.max.y), between(b.min.z, b.max.z)};
+      const base::Vec3f p{between(b.min.x, b.max.x), between(b.min.y, b.max.y), between(b.min.z, b.max.z)};
       std::size_t best = 0;
       double best_squared = std::numeric_limits<double>::infinity();
       for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
@@ -327,8 +327,8 @@ fusion::FusionPlan threshold_plan(const SceneSnapshot& scene, double threshold, 
 }
 
 TEST(SceneSnapshot, HighlightedShareIsOfTheSurface) {
-  MultispectralMesh mesh = testing::terrain({.columns = 50, .rows = 50, .has_missing_temperature = false});
-  const auto area_of = [&](const fusion::Triangle& t) {
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 50, .rows = 50, .has_missing_temperature = false});
+  const auto area_of = [&](const base::Triangle& t) {
     const auto p = mesh.positions();
     const auto d = [&](std::uint32_t a, std::uint32_t b) {
       return std::array{double{p[b].x} - double{p[a].x}, double{p[b].y} - double{p[a].y},
@@ -340,7 +340,7 @@ TEST(SceneSnapshot, HighlightedShareIsOfTheSurface) {
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) mesh.temperature_celsius()[v] = v < 400 ? 60 : 20;
   mesh.temperature_celsius()[401] = std::numeric_limits<float>::infinity();
   double hot = 0, all = 0;
-  for (const fusion::Triangle& t : mesh.triangles()) {
+  for (const base::Triangle& t : mesh.triangles()) {
     all += area_of(t);
     for (const std::uint32_t v : t) hot += mesh.temperature_celsius()[v] > 40 ? area_of(t) / 3 : 0;
   }
@@ -354,12 +354,12 @@ TEST(SceneSnapshot, HighlightedShareIsOfTheSurface) {
 }
 
 TEST(SceneSnapshot, HighlightedShareOfPointsCountsThem) {
-  MultispectralMesh mesh = testing::point_cloud(5'000, 9);
+  mesh::MultispectralMesh mesh = testing::point_cloud(5'000, 9);
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) mesh.temperature_celsius()[v] = v % 5 == 0 ? 60 : 20;
   const auto scene = snapshot_of(mesh);
   EXPECT_DOUBLE_EQ(scene->highlighted_share(threshold_plan(*scene, 40)), 0.2);
-  MultispectralMesh one_place = testing::terrain({.columns = 20, .rows = 20, .has_missing_temperature = false});
-  std::ranges::fill(one_place.positions(), Vec3f{1, 2, 3});
+  mesh::MultispectralMesh one_place = testing::terrain({.columns = 20, .rows = 20, .has_missing_temperature = false});
+  std::ranges::fill(one_place.positions(), base::Vec3f{1, 2, 3});
   std::ranges::fill(one_place.temperature_celsius(), 50.0F);
   const auto flat = snapshot_of(one_place);
   EXPECT_DOUBLE_EQ(flat->highlighted_share(threshold_plan(*flat, 40)), 1);
@@ -374,7 +374,7 @@ TEST(SceneSnapshot, PositionStepFollowsTheEdgeLength) {
 }
 
 TEST(SceneSnapshot, EmptySceneHasNoTiles) {
-  const auto scene = snapshot_of(MultispectralMesh());
+  const auto scene = snapshot_of(mesh::MultispectralMesh());
   EXPECT_TRUE(scene->tiles().empty());
   EXPECT_EQ(scene->level_count(), 0);
   EXPECT_FALSE(scene->probe({0, 0, 0}));
@@ -383,27 +383,27 @@ TEST(SceneSnapshot, EmptySceneHasNoTiles) {
 
 TEST(SceneSnapshot, DegenerateScenesAreCutToo) {
   expect_all(points({{1, 2, 3}}));
-  expect_all(points(std::vector<Vec3f>(5000, {1, 2, 3})));
+  expect_all(points(std::vector<base::Vec3f>(5000, {1, 2, 3})));
   {
-    MultispectralMesh triangle = points({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}});
+    mesh::MultispectralMesh triangle = points({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}});
     triangle.triangles() = {{0, 1, 2}, {0, 0, 0}, {2, 1, 1}};
     expect_all(triangle);
   }
   {
     SCOPED_TRACE("a plane");
-    MultispectralMesh plane = testing::terrain({});
-    for (Vec3f& p : plane.positions()) p.z = 7;
+    mesh::MultispectralMesh plane = testing::terrain({});
+    for (base::Vec3f& p : plane.positions()) p.z = 7;
     expect_all(plane);
   }
   for (const float scale : {1e-44f, 1e-30f, 3e36f}) {
     SCOPED_TRACE(scale);
-    MultispectralMesh scaled = testing::terrain({});
-    for (Vec3f& p : scaled.positions()) p = {p.x * scale, p.y * scale, p.z * scale};
+    mesh::MultispectralMesh scaled = testing::terrain({});
+    for (base::Vec3f& p : scaled.positions()) p = {p.x * scale, p.y * scale, p.z * scale};
     expect_all(scaled);
   }
   {
     SCOPED_TRACE("the whole range of float");
-    MultispectralMesh wide = testing::point_cloud(5000, 2);
+    mesh::MultispectralMesh wide = testing::point_cloud(5000, 2);
     const float largest = std::numeric_limits<float>::max();
     wide.positions()[0] = {largest, largest, largest};
     wide.positions()[1] = {-largest, -largest, -largest};
@@ -413,14 +413,14 @@ TEST(SceneSnapshot, DegenerateScenesAreCutToo) {
 
 TEST(SceneSnapshot, OutliersAndCoincidentPointsDoNotStopTheCutting) {
   {
-    MultispectralMesh mesh = testing::point_cloud(20'000, 8);
+    mesh::MultispectralMesh mesh = testing::point_cloud(20'000, 8);
     mesh.positions()[17] = {1e9f, -1e9f, 3e8f};
     const auto scene = snapshot_of(mesh);
     expect_exact_leaves(mesh, *scene);
     for (const auto& tile : scene->tiles()) EXPECT_LE(tile->owned_count, kLeafSize * 5 / 4);
   }
   {
-    MultispectralMesh mesh = testing::point_cloud(20'000, 8);
+    mesh::MultispectralMesh mesh = testing::point_cloud(20'000, 8);
     for (std::size_t v = 0; v < 12'000; ++v) mesh.positions()[v] = {0, 0, 0};
     const auto scene = snapshot_of(mesh);
     expect_exact_leaves(mesh, *scene);
@@ -432,25 +432,25 @@ TEST(SceneSnapshot, OutliersAndCoincidentPointsDoNotStopTheCutting) {
   }
   {
     SCOPED_TRACE("every point at half the distance of the one before");
-    std::vector<Vec3f> line(120);
+    std::vector<base::Vec3f> line(120);
     for (std::size_t i = 0; i < line.size(); ++i) line[i] = {std::ldexp(1.0f, -static_cast<int>(i)), 0, 0};
-    const MultispectralMesh mesh = points(line);
+    const mesh::MultispectralMesh mesh = points(line);
     expect_exact_leaves(mesh, *snapshot_of(mesh, 1));
   }
 }
 
 TEST(SceneSnapshot, FewTrianglesAmongManyLoneVertices) {
-  MultispectralMesh mesh = testing::point_cloud(10'000, 6);
+  mesh::MultispectralMesh mesh = testing::point_cloud(10'000, 6);
   mesh.triangles() = {{0, 1, 2}, {5, 1, 2}};
   expect_all(mesh);
 }
 
 TEST(SceneSnapshot, TriangleSoupHasLeavesOfTheRightSize) {
-  const MultispectralMesh soup = testing::soup_of(testing::terrain({.is_shuffled = false}));
+  const mesh::MultispectralMesh soup = testing::soup_of(testing::terrain({.is_shuffled = false}));
   expect_all(soup);
   const auto scene = snapshot_of(soup);
   for (const auto& tile : scene->tiles()) EXPECT_LE(tile->owned_count, kLeafSize * 5 / 4);
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -6,11 +6,11 @@
 
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
 TEST(SceneStore, StartsEmptyAndHoldsTheNewestScene) {
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   SceneStore store;
   EXPECT_EQ(store.current(), nullptr);
   const auto first = store.replace(testing::point_cloud(10, 1), pool);
@@ -23,7 +23,7 @@ TEST(SceneStore, StartsEmptyAndHoldsTheNewestScene) {
 }
 
 TEST(SceneStore, TellsSubscribersUntilTheyLeave) {
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   SceneStore store;
   std::vector<std::uint32_t> told;
   auto subscription = store.subscribe([&](const auto& scene) {
@@ -38,7 +38,7 @@ TEST(SceneStore, TellsSubscribersUntilTheyLeave) {
 }
 
 TEST(SceneStore, ListenerMayLeaveWhileItIsTold) {
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   SceneStore store;
   int calls = 0;
   SceneStore::Subscription subscription;
@@ -52,4 +52,4 @@ TEST(SceneStore, ListenerMayLeaveWhileItIsTold) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::map

@@ -18,12 +18,12 @@
 #include "fusion/mesh/surface.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::map {
 namespace {
 
-using fusion::MultispectralMesh;
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
+using mesh::MultispectralMesh;
 using protocol::TileId;
 using testing::copy_of;
 
@@ -31,9 +31,9 @@ constexpr std::uint32_t kLeafSize = 1000;
 constexpr std::size_t kRootSize = 625 * 11 / 10;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-std::shared_ptr<const SceneSnapshot> tree_of(const MultispectralMesh& mesh, unsigned thread_count = 2,
+std::shared_ptr<const SceneSnapshot> tree_of(const mesh::MultispectralMesh& mesh, unsigned thread_count = 2,
                                              std::uint32_t leaf_size = kLeafSize) {
-  WorkerPool pool(thread_count);
+  jobs::WorkerPool pool(thread_count);
   return SceneSnapshot::build(copy_of(mesh), 1, pool, leaf_size, LevelsOfDetail::All);
 }
 
@@ -74,7 +74,7 @@ std::vector<const Tile*> random_cut(const std::map<TileId, const Tile*>& tiles, 
 }
 
 using Place = std::tuple<float, float, float>;
-Place place(const Vec3f& p) {
+Place place(const base::Vec3f& p) {
   return {p.x, p.y, p.z};
 }
 
@@ -83,7 +83,7 @@ bool is_same_float(float a, float b) {
 }
 
 /// Everything that holds of the tree above every scene.
-void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
+void expect_tree(const mesh::MultispectralMesh& mesh, const SceneSnapshot& scene) {
   const auto tiles = by_id(scene);
   ASSERT_EQ(tiles.size(), scene.tiles().size());
   ASSERT_TRUE(tiles.contains(TileId{}));
@@ -137,7 +137,7 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
     float lowest = kNan, highest = kNan;
     visit_leaves(tiles, *tile, [&](const Tile& leaf) {
       std::vector<bool> is_drawn(leaf.positions.size(), mesh.is_point_cloud());
-      for (const Triangle& t : leaf.triangles) is_drawn[t[0]] = is_drawn[t[1]] = is_drawn[t[2]] = true;
+      for (const base::Triangle& t : leaf.triangles) is_drawn[t[0]] = is_drawn[t[1]] = is_drawn[t[2]] = true;
       for (std::size_t v = 0; v < leaf.positions.size(); ++v) {
         if (!is_drawn[v]) continue;
         under.insert(place(leaf.positions[v]));
@@ -156,7 +156,7 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
       EXPECT_EQ(tile->positions[v], mesh.positions()[tile->source_vertex[v]]);
       shown_lowest = std::fmin(shown_lowest, tile->temperature_celsius[v]);
       shown_highest = std::fmax(shown_highest, tile->temperature_celsius[v]);
-      const Vec3f& p = tile->positions[v];
+      const base::Vec3f& p = tile->positions[v];
       EXPECT_TRUE(p.x >= tile->bounds.min.x && p.y >= tile->bounds.min.y && p.z >= tile->bounds.min.z);
       EXPECT_TRUE(p.x <= tile->bounds.max.x && p.y <= tile->bounds.max.y && p.z <= tile->bounds.max.z);
     }
@@ -164,7 +164,7 @@ void expect_tree(const MultispectralMesh& mesh, const SceneSnapshot& scene) {
       EXPECT_TRUE(is_same_float(shown_lowest, lowest));
       EXPECT_TRUE(is_same_float(shown_highest, highest));
     }
-    for (const Triangle& t : tile->triangles) {
+    for (const base::Triangle& t : tile->triangles) {
       for (const std::uint32_t v : t) ASSERT_LT(v, count);
     }
   }
@@ -184,7 +184,7 @@ std::size_t largest_tile(const SceneSnapshot& scene) {
 std::map<std::pair<Place, Place>, int> open_edges(const std::vector<const Tile*>& tiles) {
   std::map<std::pair<Place, Place>, int> balance;
   for (const Tile* tile : tiles) {
-    for (const Triangle& t : tile->triangles) {
+    for (const base::Triangle& t : tile->triangles) {
       for (unsigned corner = 0; corner < 3; ++corner) {
         const Place a = place(tile->positions[t[corner]]), b = place(tile->positions[t[(corner + 1) % 3]]);
         if (a < b) ++balance[{a, b}];
@@ -197,7 +197,7 @@ std::map<std::pair<Place, Place>, int> open_edges(const std::vector<const Tile*>
 }
 
 TEST(TileTree, HoldsForEveryKindOfScene) {
-  for (const MultispectralMesh& mesh :
+  for (const mesh::MultispectralMesh& mesh :
        {testing::terrain({.columns = 150, .rows = 150, .has_lone_vertices = true}), testing::torus(200, 100, 3),
         testing::soup_of(testing::torus(80, 40, 3)), testing::point_cloud(30'000, 3)}) {
     SCOPED_TRACE(mesh.name);
@@ -210,7 +210,7 @@ TEST(TileTree, HoldsForEveryKindOfScene) {
 }
 
 TEST(TileTree, LeavesOnlyUnlessAskedFor) {
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   const auto scene = SceneSnapshot::build(testing::terrain({}), 1, pool, kLeafSize);
   for (const auto& tile : scene->tiles()) EXPECT_EQ(tile->child_mask, 0);
 }
@@ -222,14 +222,14 @@ TEST(TileTree, SmallSceneIsOneRoot) {
 }
 
 TEST(TileTree, RootStaysSmallWhereTheSceneWouldFitALeaf) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 30, .rows = 30});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 30, .rows = 30});
   const auto scene = tree_of(mesh);
   expect_tree(mesh, *scene);
   EXPECT_LE(scene->tiles()[0]->positions.size(), kRootSize);
 }
 
 TEST(TileTree, SameForAnyThreadCount) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200});
   const auto one = tree_of(mesh, 1);
   const auto four = tree_of(mesh, 4);
   ASSERT_EQ(one->tiles().size(), four->tiles().size());
@@ -248,7 +248,8 @@ TEST(TileTree, SameForAnyThreadCount) {
 }
 
 TEST(TileTree, ClosedSurfaceStaysClosedAtAnyMixOfLevels) {
-  for (const MultispectralMesh& mesh : {testing::torus(250, 120, 7), testing::soup_of(testing::torus(90, 50, 7))}) {
+  for (const mesh::MultispectralMesh& mesh :
+       {testing::torus(250, 120, 7), testing::soup_of(testing::torus(90, 50, 7))}) {
     const auto scene = tree_of(mesh);
     const auto tiles = by_id(*scene);
     std::mt19937 random(11);
@@ -264,10 +265,10 @@ TEST(TileTree, ClosedSurfaceStaysClosedAtAnyMixOfLevels) {
 }
 
 TEST(TileTree, BordersBetweenTilesOfAnyLevelsAreTheSameOnBothSides) {
-  const MultispectralMesh mesh = testing::terrain({.columns = 220, .rows = 160});
+  const mesh::MultispectralMesh mesh = testing::terrain({.columns = 220, .rows = 160});
   const auto scene = tree_of(mesh);
   const auto tiles = by_id(*scene);
-  const Bounds& bounds = scene->bounds();
+  const base::Bounds& bounds = scene->bounds();
   const auto is_on_the_rim = [&](const Place& p) {
     const auto [x, y, z] = p;
     return x == bounds.min.x || x == bounds.max.x || y == bounds.min.y || y == bounds.max.y;
@@ -303,52 +304,52 @@ TEST(TileTree, BordersInsideATileAreSimplified) {
 }
 
 /// Points of the triangles, spread evenly enough.
-std::vector<Vec3f> samples(std::span<const Vec3f> positions, std::span<const Triangle> triangles, std::size_t count,
-                           std::mt19937& random) {
-  std::vector<Vec3f> result;
+std::vector<base::Vec3f> samples(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles,
+                                 std::size_t count, std::mt19937& random) {
+  std::vector<base::Vec3f> result;
   for (std::size_t i = 0; i < count; ++i) {
-    const Triangle& t = triangles[random() % triangles.size()];
+    const base::Triangle& t = triangles[random() % triangles.size()];
     float u = static_cast<float>(random() % 1001) * 0.001f, v = static_cast<float>(random() % 1001) * 0.001f;
     if (u + v > 1) {
       u = 1 - u;
       v = 1 - v;
     }
     const float w = 1 - u - v;
-    const Vec3f &a = positions[t[0]], &b = positions[t[1]], &c = positions[t[2]];
+    const base::Vec3f &a = positions[t[0]], &b = positions[t[1]], &c = positions[t[2]];
     result.push_back({w * a.x + u * b.x + v * c.x, w * a.y + u * b.y + v * c.y, w * a.z + u * b.z + v * c.z});
   }
   return result;
 }
 
 /// The full mesh beneath a tile.
-std::pair<std::vector<Vec3f>, std::vector<Triangle>> leaves_beneath(const std::map<TileId, const Tile*>& tiles,
-                                                                    const Tile& top) {
-  std::pair<std::vector<Vec3f>, std::vector<Triangle>> mesh;
+std::pair<std::vector<base::Vec3f>, std::vector<base::Triangle>> leaves_beneath(
+    const std::map<TileId, const Tile*>& tiles, const Tile& top) {
+  std::pair<std::vector<base::Vec3f>, std::vector<base::Triangle>> mesh;
   auto& [positions, triangles] = mesh;
   visit_leaves(tiles, top, [&](const Tile& leaf) {
     const auto first = static_cast<std::uint32_t>(positions.size());
     positions.insert(positions.end(), leaf.positions.begin(), leaf.positions.end());
-    for (const Triangle& t : leaf.triangles) triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    for (const base::Triangle& t : leaf.triangles) triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   });
   return mesh;
 }
 
 TEST(TileTree, StatedErrorIsNeverBelowTheSampledDistance) {
-  MultispectralMesh rough = testing::terrain({.columns = 110, .rows = 100});
+  mesh::MultispectralMesh rough = testing::terrain({.columns = 110, .rows = 100});
   std::mt19937 random(3);
-  for (Vec3f& p : rough.positions()) p.z *= 1 + 0.5f * static_cast<float>(random() % 100) * 0.01f;
+  for (base::Vec3f& p : rough.positions()) p.z *= 1 + 0.5f * static_cast<float>(random() % 100) * 0.01f;
   rough.positions()[777].z += 30;
-  for (const MultispectralMesh& mesh : {std::move(rough), testing::torus(120, 70, 7)}) {
+  for (const mesh::MultispectralMesh& mesh : {std::move(rough), testing::torus(120, 70, 7)}) {
     const auto scene = tree_of(mesh);
     const auto tiles = by_id(*scene);
     for (const auto& tile : scene->tiles()) {
       if (tile->child_mask == 0) continue;
       const auto [positions, triangles] = leaves_beneath(tiles, *tile);
-      const Surface full(positions, triangles), coarse(tile->positions, tile->triangles);
+      const mesh::Surface full(positions, triangles), coarse(tile->positions, tile->triangles);
       const double enough = std::pow(double{tile->geometric_error_m}, 2);
       double largest = 0;
-      const auto measure = [&](const Surface& surface, const std::vector<Vec3f>& points) {
-        for (const Vec3f& p : points) {
+      const auto measure = [&](const mesh::Surface& surface, const std::vector<base::Vec3f>& points) {
+        for (const base::Vec3f& p : points) {
           largest = std::max(largest, surface.squared_distance_anywhere(p, std::min(enough, largest),
                                                                         std::numeric_limits<double>::infinity()));
         }
@@ -367,11 +368,11 @@ TEST(TileTree, StatedErrorCoversWhatLiesBetweenTheMeasuredPoints) {
   constexpr int kSteps = 16;
   for (const unsigned seed : {1U, 2U}) {
     for (const bool is_flat : {true, false}) {
-      MultispectralMesh mesh = testing::terrain({.columns = 24, .rows = 24, .seed = seed});
+      mesh::MultispectralMesh mesh = testing::terrain({.columns = 24, .rows = 24, .seed = seed});
       std::mt19937 random(seed);
-      for (Vec3f& p : mesh.positions()) p.z = is_flat ? 0 : p.z;
+      for (base::Vec3f& p : mesh.positions()) p.z = is_flat ? 0 : p.z;
       for (int i = 0; i < 40; ++i) {
-        Vec3f& peak = mesh.positions()[random() % mesh.vertex_count()];
+        base::Vec3f& peak = mesh.positions()[random() % mesh.vertex_count()];
         peak.z += static_cast<float>(random() % 100) * 0.06f;
       }
       const auto scene = tree_of(mesh, 2, 250);
@@ -379,14 +380,14 @@ TEST(TileTree, StatedErrorCoversWhatLiesBetweenTheMeasuredPoints) {
       const auto tiles = by_id(*scene);
       const Tile& root = *scene->tiles()[0];
       const auto [positions, triangles] = leaves_beneath(tiles, root);
-      const Surface full(positions, triangles);
+      const mesh::Surface full(positions, triangles);
       double largest = 0;
-      for (const Triangle& t : root.triangles) {
-        const Vec3f &a = root.positions[t[0]], &b = root.positions[t[1]], &c = root.positions[t[2]];
+      for (const base::Triangle& t : root.triangles) {
+        const base::Vec3f &a = root.positions[t[0]], &b = root.positions[t[1]], &c = root.positions[t[2]];
         for (int i = 0; i <= kSteps; ++i) {
           for (int j = 0; i + j <= kSteps; ++j) {
             const float u = static_cast<float>(i) / kSteps, v = static_cast<float>(j) / kSteps, w = 1 - u - v;
-            const Vec3f p{w * a.x + u * b.x + v * c.x, w * a.y + u * b.y + v * c.y, w * a.z + u * b.z + v * c.z};
+            const base::Vec3f p{w * a.x + u * b.x + v * c.x, w * a.y + u * b.y + v * c.y, w * a.z + u * b.z + v * c.z};
             largest =
                 std::max(largest, full.squared_distance_anywhere(p, largest, std::numeric_limits<double>::infinity()));
           }
@@ -398,18 +399,18 @@ TEST(TileTree, StatedErrorCoversWhatLiesBetweenTheMeasuredPoints) {
 }
 
 /// What is seen at the point of a surface nearest to a place: three channels and the temperature.
-std::array<double, 4> seen_at(const Tile& tile, const Vec3f& p) {
+std::array<double, 4> seen_at(const Tile& tile, const base::Vec3f& p) {
   double best = std::numeric_limits<double>::infinity();
   std::array<double, 4> seen{};
-  for (const Triangle& t : tile.triangles) {
-    const Vec3f &a = tile.positions[t[0]], &b = tile.positions[t[1]], &c = tile.positions[t[2]];
-    const double squared = squared_distance_to_triangle(p, a, b, c);
+  for (const base::Triangle& t : tile.triangles) {
+    const base::Vec3f &a = tile.positions[t[0]], &b = tile.positions[t[1]], &c = tile.positions[t[2]];
+    const double squared = mesh::squared_distance_to_triangle(p, a, b, c);
     if (squared >= best) continue;
     best = squared;
     seen = {};
-    const auto weights = nearest_weights(p, a, b, c);
+    const auto weights = mesh::nearest_weights(p, a, b, c);
     for (unsigned i = 0; i < 3; ++i) {
-      const fusion::Rgb8 colour = tile.visible[t[i]];
+      const base::Rgb8 colour = tile.visible[t[i]];
       seen[0] += weights[i] * colour.r;
       seen[1] += weights[i] * colour.g;
       seen[2] += weights[i] * colour.b;
@@ -420,9 +421,9 @@ std::array<double, 4> seen_at(const Tile& tile, const Vec3f& p) {
 }
 
 TEST(TileTree, RootIsRoundedNoFinerThanItIsOff) {
-  MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80});
   // Thin: nothing of its form would be left at the usual step.
-  for (Vec3f& p : mesh.positions()) {
+  for (base::Vec3f& p : mesh.positions()) {
     if (p.x > 20) p.z *= 0.01f;
   }
   const auto scene = tree_of(mesh);
@@ -443,10 +444,10 @@ TEST(TileTree, RootIsRoundedNoFinerThanItIsOff) {
 /// Looks at all coarse tiles of a terrain of which one corner is harder to show than the rest; `corner_contrast` of 40: none is. Returns
 /// by how much the colours of a part are worse than those of its tile, at most.
 double expect_stated_errors(float corner_contrast) {
-  MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80, .has_missing_temperature = false});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 90, .rows = 80, .has_missing_temperature = false});
   std::mt19937 random(17);
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
-    const Vec3f& p = mesh.positions()[v];
+    const base::Vec3f& p = mesh.positions()[v];
     mesh.temperature_celsius()[v] = 20 + 8 * std::sin(0.3f * p.x) * std::cos(0.2f * p.y);
     const float contrast = p.x > 50 && p.y < 35 ? corner_contrast : 40;
     mesh.visible()[v] = {static_cast<std::uint8_t>(128 + contrast * std::sin(0.8f * p.x)),
@@ -463,8 +464,8 @@ double expect_stated_errors(float corner_contrast) {
     visit_leaves(tiles, *tile, [&](const Tile& leaf) {
       // Every triangle is about as large as every other.
       for (std::size_t i = 0; i < leaf.triangles.size(); i += 5) {
-        const Triangle& t = leaf.triangles[i];
-        const Vec3f p = samples(leaf.positions, std::span(&t, 1), 1, random)[0];
+        const base::Triangle& t = leaf.triangles[i];
+        const base::Vec3f p = samples(leaf.positions, std::span(&t, 1), 1, random)[0];
         const auto full = seen_at(leaf, p), shown = seen_at(*tile, p);
         double largest = 0;
         for (unsigned j = 0; j < 3; ++j) largest = std::max(largest, std::fabs(full[j] - shown[j]));
@@ -506,7 +507,7 @@ TEST(TileTree, StatedErrorsOfColourAndTemperatureAreNotBelowThoseSampled) {
 }
 
 TEST(TileTree, ManySpotsAreSeenFromTheRootAndWarmNothingElse) {
-  MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
   std::mt19937 random(23);
   for (float& t : mesh.temperature_celsius()) t = 20 + 0.01f * static_cast<float>(random() % 20);
   std::set<Place> hot;
@@ -521,13 +522,13 @@ TEST(TileTree, ManySpotsAreSeenFromTheRootAndWarmNothingElse) {
   const auto warm_area = [](const Tile& tile) {
     double area = 0;
     for (std::int64_t i = 0; i < 40'000; ++i) {
-      const Triangle& t = tile.triangles[static_cast<std::size_t>(i) % tile.triangles.size()];
+      const base::Triangle& t = tile.triangles[static_cast<std::size_t>(i) % tile.triangles.size()];
       const double u = static_cast<double>(i * 7919 % 1000) * 1e-3,
                    v = (1 - u) * static_cast<double>(i * 104729 % 1000) * 1e-3;
       const double celsius = (1 - u - v) * static_cast<double>(tile.temperature_celsius[t[0]]) +
                              u * static_cast<double>(tile.temperature_celsius[t[1]]) +
                              v * static_cast<double>(tile.temperature_celsius[t[2]]);
-      if (celsius > 25) area += triangle_area(tile.positions[t[0]], tile.positions[t[1]], tile.positions[t[2]]);
+      if (celsius > 25) area += mesh::triangle_area(tile.positions[t[0]], tile.positions[t[1]], tile.positions[t[2]]);
     }
     return area * static_cast<double>(tile.triangles.size()) / 40'000;
   };
@@ -542,7 +543,7 @@ TEST(TileTree, ManySpotsAreSeenFromTheRootAndWarmNothingElse) {
 }
 
 TEST(TileTree, PointsOfACloudAreNeverFartherThanStated) {
-  const MultispectralMesh mesh = testing::point_cloud(20'000, 21);
+  const mesh::MultispectralMesh mesh = testing::point_cloud(20'000, 21);
   const auto scene = tree_of(mesh);
   const auto tiles = by_id(*scene);
   for (const auto& tile : scene->tiles()) {
@@ -551,7 +552,8 @@ TEST(TileTree, PointsOfACloudAreNeverFartherThanStated) {
     visit_leaves(tiles, *tile, [&](const Tile& leaf) {
       for (std::size_t v = 0; v < leaf.positions.size(); v += 7) {
         double nearest = std::numeric_limits<double>::infinity();
-        for (const Vec3f& p : tile->positions) nearest = std::min(nearest, squared_distance(leaf.positions[v], p));
+        for (const base::Vec3f& p : tile->positions)
+          nearest = std::min(nearest, mesh::squared_distance(leaf.positions[v], p));
         largest = std::max(largest, nearest);
       }
     });
@@ -561,10 +563,10 @@ TEST(TileTree, PointsOfACloudAreNeverFartherThanStated) {
 }
 
 TEST(TileTree, HotAndColdSpotsAreSeenFromTheRoot) {
-  MultispectralMesh mesh = testing::terrain({.columns = 250, .rows = 200});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 250, .rows = 200});
   std::vector<std::uint32_t> at(mesh.vertex_count());
   for (std::uint32_t v = 0; v < at.size(); ++v) {
-    const Vec3f& p = mesh.positions()[v];
+    const base::Vec3f& p = mesh.positions()[v];
     at[static_cast<std::size_t>(p.y) * 250 + static_cast<std::size_t>(p.x)] = v;
   }
   // A hot vertex far from others, and one beside a vertex that is colder by less than it is hotter.
@@ -579,7 +581,7 @@ TEST(TileTree, HotAndColdSpotsAreSeenFromTheRoot) {
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t v = 0; v < root.positions.size(); ++v) {
       if (root.temperature_celsius[v] != celsius) continue;
-      nearest = std::min(nearest, std::sqrt(squared_distance(root.positions[v], mesh.positions()[source])));
+      nearest = std::min(nearest, std::sqrt(mesh::squared_distance(root.positions[v], mesh.positions()[source])));
     }
     return nearest;
   };
@@ -590,7 +592,7 @@ TEST(TileTree, HotAndColdSpotsAreSeenFromTheRoot) {
 }
 
 TEST(TileTree, MissingTemperatureGivesWayToAnyOther) {
-  MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 200, .rows = 200, .has_missing_temperature = false});
   std::mt19937 random(1);
   for (float& t : mesh.temperature_celsius()) {
     if (random() % 10 != 0) t = kNan;
@@ -609,7 +611,7 @@ TEST(TileTree, MissingTemperatureGivesWayToAnyOther) {
 
 TEST(TileTree, WhatIsOverRangeStandsOutMost) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 150, .has_missing_temperature = false});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 150, .has_missing_temperature = false});
   mesh.temperature_celsius()[150 * 75 + 75] = kInfinity;
   mesh.temperature_celsius()[150 * 20 + 20] = -kInfinity;
   mesh.temperature_celsius()[150 * 76 + 75] = 5000;
@@ -626,15 +628,15 @@ TEST(TileTree, WhatIsOverRangeStandsOutMost) {
 }
 
 TEST(TileTree, ColoursOfCoarseTilesAreMeans) {
-  MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 150});
+  mesh::MultispectralMesh mesh = testing::terrain({.columns = 150, .rows = 150});
   for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
     mesh.visible()[v] = (static_cast<int>(mesh.positions()[v].x) + static_cast<int>(mesh.positions()[v].y)) % 2 == 0
-                            ? fusion::Rgb8{255, 200, 0}
-                            : fusion::Rgb8{0, 0, 100};
+                            ? base::Rgb8{255, 200, 0}
+                            : base::Rgb8{0, 0, 100};
   }
   const auto scene = tree_of(mesh);
   double r = 0, g = 0, b = 0;
-  for (const fusion::Rgb8& c : scene->tiles()[0]->visible) {
+  for (const base::Rgb8& c : scene->tiles()[0]->visible) {
     r += c.r;
     g += c.g;
     b += c.b;
@@ -647,13 +649,13 @@ TEST(TileTree, ColoursOfCoarseTilesAreMeans) {
 
 TEST(TileTree, LoosePiecesDoNotKeepTheRootLarge) {
   // Every other triangle of a terrain: most touch another at a vertex only; then each one alone.
-  MultispectralMesh sparse = testing::terrain({.columns = 120, .rows = 120, .is_shuffled = false});
-  std::vector<Triangle> kept;
+  mesh::MultispectralMesh sparse = testing::terrain({.columns = 120, .rows = 120, .is_shuffled = false});
+  std::vector<base::Triangle> kept;
   for (std::size_t t = 0; t < sparse.triangle_count(); t += 2) kept.push_back(sparse.triangles()[t]);
   sparse.triangles() = kept;
-  MultispectralMesh alone = testing::soup_of(sparse);
+  mesh::MultispectralMesh alone = testing::soup_of(sparse);
   for (std::size_t v = 0; v < alone.vertex_count(); ++v) alone.positions()[v].z += static_cast<float>(v / 3 % 17);
-  for (const MultispectralMesh& mesh : {std::move(sparse), std::move(alone)}) {
+  for (const mesh::MultispectralMesh& mesh : {std::move(sparse), std::move(alone)}) {
     const auto scene = tree_of(mesh);
     expect_tree(mesh, *scene);
     EXPECT_LE(scene->tiles()[0]->positions.size(), kRootSize);
@@ -664,21 +666,21 @@ TEST(TileTree, LoosePiecesDoNotKeepTheRootLarge) {
 TEST(TileTree, DegenerateScenesHaveATreeToo) {
   for (const float scale : {1e-44f, 1e-30f, 3e36f}) {
     SCOPED_TRACE(scale);
-    MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
-    for (Vec3f& p : mesh.positions()) p = {p.x * scale, p.y * scale, p.z * scale};
+    mesh::MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
+    for (base::Vec3f& p : mesh.positions()) p = {p.x * scale, p.y * scale, p.z * scale};
     const auto scene = tree_of(mesh);
     expect_tree(mesh, *scene);
     EXPECT_LE(scene->tiles()[0]->positions.size(), kRootSize);
   }
   {
     SCOPED_TRACE("a plane");
-    MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
-    for (Vec3f& p : mesh.positions()) p.z = 0;
+    mesh::MultispectralMesh mesh = testing::terrain({.columns = 60, .rows = 60});
+    for (base::Vec3f& p : mesh.positions()) p.z = 0;
     expect_tree(mesh, *tree_of(mesh));
   }
   {
     SCOPED_TRACE("triangles without area");
-    MultispectralMesh mesh = testing::point_cloud(5000, 4);
+    mesh::MultispectralMesh mesh = testing::point_cloud(5000, 4);
     for (std::uint32_t v = 0; v + 1 < 5000; ++v) mesh.triangles().push_back({v, v + 1, v + 1});
     const auto scene = tree_of(mesh);
     EXPECT_FALSE(scene->tiles()[0]->triangles.empty());
@@ -686,13 +688,13 @@ TEST(TileTree, DegenerateScenesHaveATreeToo) {
   }
   {
     SCOPED_TRACE("coincident points");
-    MultispectralMesh mesh = testing::point_cloud(5000, 4);
+    mesh::MultispectralMesh mesh = testing::point_cloud(5000, 4);
     for (std::size_t v = 0; v < 4000; ++v) mesh.positions()[v] = {0.5f, 0.5f, 0.5f};
     expect_tree(mesh, *tree_of(mesh));
   }
   {
     SCOPED_TRACE("a hub");
-    MultispectralMesh mesh;
+    mesh::MultispectralMesh mesh;
     mesh.resize_vertices(8001);
     for (std::uint32_t v = 1; v <= 8000; ++v) {
       const float turn = 6.2831853f * static_cast<float>(v) / 8000;
@@ -706,8 +708,8 @@ TEST(TileTree, DegenerateScenesHaveATreeToo) {
 }
 
 TEST(TileTree, EmptySceneHasNoTiles) {
-  EXPECT_TRUE(tree_of(MultispectralMesh())->tiles().empty());
+  EXPECT_TRUE(tree_of(mesh::MultispectralMesh())->tiles().empty());
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::map

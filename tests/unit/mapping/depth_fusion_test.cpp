@@ -15,7 +15,7 @@ constexpr double kVoxel = 0.02;
 
 class DepthFusion : public testing::Test {
  protected:
-  void look(VoxelMap& map, const BoxWorld& world, const Eigen::Isometry3d& pose, server::WorkerPool& pool) {
+  void look(VoxelMap& map, const BoxWorld& world, const Eigen::Isometry3d& pose, jobs::WorkerPool& pool) {
     const DepthFrame frame =
         prepared_depth(world.depth(camera_, pose), calibration_, rays_, kTruncationVoxels * kVoxel, pool);
     fuse_depth(map, {frame, camera_, rays_, calibration_.noise, pose}, nullptr, pool);
@@ -30,7 +30,7 @@ class DepthFusion : public testing::Test {
   const DepthCalibration calibration_{small_camera(), 0.001, 0, 0, {}};
   const CameraModel camera_ = small_camera();
   const RayTable rays_{camera_};
-  server::WorkerPool pool_{2};
+  jobs::WorkerPool pool_{2};
 };
 
 TEST_F(DepthFusion, PutsAWallWhereItIs) {
@@ -39,8 +39,8 @@ TEST_F(DepthFusion, PutsAWallWhereItIs) {
   for (int i = 0; i < 5; ++i) look(map, world, looking_ahead(0.05 * i, 0.01 * i, 0.02 * i, 0.03 * i), pool_);
   const UnitMesh mesh = mesh_of(map);
   ASSERT_GT(mesh.positions.size(), 2000U);
-  for (const fusion::Vec3f& p : mesh.positions) EXPECT_NEAR(p.z, 2, 0.0015);
-  for (const fusion::Triangle& t : mesh.triangles) {
+  for (const base::Vec3f& p : mesh.positions) EXPECT_NEAR(p.z, 2, 0.0015);
+  for (const base::Triangle& t : mesh.triangles) {
     const auto at = [&](std::size_t i) {
       return Eigen::Vector3f(mesh.positions[t[i]].x, mesh.positions[t[i]].y, mesh.positions[t[i]].z);
     };
@@ -83,7 +83,7 @@ TEST_F(DepthFusion, LeavesOutWhatLiesAtAnEdge) {
 
 TEST_F(DepthFusion, TheSameBytesForAnyNumberOfThreads) {
   const BoxWorld world{{wall(), {{-0.3, -0.2, 1.4}, {0.1, 0.2, 1.6}, {}}}};
-  server::WorkerPool many(5);
+  jobs::WorkerPool many(5);
   VoxelMap a(kVoxel), b(kVoxel);
   for (int i = 0; i < 4; ++i) {
     look(a, world, looking_ahead(0.03 * i, 0, 0, 0.05 * i), pool_);
@@ -115,7 +115,7 @@ TEST_F(DepthFusion, MeansDoNotStallHoweverHeavyTheyAre) {
   double sum = 0;
   const UnitMesh mesh = mesh_of(map);
   ASSERT_GT(mesh.positions.size(), 20U);
-  for (const fusion::Vec3f& p : mesh.positions) sum += static_cast<double>(p.z);
+  for (const base::Vec3f& p : mesh.positions) sum += static_cast<double>(p.z);
   EXPECT_NEAR(sum / static_cast<double>(mesh.positions.size()), 2.001, 1e-4);
 }
 

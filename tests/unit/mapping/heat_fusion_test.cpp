@@ -44,7 +44,7 @@ class HeatFusionTest : public testing::Test {
 
   const Calibration calibration_ = small_cameras();
   const RayTable rays_{calibration_.depth.camera};
-  server::WorkerPool pool_{2};
+  jobs::WorkerPool pool_{2};
   VoxelMap map_{kVoxel};
 };
 
@@ -191,9 +191,9 @@ TEST_F(HeatFusionTest, EmissivityIsTakenOut) {
 
 TEST_F(HeatFusionTest, TheSameBytesForAnyNumberOfThreads) {
   const BoxWorld world{{{{-1, -1, 2}, {1, 1, 2.5}, [](const Eigen::Vector3d& p) { return 20 + 3 * p.x(); }}}};
-  server::WorkerPool many(5);
+  jobs::WorkerPool many(5);
   std::vector<HeatBlock> first;
-  for (server::WorkerPool* pool : {&pool_, &many}) {
+  for (jobs::WorkerPool* pool : {&pool_, &many}) {
     map_ = VoxelMap(kVoxel);
     build(world);
     HeatFusion heat(*calibration_.thermal, {});

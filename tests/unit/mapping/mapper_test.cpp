@@ -30,7 +30,7 @@ class MapperTest : public testing::Test {
   Calibration calibration_ = small_cameras();
   MapperSettings settings_;
   Trajectory trajectory_;
-  server::WorkerPool pool_{1};
+  jobs::WorkerPool pool_{1};
   FaultLog faults_;
 };
 
@@ -44,7 +44,7 @@ TEST_F(MapperTest, MakesAMeshWithTemperatures) {
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     if (std::isnan(mesh.celsius[i])) continue;
     ++known;
-    const fusion::Vec3f& p = mesh.positions[i];
+    const base::Vec3f& p = mesh.positions[i];
     if (p.z < 1.5F && p.z > 1.35F) {
       EXPECT_NEAR(mesh.celsius[i], 34, 0.5);
       ++warm;
@@ -107,7 +107,7 @@ TEST_F(MapperTest, StaysCleanWhenPosesJump) {
   }
   EXPECT_GE(faults_.of(FaultKind::JumpingPose).count, 1U);
   EXPECT_GE(faults_.of(FaultKind::UnfittingPose).count, 8U);
-  for (const fusion::Vec3f& p : mapper.whole_mesh().positions) {
+  for (const base::Vec3f& p : mapper.whole_mesh().positions) {
     EXPECT_TRUE(p.z > 1.97F || (p.z > 1.36F && p.z < 1.7F && p.x < 0.05F)) << p.x << " " << p.z;
   }
   EXPECT_GE(mapper.figures().depth_frames + 2, clean.figures().depth_frames);

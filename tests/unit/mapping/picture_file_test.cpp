@@ -38,7 +38,7 @@ TEST_F(PictureFile, KeepsSixteenBits) {
 }
 
 TEST_F(PictureFile, KeepsColoursWithinWhatJpegLoses) {
-  PictureRgb picture{64, 32, std::vector<fusion::Rgb8>(64 * 32, {200, 100, 50})};
+  PictureRgb picture{64, 32, std::vector<base::Rgb8>(64 * 32, {200, 100, 50})};
   ASSERT_TRUE(write_jpeg(folder_ / "a.jpg", picture, 95));
   const auto read = read_colour(folder_ / "a.jpg");
   ASSERT_TRUE(read) << read.error().message;
@@ -56,7 +56,7 @@ TEST_F(PictureFile, KeepsFloats) {
 
 TEST_F(PictureFile, RefusesWhatIsCut) {
   ASSERT_TRUE(write_png16(folder_ / "a.png", {64, 64, std::vector<std::uint16_t>(64 * 64, 1234)}));
-  ASSERT_TRUE(write_jpeg(folder_ / "a.jpg", {64, 64, std::vector<fusion::Rgb8>(64 * 64, {1, 200, 3})}, 90));
+  ASSERT_TRUE(write_jpeg(folder_ / "a.jpg", {64, 64, std::vector<base::Rgb8>(64 * 64, {1, 200, 3})}, 90));
   ASSERT_TRUE(write_pfm(folder_ / "a.pfm", {64, 64, std::vector<float>(64 * 64, 1)}));
   for (const char* name : {"a.png", "a.jpg", "a.pfm"}) cut(folder_ / name, 0.6);
   const auto png = read_png16(folder_ / "a.png");
@@ -84,10 +84,10 @@ TEST_F(PictureFile, SurvivesDamageAnywhere) {
 }
 
 TEST_F(PictureFile, TellsWhatIsThereFromWhatIsNot) {
-  EXPECT_EQ(read_png16(folder_ / "none.png").error().code, fusion::ErrorCode::FileNotFound);
+  EXPECT_EQ(read_png16(folder_ / "none.png").error().code, base::ErrorCode::FileNotFound);
   std::ofstream(folder_ / "text.png") << "no picture";
-  EXPECT_EQ(read_png16(folder_ / "text.png").error().code, fusion::ErrorCode::FileUnreadable);
-  EXPECT_EQ(read_colour(folder_ / "text.png").error().code, fusion::ErrorCode::FileUnreadable);
+  EXPECT_EQ(read_png16(folder_ / "text.png").error().code, base::ErrorCode::FileUnreadable);
+  EXPECT_EQ(read_colour(folder_ / "text.png").error().code, base::ErrorCode::FileUnreadable);
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ TEST(SurfaceMesh, OfABallIsClosedAndRound) {
   ASSERT_GE(map.units().size(), 8U);
   const UnitMesh mesh = joined(meshes(map));
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
-  for (const fusion::Triangle& t : mesh.triangles) {
+  for (const base::Triangle& t : mesh.triangles) {
     for (std::size_t i = 0; i < 3; ++i) ++sides[{t[i], t[(i + 1) % 3]}];
   }
   for (const auto& [side, count] : sides) {
@@ -63,7 +63,7 @@ TEST(SurfaceMesh, OfABallIsClosedAndRound) {
     EXPECT_EQ(sides.count({side.second, side.first}), 1U) << "a hole";
   }
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const fusion::Vec3f& p = mesh.positions[i];
+    const base::Vec3f& p = mesh.positions[i];
     EXPECT_NEAR((Eigen::Vector3d(p.x, p.y, p.z) - centre).norm(), 0.2, 1e-4);
     EXPECT_NEAR(mesh.celsius[i], 20 + p.x, 1e-3);
     EXPECT_NEAR(mesh.sigma_kelvin[i], std::sqrt(0.04 + 0.03 * 0.03), 1e-4);
@@ -72,7 +72,7 @@ TEST(SurfaceMesh, OfABallIsClosedAndRound) {
 
 TEST(SurfaceMesh, UnitsMeetBitForBit) {
   const VoxelMap map = ball(0.01, {0.003, -0.321, 0.017}, 0.2);
-  std::map<std::uint64_t, fusion::Vec3f> known;
+  std::map<std::uint64_t, base::Vec3f> known;
   std::size_t shared = 0;
   for (const UnitMesh& unit : meshes(map)) {
     for (std::size_t i = 0; i < unit.positions.size(); ++i) {

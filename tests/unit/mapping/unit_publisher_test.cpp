@@ -33,7 +33,7 @@ class UnitPublisherTest : public testing::Test {
   }
   /// All that was told has the same vertices where units meet.
   void expect_no_cracks() const {
-    std::map<std::uint64_t, fusion::Vec3f> known;
+    std::map<std::uint64_t, base::Vec3f> known;
     for (const auto& [id, mesh] : told_) {
       for (std::size_t i = 0; i < mesh.edges.size(); ++i) {
         const auto [entry, is_new] = known.emplace(mesh.edges[i], mesh.positions[i]);
@@ -49,7 +49,7 @@ class UnitPublisherTest : public testing::Test {
   Calibration calibration_ = small_cameras();
   MapperSettings settings_;
   Trajectory trajectory_;
-  server::WorkerPool pool_{1};
+  jobs::WorkerPool pool_{1};
   FaultLog faults_;
   Mapper mapper_{calibration_,
                  [] {

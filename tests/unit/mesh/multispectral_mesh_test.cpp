@@ -7,7 +7,7 @@
 
 #include "tests/unit/files/allocation_meter.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 namespace {
 
 TEST(MultispectralMesh, StartsEmpty) {
@@ -26,12 +26,12 @@ TEST(MultispectralMesh, NewVerticesAreGreyAtTheOriginWithoutTemperature) {
   mesh.temperature_celsius()[1] = 7;
   mesh.resize_vertices(3);
   EXPECT_EQ(mesh.vertex_count(), 3U);
-  EXPECT_EQ(mesh.positions()[1], (Vec3f{1, 2, 3}));
-  EXPECT_EQ(mesh.visible()[1], (Rgb8{4, 5, 6}));
+  EXPECT_EQ(mesh.positions()[1], (base::Vec3f{1, 2, 3}));
+  EXPECT_EQ(mesh.visible()[1], (base::Rgb8{4, 5, 6}));
   EXPECT_EQ(mesh.temperature_celsius()[1], 7);
   for (const std::size_t fresh : {std::size_t{0}, std::size_t{2}}) {
-    EXPECT_EQ(mesh.positions()[fresh], Vec3f{});
-    EXPECT_EQ(mesh.visible()[fresh], (Rgb8{128, 128, 128}));
+    EXPECT_EQ(mesh.positions()[fresh], base::Vec3f{});
+    EXPECT_EQ(mesh.visible()[fresh], (base::Rgb8{128, 128, 128}));
     EXPECT_TRUE(std::isnan(mesh.temperature_celsius()[fresh]));
   }
   mesh.resize_vertices(1);
@@ -45,7 +45,7 @@ TEST(MultispectralMesh, KeepsItsDataWhenMoved) {
   mesh.resize_vertices(1);
   mesh.positions()[0] = {1, 2, 3};
   MultispectralMesh other = std::move(mesh);
-  EXPECT_EQ(other.positions()[0], (Vec3f{1, 2, 3}));
+  EXPECT_EQ(other.positions()[0], (base::Vec3f{1, 2, 3}));
   mesh = MultispectralMesh();
   mesh.resize_vertices(4);
   EXPECT_EQ(mesh.vertex_count(), 4U);
@@ -60,4 +60,4 @@ TEST(MultispectralMesh, CostsNoMoreThanItsDataPerVertex) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

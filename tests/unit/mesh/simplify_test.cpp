@@ -13,17 +13,17 @@
 
 #include "fusion/mesh/heat_spots.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
-using fusion::Rgb8;
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Rgb8;
+using base::Triangle;
+using base::Vec3f;
 
 /// A flat wall of columns x rows vertices, one centimetre apart.
 struct Wall {
   Wall(std::uint32_t width, std::uint32_t rows)
-      : columns(width), visible(width * rows, Rgb8{200, 200, 190}), celsius(width * rows, 20.0f) {
+      : columns(width), visible(width * rows, base::Rgb8{200, 200, 190}), celsius(width * rows, 20.0f) {
     std::mt19937 random(5);
     for (std::uint32_t y = 0; y < rows; ++y) {
       for (std::uint32_t x = 0; x < columns; ++x) {
@@ -51,31 +51,31 @@ struct Wall {
   }
 
   std::uint32_t columns;
-  std::vector<Vec3f> positions;
-  std::vector<Triangle> triangles;
-  std::vector<Rgb8> visible;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Triangle> triangles;
+  std::vector<base::Rgb8> visible;
   std::vector<float> celsius;
 };
 
-std::set<std::uint32_t> used(const std::vector<Triangle>& triangles) {
+std::set<std::uint32_t> used(const std::vector<base::Triangle>& triangles) {
   std::set<std::uint32_t> result;
-  for (const Triangle& t : triangles) result.insert(t.begin(), t.end());
+  for (const base::Triangle& t : triangles) result.insert(t.begin(), t.end());
   return result;
 }
 
-double area(const Wall& wall, const std::vector<Triangle>& triangles) {
+double area(const Wall& wall, const std::vector<base::Triangle>& triangles) {
   double sum = 0;
-  for (const Triangle& t : triangles)
+  for (const base::Triangle& t : triangles)
     sum += triangle_area(wall.positions[t[0]], wall.positions[t[1]], wall.positions[t[2]]);
   return sum;
 }
 
 /// The area on which a linear field over the triangles is above a threshold.
-double area_above(const Wall& wall, const std::vector<Triangle>& triangles,
+double area_above(const Wall& wall, const std::vector<base::Triangle>& triangles,
                   const std::function<double(std::uint32_t)>& value, double threshold) {
   constexpr int kPieces = 24;
   double sum = 0;
-  for (const Triangle& t : triangles) {
+  for (const base::Triangle& t : triangles) {
     int above = 0, count = 0;
     for (int i = 0; i < kPieces; ++i) {
       for (int j = 0; i + j < kPieces; ++j) {
@@ -149,7 +149,7 @@ TEST(Simplified, LetteringStaysWhereThereIsNothingElse) {
 TEST(Simplified, NoiseOfColoursEvensOut) {
   Wall wall(101, 101);
   std::mt19937 random(9);
-  for (Rgb8& c : wall.visible) c = {static_cast<std::uint8_t>(100 + random() % 41), 100, 100};
+  for (base::Rgb8& c : wall.visible) c = {static_cast<std::uint8_t>(100 + random() % 41), 100, 100};
   const Simplified simple = wall.simplified_to(600);
   double sum = 0, squares = 0;
   const auto kept = used(simple.triangles);
@@ -163,7 +163,7 @@ TEST(Simplified, NoiseOfColoursEvensOut) {
 
 TEST(Simplified, LoosePiecesDoNotVanish) {
   Wall wall(9, 9);
-  std::vector<Triangle> loose;
+  std::vector<base::Triangle> loose;
   for (std::size_t t = 0; t < wall.triangles.size(); t += 6) loose.push_back(wall.triangles[t]);
   wall.triangles = loose;
   EXPECT_EQ(wall.simplified_to(1).triangles, loose);
@@ -252,4 +252,4 @@ TEST(Simplify, TheSameWhateverItsMemoryWasUsedFor) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::mesh

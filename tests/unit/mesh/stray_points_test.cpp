@@ -9,15 +9,15 @@
 #include "fusion/files/scene_survey.hpp"
 #include "tests/unit/files/loaded.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 namespace {
 
 struct Shape {
-  std::vector<Vec3f> positions;
-  std::vector<Triangle> triangles;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Triangle> triangles;
 
   /// A bumpy square of `side` x `side` vertices.
-  void add_patch(Vec3f corner, float size_m, unsigned side, bool has_triangles = true) {
+  void add_patch(base::Vec3f corner, float size_m, unsigned side, bool has_triangles = true) {
     const auto first = static_cast<std::uint32_t>(positions.size());
     const float step = size_m / static_cast<float>(side - 1);
     for (unsigned y = 0; y < side; ++y) {
@@ -37,7 +37,7 @@ struct Shape {
   }
 
   /// A box of eight vertices and twelve triangles.
-  void add_box(Vec3f low, Vec3f high) {
+  void add_box(base::Vec3f low, base::Vec3f high) {
     const auto first = static_cast<std::uint32_t>(positions.size());
     for (unsigned i = 0; i < 8; ++i) {
       positions.push_back(
@@ -91,7 +91,7 @@ TEST(StrayPoints, AreFoundWhereverTheyAre) {
     shape.positions.push_back({2, -500, 0});
     shape.positions.push_back({3e37F, 3e37F, -3e37F});
     expect_core_of_square(shape, 5, "in several directions, at every distance");
-    shape.positions.insert(shape.positions.end(), 5, Vec3f{1, 60, 1});
+    shape.positions.insert(shape.positions.end(), 5, base::Vec3f{1, 60, 1});
     expect_core_of_square(shape, 10, "several in one place");
   }
 }
@@ -101,7 +101,7 @@ TEST(StrayPoints, MayBeTinyPiecesOfSurface) {
   shape.add_patch({40, 0, 0}, 0.1F, 3);
   expect_core_of_square(shape, 9, "a patch");
   const auto first = static_cast<std::uint32_t>(shape.positions.size());
-  for (const Vec3f corner : {Vec3f{0, 900, 0}, Vec3f{0.3F, 900, 0}, Vec3f{0, 900.2F, 0}}) {
+  for (const base::Vec3f corner : {base::Vec3f{0, 900, 0}, base::Vec3f{0.3F, 900, 0}, base::Vec3f{0, 900.2F, 0}}) {
     shape.positions.push_back(corner);
   }
   shape.triangles.push_back({first, first + 1, first + 2});
@@ -116,7 +116,8 @@ TEST(StrayPoints, MayHangOnTheSceneByTheirTriangles) {
 
 TEST(StrayPoints, AreNotWhatIsOnlyAwayFromTheMiddle) {
   Shape shape = square(false);
-  for (const Vec3f near : {Vec3f{5, 1, 0}, Vec3f{1, -3, 1}, Vec3f{1, 1, 4}}) shape.positions.push_back(near);
+  for (const base::Vec3f near : {base::Vec3f{5, 1, 0}, base::Vec3f{1, -3, 1}, base::Vec3f{1, 1, 4}})
+    shape.positions.push_back(near);
   EXPECT_EQ(shape.strays().count, 0U);
 }
 
@@ -185,17 +186,17 @@ TEST(StrayPoints, AreNotInScenesOfFewOrUnevenVertices) {
 TEST(StrayPoints, AreNotInDegenerateScenes) {
   EXPECT_EQ(stray_points({}, {}).count, 0U);
   for (const std::size_t count : {1U, 2U, 3U, 9U, 144U}) {
-    const std::vector<Vec3f> one_place(count, Vec3f{1.5F, 2.5F, 0.5F});
+    const std::vector<base::Vec3f> one_place(count, base::Vec3f{1.5F, 2.5F, 0.5F});
     const StrayPoints strays = stray_points(one_place, {});
     EXPECT_EQ(strays.count, 0U);
-    EXPECT_EQ(strays.core, (Bounds{one_place[0], one_place[0]}));
-    std::vector<Vec3f> line;
+    EXPECT_EQ(strays.core, (base::Bounds{one_place[0], one_place[0]}));
+    std::vector<base::Vec3f> line;
     for (std::size_t i = 0; i < count; ++i) line.push_back({0.01F * static_cast<float>(i), 0, 0});
     EXPECT_EQ(stray_points(line, {}).count, 0U) << count;
     line.back() = {-3e38F, 3e38F, 3e38F};
     EXPECT_EQ(stray_points(line, {}).count, count >= 10 ? 1U : 0U) << count;
   }
-  const std::vector<Vec3f> two{{0, 0, 0}, {5e5F, 0, 0}};
+  const std::vector<base::Vec3f> two{{0, 0, 0}, {5e5F, 0, 0}};
   EXPECT_EQ(stray_points(two, {}).count, 0U);
 }
 
@@ -220,25 +221,25 @@ TEST(SceneSurvey, TellsOfStrays) {
     std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(100 + count) + "\n" +
                        std::string(test::kXyz) + "end_header\n";
     for (int i = 0; i < 100; ++i) text += std::to_string(i % 10) + " " + std::to_string(i / 10) + " 0\n";
-    LoadedScene scene = test::loaded(text + strays);
-    survey(scene);
+    files::LoadedScene scene = test::loaded(text + strays);
+    files::survey(scene);
     return scene;
   };
-  const LoadedScene none = with_strays("", 0);
+  const files::LoadedScene none = with_strays("", 0);
   EXPECT_EQ(test::note_count(none, "stray_points"), 0U);
-  EXPECT_EQ(none.core_bounds, (Bounds{{0, 0, 0}, {9, 9, 0}}));
+  EXPECT_EQ(none.core_bounds, (base::Bounds{{0, 0, 0}, {9, 9, 0}}));
 
-  const LoadedScene one = with_strays("31000 -25000 900\n", 1);
+  const files::LoadedScene one = with_strays("31000 -25000 900\n", 1);
   EXPECT_EQ(one.core_bounds->min.x - one.core_bounds->max.x, -9);
   ASSERT_EQ(test::note_count(one, "stray_points"), 1U);
   EXPECT_EQ(one.notes.back().message,
             "1 stray vertex lies far from everything else, up to 39.8 km away: it stays in the scene, and views are "
             "fitted to the rest");
-  const LoadedScene two = with_strays("0 0 400\n0 0 -50\n", 2);
+  const files::LoadedScene two = with_strays("0 0 400\n0 0 -50\n", 2);
   EXPECT_EQ(two.notes.back().message,
             "2 stray vertices lie far from everything else, up to 400 m away: they stay in the scene, and views are "
             "fitted to the rest");
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

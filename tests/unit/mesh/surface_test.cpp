@@ -12,22 +12,23 @@
 #include "fusion/mesh/point_groups.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::mesh {
 namespace {
 
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
 
 float unit(std::mt19937& random) {
   return static_cast<float>(random() >> 8) * 0x1p-24f;
 }
-Vec3f point(std::mt19937& random) {
+base::Vec3f point(std::mt19937& random) {
   const float x = unit(random), y = unit(random), z = unit(random);
   return {x, y, z};
 }
 
 /// The smallest over a fine grid of points of the triangle: never below the distance, and little above it.
-double sampled_squared_distance(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+double sampled_squared_distance(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b,
+                                const base::Vec3f& c) {
   double best = std::numeric_limits<double>::infinity();
   constexpr int kSteps = 100;
   for (int i = 0; i <= kSteps; ++i) {
@@ -43,10 +44,10 @@ double sampled_squared_distance(const Vec3f& p, const Vec3f& a, const Vec3f& b, 
 TEST(TriangleDistance, EqualsTheSampledOne) {
   std::mt19937 random(1);
   for (int i = 0; i < 300; ++i) {
-    const Vec3f p = point(random), a = point(random), b = point(random);
+    const base::Vec3f p = point(random), a = point(random), b = point(random);
     // Among them triangles that are segments and points.
-    const Vec3f c = i % 5 == 0 ? a : point(random);
-    const Vec3f d = i % 10 == 0 ? a : b;
+    const base::Vec3f c = i % 5 == 0 ? a : point(random);
+    const base::Vec3f d = i % 10 == 0 ? a : b;
     const double exact = std::sqrt(squared_distance_to_triangle(p, a, d, c));
     const double sampled = std::sqrt(sampled_squared_distance(p, a, d, c));
     EXPECT_LE(exact, sampled + 1e-6);
@@ -62,19 +63,19 @@ TEST(TriangleDistance, HoldsForHugeAndTinyTriangles) {
 }
 
 TEST(Surface, FindsOpenEdges) {
-  const fusion::MultispectralMesh terrain = testing::terrain({.columns = 30, .rows = 20});
+  const mesh::MultispectralMesh terrain = testing::terrain({.columns = 30, .rows = 20});
   const std::vector<bool> is_open = Surface(terrain.positions(), terrain.triangles()).open_vertices();
   for (std::size_t v = 0; v < terrain.vertex_count(); ++v) {
-    const Vec3f& p = terrain.positions()[v];
+    const base::Vec3f& p = terrain.positions()[v];
     EXPECT_EQ(is_open[v], p.x == 0 || p.x == 29 || p.y == 0 || p.y == 19);
   }
-  const fusion::MultispectralMesh torus = testing::torus(30, 20, 1);
+  const mesh::MultispectralMesh torus = testing::torus(30, 20, 1);
   for (const bool open : Surface(torus.positions(), torus.triangles()).open_vertices()) EXPECT_FALSE(open);
 }
 
 TEST(Surface, NearestSeedsAreFewestEdgesAway) {
-  const std::vector<Vec3f> positions{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4.4f, 0, 0}, {9, 9, 9}};
-  const std::vector<Triangle> strip{{0, 1, 1}, {1, 2, 2}, {2, 3, 3}, {3, 4, 4}};
+  const std::vector<base::Vec3f> positions{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4.4f, 0, 0}, {9, 9, 9}};
+  const std::vector<base::Triangle> strip{{0, 1, 1}, {1, 2, 2}, {2, 3, 3}, {3, 4, 4}};
   const Surface surface(positions, strip);
   EXPECT_EQ(surface.nearest_seeds({true, false, false, false, true, false}),
             (std::vector<std::uint32_t>{0, 0, 0, 4, 4, Surface::kNone}))
@@ -82,14 +83,14 @@ TEST(Surface, NearestSeedsAreFewestEdgesAway) {
 }
 
 TEST(Surface, DistanceAnywhereIsTheSmallest) {
-  const fusion::MultispectralMesh torus = testing::torus(60, 40, 1);
+  const mesh::MultispectralMesh torus = testing::torus(60, 40, 1);
   const Surface surface(torus.positions(), torus.triangles());
   std::mt19937 random(2);
   for (int i = 0; i < 50; ++i) {
-    const Vec3f u = point(random);
-    const Vec3f p{30 * u.x - 15, 30 * u.y - 15, 10 * u.z - 5};
+    const base::Vec3f u = point(random);
+    const base::Vec3f p{30 * u.x - 15, 30 * u.y - 15, 10 * u.z - 5};
     double smallest = std::numeric_limits<double>::infinity();
-    for (const Triangle& t : torus.triangles()) {
+    for (const base::Triangle& t : torus.triangles()) {
       smallest = std::min(smallest, squared_distance_to_triangle(p, torus.positions()[t[0]], torus.positions()[t[1]],
                                                                  torus.positions()[t[2]]));
     }
@@ -102,23 +103,23 @@ TEST(Surface, DistanceAnywhereIsTheSmallest) {
 
 TEST(Surface, TwoSidedDistanceSeesBothSides) {
   // A flat square of two triangles, and the same with a spike in the middle.
-  const std::vector<Vec3f> flat{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}};
-  const std::vector<Triangle> two{{0, 1, 2}, {0, 2, 3}};
-  std::vector<Vec3f> spiked = flat;
+  const std::vector<base::Vec3f> flat{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}};
+  const std::vector<base::Triangle> two{{0, 1, 2}, {0, 2, 3}};
+  std::vector<base::Vec3f> spiked = flat;
   spiked.push_back({1, 1, 0.5f});
-  const std::vector<Triangle> four{{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+  const std::vector<base::Triangle> four{{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
   const Surface fine(spiked, four), coarse(flat, two);
   const std::vector<std::uint32_t> coarse_of_fine{0, 1, 2, 3, 0}, fine_of_coarse{0, 1, 2, 3};
   EXPECT_FLOAT_EQ(static_cast<float>(two_sided_distance(fine, coarse, coarse_of_fine, fine_of_coarse)), 0.5f);
   // One triangle of the square is gone: only the fine side notices.
-  std::vector<Vec3f> level = spiked;
+  std::vector<base::Vec3f> level = spiked;
   level[4].z = 0;
-  const std::vector<Triangle> half{{0, 1, 2}};
+  const std::vector<base::Triangle> half{{0, 1, 2}};
   EXPECT_EQ(two_sided_distance(Surface(level, four), coarse, coarse_of_fine, fine_of_coarse), 0);
   EXPECT_GE(two_sided_distance(Surface(level, four), Surface(flat, half), coarse_of_fine, fine_of_coarse), 0.4);
   // A triangle stands up where the fine surface has none: only the coarse side notices.
-  const std::vector<Vec3f> raised{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 9}};
-  const std::vector<Triangle> roof{{0, 1, 2}, {0, 2, 3}, {0, 2, 4}};
+  const std::vector<base::Vec3f> raised{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 9}};
+  const std::vector<base::Triangle> roof{{0, 1, 2}, {0, 2, 3}, {0, 2, 4}};
   EXPECT_GE(two_sided_distance(Surface(raised, two), Surface(raised, roof), std::vector<std::uint32_t>{0, 1, 2, 3, 4},
                                std::vector<std::uint32_t>{0, 1, 2, 3, 4}),
             4);
@@ -126,8 +127,8 @@ TEST(Surface, TwoSidedDistanceSeesBothSides) {
 
 TEST(PointGroups, LeaveNoPointFarFromItsRepresentative) {
   std::mt19937 random(5);
-  std::vector<Vec3f> points(4000);
-  for (Vec3f& p : points) p = point(random);
+  std::vector<base::Vec3f> points(4000);
+  for (base::Vec3f& p : points) p = point(random);
   points[100] = {50, 0, 0};
   std::vector<std::uint32_t> members;
   for (std::uint32_t v = 10; v < points.size(); ++v) members.push_back(v);
@@ -147,11 +148,11 @@ TEST(PointGroups, LeaveNoPointFarFromItsRepresentative) {
 }
 
 TEST(PointGroups, CoincidentPointsAreOneGroup) {
-  const std::vector<Vec3f> points(20, Vec3f{1, 2, 3});
+  const std::vector<base::Vec3f> points(20, base::Vec3f{1, 2, 3});
   std::vector<std::uint32_t> members(20);
   for (std::uint32_t v = 0; v < 20; ++v) members[v] = v;
   for (const std::uint32_t standing : group_representatives(points, members, 5)) EXPECT_EQ(standing, 0u);
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::mesh

@@ -10,10 +10,10 @@
 
 #include "fusion/mesh/half_edges.hpp"
 
-namespace spectra::fusion {
+namespace spectra::mesh {
 namespace {
 
-MultispectralMesh mesh_of(std::size_t vertex_count, std::vector<Triangle> triangles) {
+MultispectralMesh mesh_of(std::size_t vertex_count, std::vector<base::Triangle> triangles) {
   MultispectralMesh mesh;
   mesh.resize_vertices(vertex_count);
   mesh.triangles() = std::move(triangles);
@@ -22,7 +22,7 @@ MultispectralMesh mesh_of(std::size_t vertex_count, std::vector<Triangle> triang
 
 /// What OpenMesh relies on: links that agree both ways, boundary vertices that refer to their boundary half-edge, and
 /// every half-edge of a vertex reached by turning round it.
-void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std::vector<Triangle>& triangles) {
+void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std::vector<base::Triangle>& triangles) {
   const MeshKernel& kernel = topology.kernel;
   ASSERT_EQ(kernel.n_faces(), triangles.size());
   ASSERT_EQ(kernel.n_vertices(), vertex_count + topology.source_vertex.size());
@@ -51,7 +51,7 @@ void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std
     }
   }
   for (const auto face : kernel.faces()) {
-    Triangle corners{};
+    base::Triangle corners{};
     std::size_t i = 0;
     for (auto it = kernel.cfv_iter(face); it.is_valid(); ++it, ++i) {
       ASSERT_LT(i, 3U);
@@ -60,19 +60,19 @@ void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std
           static_cast<std::uint32_t>(index < vertex_count ? index : topology.source_vertex[index - vertex_count]);
     }
     // OpenMesh may begin at any corner.
-    Triangle expected = triangles[static_cast<std::size_t>(face.idx())];
+    base::Triangle expected = triangles[static_cast<std::size_t>(face.idx())];
     std::rotate(expected.begin(), std::find(expected.begin(), expected.end(), corners[0]), expected.end());
     EXPECT_EQ(corners, expected);
   }
 }
 
-HalfEdges sound_half_edges(std::size_t vertex_count, const std::vector<Triangle>& triangles) {
+HalfEdges sound_half_edges(std::size_t vertex_count, const std::vector<base::Triangle>& triangles) {
   HalfEdges topology = half_edges(vertex_count, triangles);
   expect_sound(topology, vertex_count, triangles);
   return topology;
 }
 
-const std::vector<Triangle> kTetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+const std::vector<base::Triangle> kTetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
 
 TEST(HalfEdges, OfAClosedSurface) {
   const HalfEdges topology = sound_half_edges(4, kTetrahedron);
@@ -98,7 +98,7 @@ TEST(HalfEdges, CutsAlongAnEdgeOfThreeTriangles) {
 }
 
 TEST(HalfEdges, LeavesOutWhatIsNoTriangle) {
-  const std::vector<Triangle> triangles = {{0, 0, 1}, {0, 1, 2}, {1, 2, 9}, {2, 1, 2}};
+  const std::vector<base::Triangle> triangles = {{0, 0, 1}, {0, 1, 2}, {1, 2, 9}, {2, 1, 2}};
   const HalfEdges topology = half_edges(3, triangles);
   EXPECT_EQ(topology.kernel.n_faces(), 1U);
 }
@@ -107,11 +107,11 @@ TEST(HalfEdges, AreSoundForTrianglesAtRandom) {
   std::mt19937 random(11);
   for (int round = 0; round < 200; ++round) {
     const std::uint32_t vertex_count = 3 + static_cast<std::uint32_t>(random() % 12);
-    std::vector<Triangle> triangles;
+    std::vector<base::Triangle> triangles;
     for (int i = 0; i < 30; ++i) {
-      const Triangle triangle = {static_cast<std::uint32_t>(random() % vertex_count),
-                                 static_cast<std::uint32_t>(random() % vertex_count),
-                                 static_cast<std::uint32_t>(random() % vertex_count)};
+      const base::Triangle triangle = {static_cast<std::uint32_t>(random() % vertex_count),
+                                       static_cast<std::uint32_t>(random() % vertex_count),
+                                       static_cast<std::uint32_t>(random() % vertex_count)};
       if (std::set<std::uint32_t>(triangle.begin(), triangle.end()).size() == 3) triangles.push_back(triangle);
     }
     SCOPED_TRACE(round);
@@ -164,4 +164,4 @@ TEST(Topology, OfAPointCloud) {
 }
 
 }  // namespace
-}  // namespace spectra::fusion
+}  // namespace spectra::mesh

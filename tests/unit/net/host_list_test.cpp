@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(HostName, IsTheHostWithoutItsPort) {
@@ -86,4 +86,4 @@ TEST(HostList, JudgesEveryPairOfHostAndOrigin) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -2,7 +2,7 @@
 
 #include "server/net/ingest_client.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(IngestAddress, IsReadFromAUrl) {
@@ -33,4 +33,4 @@ TEST(IngestAddress, IsWrittenAsInAUrl) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

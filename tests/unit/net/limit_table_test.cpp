@@ -7,7 +7,7 @@
 #include <set>
 #include <sstream>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(LimitTable, SetsCountsBytesAndTimes) {
@@ -51,4 +51,4 @@ TEST(LimitTable, StandsInTheDocumentAsItIs) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -2,7 +2,7 @@
 
 #include "server/net/http_server.hpp"
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(ListenAddress, ReadsAddressesWithPorts) {
@@ -26,4 +26,4 @@ TEST(ListenAddress, RefusesEverythingElse) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 using namespace std::chrono_literals;
@@ -44,4 +44,4 @@ TEST(PingWatch, APongThatNobodyAskedForIsNoAnswer) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

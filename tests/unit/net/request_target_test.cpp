@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 using Query = std::vector<std::pair<std::string, std::string>>;
@@ -45,4 +45,4 @@ TEST(TargetText, IsReadBackAsItWas) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(Liking, IsWhatTheClientSays) {
@@ -99,4 +99,4 @@ TEST_F(StaticFilesInCodings, AreNotTrustedWhereTheNameStaysWhenTheContentChanges
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::net {
 namespace {
 
 TEST(TokenBucket, LetsABurstThroughAndThenTheRate) {
-  TokenBucket bucket(10, 5);
+  access::TokenBucket bucket(10, 5);
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(bucket.take(100)) << i;
   EXPECT_FALSE(bucket.take(100));
   EXPECT_NEAR(bucket.wait_s(100), 0.1, 1e-9);
@@ -15,7 +15,7 @@ TEST(TokenBucket, LetsABurstThroughAndThenTheRate) {
 }
 
 TEST(TokenBucket, KeepsNoMoreThanItsBurst) {
-  TokenBucket bucket(10, 5);
+  access::TokenBucket bucket(10, 5);
   int taken = 0;
   while (bucket.take(1e6)) ++taken;
   EXPECT_EQ(taken, 5);
@@ -23,7 +23,7 @@ TEST(TokenBucket, KeepsNoMoreThanItsBurst) {
 }
 
 TEST(TokenBucket, GivesManyAtOnceAndMoreThanItHoldsWhenItIsFull) {
-  TokenBucket bucket(100, 50);
+  access::TokenBucket bucket(100, 50);
   EXPECT_TRUE(bucket.take(10, 30));
   EXPECT_FALSE(bucket.take(10, 30));
   EXPECT_NEAR(bucket.wait_s(10, 30), 0.1, 1e-9);
@@ -33,9 +33,9 @@ TEST(TokenBucket, GivesManyAtOnceAndMoreThanItHoldsWhenItIsFull) {
 }
 
 TEST(TokenBucket, NeverRefusesASliderAtItsPace) {
-  TokenBucket bucket(300, 600);
+  access::TokenBucket bucket(300, 600);
   for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(bucket.take(i / 120.0));
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::net

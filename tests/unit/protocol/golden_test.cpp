@@ -226,26 +226,26 @@ json header_json(const TileFrameHeader& header) {
 json frame_json(const TileFrameView& frame) {
   json described{{"header", header_json(frame.header)}};
   if (frame.header.kind == FrameKind::Geometry) {
-    const auto geometry = decoded_geometry(frame.payload);
+    const auto geometry = codec::decoded_geometry(frame.payload);
     if (!geometry) return geometry.error().message;
     described["positions_m"] = geometry.value().positions_m;
     described["triangles"] = geometry.value().triangles;
   } else if (frame.header.kind == FrameKind::Colours || frame.header.kind == FrameKind::ColoursSubtractGreen) {
     const auto colours =
-        decoded_colours(frame.payload, frame.header.kind == FrameKind::Colours ? ColourTransform::None
-                                                                               : ColourTransform::SubtractGreen);
+        codec::decoded_colours(frame.payload, frame.header.kind == FrameKind::Colours ? ColourTransform::None
+                                                                                      : ColourTransform::SubtractGreen);
     if (!colours) return colours.error().message;
     described["colours"] = colours.value();
-    const auto marks = decoded_marks(frame.payload).value();
+    const auto marks = codec::decoded_marks(frame.payload).value();
     if (!marks.empty()) described["marks"] = marks;
   } else if (frame.header.kind == FrameKind::Visible || frame.header.kind == FrameKind::VisibleSubtractGreen) {
     const auto transform =
         frame.header.kind == FrameKind::Visible ? ColourTransform::None : ColourTransform::SubtractGreen;
-    const auto visible = decoded_colours(frame.payload, transform);
+    const auto visible = codec::decoded_colours(frame.payload, transform);
     if (!visible) return visible.error().message;
     described["visible"] = visible.value();
   } else if (frame.header.kind == FrameKind::Temperature) {
-    const auto temperature = decoded_temperature_codes(frame.payload);
+    const auto temperature = codec::decoded_temperature_codes(frame.payload);
     if (!temperature) return temperature.error().message;
     described["scale"] = temperature.value().table.scale;
     described["offset"] = temperature.value().table.offset;
@@ -264,9 +264,9 @@ std::vector<std::byte> frame_bytes(TileFrameHeader header, const std::vector<std
 
 /// The frames as they are made: a bent square of two tiles' width, its colours, a cloud, a tile that leaves.
 std::map<std::string, std::vector<std::byte>> made_frames() {
-  std::vector<LatticePoint> positions;
-  std::vector<TileTriangle> triangles;
-  std::vector<ColourBytes> colours;
+  std::vector<codec::LatticePoint> positions;
+  std::vector<codec::TileTriangle> triangles;
+  std::vector<codec::ColourBytes> colours;
   for (std::uint32_t y = 0; y < 4; ++y)
     for (std::uint32_t x = 0; x < 4; ++x) {
       positions.push_back({static_cast<std::int32_t>(100 * x), static_cast<std::int32_t>(90 * y),
@@ -287,49 +287,49 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.position_step_m = 0.001953125F;
   header.lowest_celsius = 4.25F;
   header.highest_celsius = 36.5F;
-  const EncodedGeometry mesh = encoded_geometry(positions, triangles, header.position_step_m, 7).value();
+  const codec::EncodedGeometry mesh = codec::encoded_geometry(positions, triangles, header.position_step_m, 7).value();
   header.vertex_count = static_cast<std::uint32_t>(mesh.input_of_decoded.size());
 
   std::map<std::string, std::vector<std::byte>> frames;
   frames["geometry"] = frame_bytes(header, mesh.payload);
 
-  std::vector<ColourBytes> decoded_order;
+  std::vector<codec::ColourBytes> decoded_order;
   for (const std::uint32_t input : mesh.input_of_decoded) decoded_order.push_back(colours[input]);
   header.kind = FrameKind::Colours;
   header.sequence = 2;
   header.generation = 9;
-  frames["colours"] = frame_bytes(header, encoded_colours(decoded_order, 8, 7).value());
+  frames["colours"] = frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7).value());
   header.sequence = 3;
   header.generation = 10;
-  frames["colours_6_bits"] = frame_bytes(header, encoded_colours(decoded_order, 6, 7).value());
+  frames["colours_6_bits"] = frame_bytes(header, codec::encoded_colours(decoded_order, 6, 7).value());
 
   header.kind = FrameKind::ColoursSubtractGreen;
   frames["colours_subtract_green_6_bits"] =
-      frame_bytes(header, encoded_colours(decoded_order, 6, 7, ColourTransform::SubtractGreen).value());
+      frame_bytes(header, codec::encoded_colours(decoded_order, 6, 7, ColourTransform::SubtractGreen).value());
   header.generation = 9;
   frames["colours_subtract_green"] =
-      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
+      frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
 
   std::vector<std::uint8_t> marks;
   for (const std::uint32_t input : mesh.input_of_decoded) marks.push_back(input % 4 == 3 ? 1 : 0);
   frames["colours_subtract_green_marks"] =
-      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen, marks).value());
+      frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen, marks).value());
   header.kind = FrameKind::Colours;
   frames["colours_marks"] =
-      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::None, marks).value());
+      frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7, ColourTransform::None, marks).value());
 
   header.generation = 0;
   header.kind = FrameKind::Visible;
-  frames["visible"] = frame_bytes(header, encoded_colours(decoded_order, 8, 7).value());
+  frames["visible"] = frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7).value());
   header.kind = FrameKind::VisibleSubtractGreen;
   frames["visible_subtract_green"] =
-      frame_bytes(header, encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
+      frame_bytes(header, codec::encoded_colours(decoded_order, 8, 7, ColourTransform::SubtractGreen).value());
   std::vector<std::uint16_t> codes;
   for (const std::uint32_t input : mesh.input_of_decoded) {
     codes.push_back(static_cast<std::uint16_t>(input < 13 ? 215 * input : 65520 + input));
   }
   header.kind = FrameKind::Temperature;
-  frames["temperature"] = frame_bytes(header, encoded_temperature_codes(codes, {0.0125F, 4.25F}, 7).value());
+  frames["temperature"] = frame_bytes(header, codec::encoded_temperature_codes(codes, {0.0125F, 4.25F}, 7).value());
 
   header.kind = FrameKind::Remove;
   header.sequence = 4;
@@ -345,7 +345,7 @@ std::map<std::string, std::vector<std::byte>> made_frames() {
   header.colour_error_levels = 3.5F;
   header.temperature_error_celsius = std::numeric_limits<float>::quiet_NaN();
   header.lowest_celsius = header.highest_celsius = std::numeric_limits<float>::quiet_NaN();
-  const EncodedGeometry cloud = encoded_geometry(positions, {}, header.position_step_m, 7).value();
+  const codec::EncodedGeometry cloud = codec::encoded_geometry(positions, {}, header.position_step_m, 7).value();
   header.vertex_count = static_cast<std::uint32_t>(cloud.input_of_decoded.size());
   frames["points"] = frame_bytes(header, cloud.payload);
   return frames;

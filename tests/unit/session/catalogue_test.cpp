@@ -9,13 +9,13 @@
 #include "fusion/registry.hpp"
 #include "server/session/conversions.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 using nlohmann::json;
 
 /// The params of a text as they go over the wire.
-json params_of(const OutgoingText& text) {
+json params_of(const net::OutgoingText& text) {
   const std::string whole = text.begin + std::string(text.shared) + text.end;
   EXPECT_EQ(whole.size(), text.size_bytes());
   const json message = json::parse(whole);
@@ -24,15 +24,15 @@ json params_of(const OutgoingText& text) {
   return message["params"];
 }
 
-std::string header(const HttpReply& reply, const std::string& name) {
+std::string header(const net::HttpReply& reply, const std::string& name) {
   for (const auto& [key, value] : reply.headers) {
     if (key == name) return value;
   }
   return {};
 }
 
-HttpReply asked(const Catalogue& catalogue, const std::string& path, const std::string& accept_encoding = {},
-                const std::string& if_none_match = {}) {
+net::HttpReply asked(const Catalogue& catalogue, const std::string& path, const std::string& accept_encoding = {},
+                     const std::string& if_none_match = {}) {
   return catalogue.reply({{path, {}}, if_none_match, accept_encoding});
 }
 
@@ -40,11 +40,11 @@ TEST(Catalogue, IsInAFullHelloAndNamedInABriefOne) {
   const Catalogue catalogue;
   protocol::Hello hello;
   hello.session_id = "s";
-  const json brief = params_of(catalogue.hello_text(hello, HelloForm::Brief));
+  const json brief = params_of(catalogue.hello_text(hello, net::HelloForm::Brief));
   EXPECT_EQ(brief["catalogue"], catalogue.path());
   EXPECT_FALSE(brief.contains("methods"));
 
-  const json full = params_of(catalogue.hello_text(hello, HelloForm::Full));
+  const json full = params_of(catalogue.hello_text(hello, net::HelloForm::Full));
   hello.methods = method_messages();
   hello.palettes = palette_messages();
   EXPECT_EQ(full, protocol::to_json(hello)) << "the same as one that was made as a whole";
@@ -53,8 +53,8 @@ TEST(Catalogue, IsInAFullHelloAndNamedInABriefOne) {
 
 TEST(Catalogue, IsOneTextForAll) {
   const Catalogue catalogue;
-  const auto first = catalogue.hello_text({}, HelloForm::Full);
-  const auto second = catalogue.hello_text({}, HelloForm::Full);
+  const auto first = catalogue.hello_text({}, net::HelloForm::Full);
+  const auto second = catalogue.hello_text({}, net::HelloForm::Full);
   EXPECT_EQ(first.shared.data(), second.shared.data());
   EXPECT_GT(first.shared.size(), 50 * (first.begin.size() + first.end.size()));
   EXPECT_EQ(catalogue.path(), Catalogue().path()) << "its name is that of its content";
@@ -84,4 +84,4 @@ TEST(Catalogue, IsCompressedForThoseWhoTakeIt) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -9,7 +9,7 @@
 
 #include "fusion/registry.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 fusion::SceneTemperature scene_from(float low, float high) {
@@ -70,7 +70,7 @@ TEST(FusionMessages, BringEverySettingOfEveryMethodThroughTheWire) {
     wanted.method = method->id;
     wanted.palette = "turbo";
     wanted.range = fusion::RangeSetting::manual(14.5, 26.25);
-    wanted.missing = fusion::MissingDisplay{fusion::Rgb8{1, 2, 255}};
+    wanted.missing = fusion::MissingDisplay{base::Rgb8{1, 2, 255}};
     for (const auto& parameter : method->parameters) wanted.params.emplace(parameter.name, other_value(parameter));
     const auto settings = fusion::with_change(fusion::default_settings(), wanted);
     ASSERT_TRUE(settings) << method->id << ": " << settings.error().message;
@@ -118,7 +118,7 @@ TEST(FusionMessages, BringPercentilesThroughTheWireWithWhatTheyAmountTo) {
 }
 
 TEST(FusionMessages, TellAReadingBeyondTheSensorsRange) {
-  Probe probe;
+  map::Probe probe;
   const auto told = [&] { return protocol::to_json(to_message(probe, {})); };
   EXPECT_TRUE(told()["temperature"].is_null());
   EXPECT_FALSE(told().contains("temperature_range"));
@@ -251,10 +251,10 @@ TEST(QualityMessages, RoundTheStepDownAndKeepTheRest) {
   protocol::QualityChange change;
   change.position_step_mm = 3;
   change.colour_bits = 5;
-  const auto changed = with_change(StreamQuality{}, change).value();
-  EXPECT_EQ(changed.position_step_m, lattice_step(0.003));
+  const auto changed = with_change(stream::StreamQuality{}, change).value();
+  EXPECT_EQ(changed.position_step_m, stream::lattice_step(0.003));
   EXPECT_EQ(changed.colour_bits, 5);
-  EXPECT_EQ(changed.encoder_speed, StreamQuality{}.encoder_speed);
+  EXPECT_EQ(changed.encoder_speed, stream::StreamQuality{}.encoder_speed);
   EXPECT_FALSE(to_message(changed).marks);
   change.marks = true;
   EXPECT_TRUE(to_message(with_change(changed, change).value()).marks);
@@ -265,7 +265,7 @@ TEST(QualityMessages, SwitchAutomaticQualityOnAndOff) {
   protocol::QualityChange change;
   change.mode = protocol::QualityMode::Auto;
   change.latency_target_ms = 120;
-  const auto automatic = with_change(StreamQuality{}, change).value();
+  const auto automatic = with_change(stream::StreamQuality{}, change).value();
   EXPECT_TRUE(automatic.automatic);
   EXPECT_EQ(automatic.latency_target_ms, 120);
   EXPECT_EQ(to_message(automatic).mode, protocol::QualityMode::Auto);
@@ -277,4 +277,4 @@ TEST(QualityMessages, SwitchAutomaticQualityOnAndOff) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::session

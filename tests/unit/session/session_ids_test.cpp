@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 TEST(SessionIds, AreKnownAgainByTheirOwnRunOnly) {
@@ -28,4 +28,4 @@ TEST(SessionIds, RefuseWhatIsNoId) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::session

@@ -4,7 +4,7 @@
 
 #include "fusion/registry.hpp"
 
-namespace spectra::server {
+namespace spectra::session {
 namespace {
 
 TEST(SettingsText, OfNothingAreTheDefaults) {
@@ -25,7 +25,7 @@ TEST(SettingsText, SetsEverythingThatIsWritten) {
   EXPECT_EQ(std::get<std::string>(settings.params.at("sides")), "hot");
   EXPECT_EQ(settings.palette, "turbo");
   EXPECT_EQ(settings.range, (fusion::RangeSetting::manual(-10, 40.5)));
-  EXPECT_EQ(settings.missing, (fusion::Rgb8{255, 128, 0}));
+  EXPECT_EQ(settings.missing, (base::Rgb8{255, 128, 0}));
 }
 
 TEST(SettingsText, ReadsPercentiles) {
@@ -86,4 +86,4 @@ TEST(MissingText, ComesBackAsItWas) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::session

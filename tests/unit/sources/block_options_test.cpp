@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
 TEST(BlockOptions, AreThoseOfTheCommandLine) {
@@ -18,12 +18,12 @@ TEST(BlockOptions, AreThoseOfTheCommandLine) {
                                           {"up", "-y"}});
   ASSERT_TRUE(block) << block.error().message;
   EXPECT_EQ(block.value().observed_at, 1700000000.5);
-  EXPECT_EQ(block.value().sensor, (fusion::Vec3d{1, -2.5, 300}));
+  EXPECT_EQ(block.value().sensor, (base::Vec3d{1, -2.5, 300}));
   EXPECT_EQ(block.value().read.temperature_property, "heat");
-  EXPECT_EQ(block.value().read.temperature_unit, fusion::TemperatureUnit::Kelvin);
+  EXPECT_EQ(block.value().read.temperature_unit, files::TemperatureUnit::Kelvin);
   EXPECT_EQ(block.value().read.no_data.size(), 2U);
   EXPECT_EQ(block.value().read.metres_per_unit, 0.001);
-  EXPECT_EQ(block.value().read.up, fusion::UpAxis::MinusY);
+  EXPECT_EQ(block.value().read.up, base::UpAxis::MinusY);
 }
 
 TEST(BlockOptions, ComeBackFromTheTextThatIsKept) {
@@ -41,25 +41,25 @@ TEST(BlockOptions, ComeBackFromTheTextThatIsKept) {
 }
 
 TEST(BlockOptions, AreWrittenAsAQueryThatIsReadBack) {
-  fusion::ReadOptions read;
+  files::ReadOptions read;
   EXPECT_TRUE(query_of(read).empty());
   read.temperature_property = "heat";
   read.temperature_scale = 0.1;
   read.temperature_offset = -273.15;
   read.no_data = {-9999, std::numeric_limits<double>::infinity()};
   read.metres_per_unit = 1e-3;
-  read.up = fusion::UpAxis::MinusZ;
+  read.up = base::UpAxis::MinusZ;
   const auto block = incoming_block("a", query_of(read));
   ASSERT_TRUE(block) << block.error().message;
-  const fusion::ReadOptions& back = block.value().read;
+  const files::ReadOptions& back = block.value().read;
   EXPECT_EQ(back.temperature_property, "heat");
   EXPECT_EQ(back.temperature_scale, 0.1);
   EXPECT_EQ(back.temperature_offset, -273.15);
   EXPECT_EQ(back.no_data, read.no_data);
   EXPECT_EQ(back.metres_per_unit, 1e-3);
   EXPECT_EQ(back.up, read.up);
-  fusion::ReadOptions unit;
-  unit.temperature_unit = fusion::TemperatureUnit::Centikelvin;
+  files::ReadOptions unit;
+  unit.temperature_unit = files::TemperatureUnit::Centikelvin;
   EXPECT_EQ(incoming_block("a", query_of(unit)).value().read.temperature_unit, unit.temperature_unit);
 }
 
@@ -79,4 +79,4 @@ TEST(BlockOptions, NameTheFieldThatCannotBeMeant) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::sources

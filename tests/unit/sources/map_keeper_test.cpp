@@ -11,7 +11,7 @@
 
 #include "server/sources/block_options.hpp"
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
 /// A flat sheet of side x side vertices as a PLY file with double coordinates, the part of a lattice that begins at `column`.
@@ -57,8 +57,8 @@ class MapKeeperTest : public testing::Test {
     IncomingBlock block = incoming_block(id, std::string()).value();
     block.ply = std::make_shared<const std::string>(std::move(ply));
     ++asked_;
-    map_.put(std::move(block), [this, id](const std::variant<MapKeeper::Taken, BlockRefusal>& outcome) {
-      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+    map_.put(std::move(block), [this, id](const std::variant<MapKeeper::Taken, net::BlockRefusal>& outcome) {
+      const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
       tell(refusal != nullptr ? id + " refused: " + refusal->code
                               : id + " has " + std::to_string(std::get<MapKeeper::Taken>(outcome).entry.vertex_count));
     });
@@ -66,8 +66,8 @@ class MapKeeperTest : public testing::Test {
 
   void remove(const std::string& id) {
     ++asked_;
-    map_.remove(id, [this, id](const std::variant<store::Revision, BlockRefusal>& outcome) {
-      const auto* refusal = std::get_if<BlockRefusal>(&outcome);
+    map_.remove(id, [this, id](const std::variant<store::Revision, net::BlockRefusal>& outcome) {
+      const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
       tell(refusal != nullptr ? id + " refused: " + refusal->code : id + " is gone");
     });
   }
@@ -78,13 +78,13 @@ class MapKeeperTest : public testing::Test {
     return answers_;
   }
 
-  std::vector<fusion::Vec3f> positions_of(const std::string& id) {
+  std::vector<base::Vec3f> positions_of(const std::string& id) {
     const auto mesh = scenes_.current()->block_mesh(id);
     return {mesh->positions().begin(), mesh->positions().end()};
   }
 
-  SceneStore scenes_;
-  WorkerPool pool_{2};
+  map::SceneStore scenes_;
+  jobs::WorkerPool pool_{2};
   MapKeeper map_{scenes_, pool_, nullptr};
 
  private:
@@ -155,8 +155,8 @@ TEST(MapKeeper, MakesTheCoarseTilesOfWhatItRestores) {
                [&](const store::StoreResult<store::Revision>& outcome) { is_stored.set_value(outcome.has_value()); });
     ASSERT_TRUE(is_stored.get_future().get());
   }
-  SceneStore scenes;
-  WorkerPool pool(2);
+  map::SceneStore scenes;
+  jobs::WorkerPool pool(2);
   MapKeeper map(scenes, pool, std::move(store));
   ASSERT_EQ(map.restore(), std::nullopt);
   // Tiles of the first block meet those of the second now, and are made again.
@@ -171,4 +171,4 @@ TEST(MapKeeper, MakesTheCoarseTilesOfWhatItRestores) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <limits>
 
-namespace spectra::server {
+namespace spectra::sources {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 TEST(StoredBaseline, ComesBackBitForBit) {
-  const BlockBaseline baseline{{20.5F, kNan, -std::numeric_limits<float>::infinity(), 20.5F},
-                               {1700000000.25, 1699999999, kUnknownTime, 1700000000.25}};
+  const map::BlockBaseline baseline{{20.5F, kNan, -std::numeric_limits<float>::infinity(), 20.5F},
+                                    {1700000000.25, 1699999999, map::kUnknownTime, 1700000000.25}};
   const auto back = baseline_from(text_of(baseline), 4);
   ASSERT_TRUE(back);
   for (std::size_t v = 0; v < 4; ++v) {
@@ -21,14 +21,14 @@ TEST(StoredBaseline, ComesBackBitForBit) {
     EXPECT_TRUE(back->at[v] == baseline.at[v] || std::isnan(baseline.at[v])) << v;
     EXPECT_EQ(std::isnan(back->at[v]), std::isnan(baseline.at[v])) << v;
   }
-  const BlockBaseline timeless{{1, 2}, {kUnknownTime, kUnknownTime}};
+  const map::BlockBaseline timeless{{1, 2}, {map::kUnknownTime, map::kUnknownTime}};
   EXPECT_TRUE(std::isnan(baseline_from(text_of(timeless), 2)->at[1]));
-  EXPECT_EQ(text_of(BlockBaseline{}), "");
+  EXPECT_EQ(text_of(map::BlockBaseline{}), "");
   EXPECT_TRUE(baseline_from("", 7)->is_empty());
 }
 
 TEST(StoredBaseline, AnyOtherBytesAreNone) {
-  const std::string good = text_of(BlockBaseline{{1, 2}, {10, 20}});
+  const std::string good = text_of(map::BlockBaseline{{1, 2}, {10, 20}});
   EXPECT_FALSE(baseline_from(good, 3)) << "of another block";
   for (std::size_t length = 1; length < good.size(); ++length) EXPECT_FALSE(baseline_from(good.substr(0, length), 2));
   for (std::size_t at = 0; at < good.size(); ++at) {
@@ -52,4 +52,4 @@ TEST(StoredMark, ComesBackAndNothingElseDoes) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::sources

@@ -53,7 +53,7 @@ TEST(BlockStore, GivesBackWhatWasPutAfterBeingOpenedAgain) {
   const StoreFixture here;
   BlockRecord block = made_block("wall.1_a-B", 7, 30'000);
   block.description.observed_at = 1.5e9 + 0.25;
-  block.description.sensor = fusion::Vec3d{-0.0, 1e-300, 6'378'137.125};
+  block.description.sensor = base::Vec3d{-0.0, 1e-300, 6'378'137.125};
   block.description.read_options = "scale=0.001&up=y";
   block.description.triangle_count = std::uint64_t{1} << 40U;
   block.description.bounds = {{-1, -2, -3}, {1.5, 2.5, 1e300}};

@@ -9,7 +9,7 @@
 
 #include "fake_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using testing::scene_of;
@@ -17,8 +17,8 @@ using testing::scene_of;
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 /// A board of `side` x `side` vertices across the line of sight along z, one metre wide, all of 20 degC.
-std::shared_ptr<Tile> board(std::uint32_t number, float x, float y, float z, std::uint32_t side = 21) {
-  auto tile = std::make_shared<Tile>();
+std::shared_ptr<map::Tile> board(std::uint32_t number, float x, float y, float z, std::uint32_t side = 21) {
+  auto tile = std::make_shared<map::Tile>();
   tile->id = {1, number, 0, 0};
   for (std::uint32_t row = 0; row < side; ++row) {
     for (std::uint32_t column = 0; column < side; ++column) {
@@ -41,7 +41,7 @@ std::shared_ptr<Tile> board(std::uint32_t number, float x, float y, float z, std
 }
 
 /// The vertex in the middle of a board.
-std::size_t middle(const Tile& tile) {
+std::size_t middle(const map::Tile& tile) {
   return tile.positions.size() / 2;
 }
 
@@ -50,8 +50,8 @@ Camera camera() {
   return {.eye = {0, 0, 4}, .target = {0, 0, 0}, .up = {0, 1, 0}, .fov_y_deg = 45, .viewport = {900, 600}};
 }
 
-ExtremesInView in_view(const std::vector<std::shared_ptr<Tile>>& tiles, const PictureWindow& window = kWholePicture,
-                       const Camera& from = camera()) {
+ExtremesInView in_view(const std::vector<std::shared_ptr<map::Tile>>& tiles,
+                       const PictureWindow& window = kWholePicture, const Camera& from = camera()) {
   return extremes_in_view(*scene_of({tiles.begin(), tiles.end()}), from, window);
 }
 
@@ -98,7 +98,7 @@ TEST(ExtremesInView, AreHiddenByASurfaceThatReachesBehindTheEye) {
   const auto wall = board(0, 0, 0.1F, 0);
   wall->temperature_celsius[middle(*wall)] = 90;
   // From behind the eye to beyond the wall, and between the eye and the middle of it.
-  auto ceiling = std::make_shared<Tile>();
+  auto ceiling = std::make_shared<map::Tile>();
   ceiling->id = {1, 1, 0, 0};
   ceiling->positions = {{-9, 0.05F, 20}, {9, 0.05F, 20}, {9, 0.05F, -20}, {-9, 0.05F, -20}};
   ceiling->temperature_celsius = {15, 15, 15, 15};
@@ -140,4 +140,4 @@ TEST(ExtremesInView, NeedACameraThatCanSee) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

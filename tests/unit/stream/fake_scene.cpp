@@ -7,10 +7,10 @@
 #include "fusion/settings.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
-std::shared_ptr<Tile> patch_tile(protocol::TileId id, int side, int column, float celsius) {
-  auto tile = std::make_shared<Tile>();
+std::shared_ptr<map::Tile> patch_tile(protocol::TileId id, int side, int column, float celsius) {
+  auto tile = std::make_shared<map::Tile>();
   tile->id = id;
   tile->lowest_celsius = celsius;
   tile->highest_celsius = celsius + 5;
@@ -40,13 +40,13 @@ std::shared_ptr<Tile> patch_tile(protocol::TileId id, int side, int column, floa
   return tile;
 }
 
-FakeScene::FakeScene(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision)
+FakeScene::FakeScene(std::vector<std::shared_ptr<const map::Tile>> tiles, std::uint32_t revision)
     : revision_(revision), tiles_(std::move(tiles)) {
   fusion::TemperatureAccumulator accumulator;
   if (!tiles_.empty()) bounds_ = tiles_.front()->bounds;
   for (const auto& tile : tiles_) {
     accumulator.add(tile->temperature_celsius);
-    for (const auto axis : {&fusion::Vec3f::x, &fusion::Vec3f::y, &fusion::Vec3f::z}) {
+    for (const auto axis : {&base::Vec3f::x, &base::Vec3f::y, &base::Vec3f::z}) {
       bounds_.min.*axis = std::min(bounds_.min.*axis, tile->bounds.min.*axis);
       bounds_.max.*axis = std::max(bounds_.max.*axis, tile->bounds.max.*axis);
     }
@@ -69,8 +69,8 @@ std::uint64_t FakeScene::triangle_count() const {
   return count;
 }
 
-std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side) {
-  std::vector<std::shared_ptr<const Tile>> tiles;
+std::vector<std::shared_ptr<const map::Tile>> tiles_of_tree(int leaf_count, int side) {
+  std::vector<std::shared_ptr<const map::Tile>> tiles;
   auto root = patch_tile({0, 0, 0, 0}, side, 0, 20);
   root->child_mask = 1;
   root->geometric_error_m = 0.1F;
@@ -82,8 +82,8 @@ std::vector<std::shared_ptr<const Tile>> tiles_of_tree(int leaf_count, int side)
   return tiles;
 }
 
-std::vector<std::shared_ptr<const Tile>> quadtree_tiles(int level_count, int side) {
-  std::vector<std::shared_ptr<const Tile>> tiles;
+std::vector<std::shared_ptr<const map::Tile>> quadtree_tiles(int level_count, int side) {
+  std::vector<std::shared_ptr<const map::Tile>> tiles;
   for (int level = 0; level < level_count; ++level) {
     const std::uint32_t count = 1U << level;
     const float width = 4.0F / static_cast<float>(count);
@@ -106,11 +106,12 @@ std::vector<std::shared_ptr<const Tile>> quadtree_tiles(int level_count, int sid
   return tiles;
 }
 
-std::shared_ptr<const SceneSnapshot> scene_of(std::vector<std::shared_ptr<const Tile>> tiles, std::uint32_t revision) {
+std::shared_ptr<const map::SceneSnapshot> scene_of(std::vector<std::shared_ptr<const map::Tile>> tiles,
+                                                   std::uint32_t revision) {
   return std::make_shared<FakeScene>(std::move(tiles), revision);
 }
 
-fusion::FusionPlan plan_with_alpha(const SceneSnapshot& scene, double alpha) {
+fusion::FusionPlan plan_with_alpha(const map::SceneSnapshot& scene, double alpha) {
   fusion::FusionChange change;
   change.params["alpha"] = alpha;
   return fusion::FusionPlan::prepare(fusion::with_change(fusion::default_settings(), change).value(),
@@ -118,4 +119,4 @@ fusion::FusionPlan plan_with_alpha(const SceneSnapshot& scene, double alpha) {
       .value();
 }
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

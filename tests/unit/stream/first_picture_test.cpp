@@ -5,7 +5,7 @@
 #include "fake_scene.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using testing::plan_with_alpha;
@@ -21,7 +21,7 @@ TEST(FirstPicture, TheRootIsThereBeforeTheFirstViewer) {
   encode_first_picture(scene, cache);
   EXPECT_EQ(cache.miss_count(), 1U);
 
-  WorkerPool pool(1);
+  jobs::WorkerPool pool(1);
   TestViewer viewer(scene, cache, pool);
   viewer.stream().subscribe({});
   viewer.stream().set_plan(plan_with_alpha(*scene, 0.5));
@@ -30,4 +30,4 @@ TEST(FirstPicture, TheRootIsThereBeforeTheFirstViewer) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -12,13 +12,13 @@
 #include "fusion/mesh/position_index.hpp"
 #include "server/stream/lattice.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 namespace {
 
-using fusion::Vec3f;
+using base::Vec3f;
 using Place = std::array<double, 3>;
 
-Place place_of(const Vec3f& p) {
+Place place_of(const base::Vec3f& p) {
   return {double{p.x}, double{p.y}, double{p.z}};
 }
 
@@ -134,9 +134,9 @@ Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place
 
 }  // namespace
 
-FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count) {
+FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count) {
   FormReport report;
-  PositionIndex index(static_cast<std::size_t>(scene.vertex_count()));
+  mesh::PositionIndex index(static_cast<std::size_t>(scene.vertex_count()));
   std::vector<Place> before, after;
   std::vector<std::uint32_t> parent;
   const auto piece_of = [&](std::uint32_t v) {
@@ -185,7 +185,7 @@ FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count) {
     if (loss.is_merged) ++report.merged_piece_count;
   }
 
-  const Bounds& box = scene.bounds();
+  const base::Bounds& box = scene.bounds();
   const double smallest_radius = std::sqrt(squared(place_of(box.min), place_of(box.max))) / 20'000;
   const NearestPlaces places(before);
   const std::size_t stride = std::max<std::size_t>(1, before.size() / std::max<std::size_t>(1, seed_count));
@@ -207,4 +207,4 @@ FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count) {
   return report;
 }
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

@@ -5,7 +5,7 @@
 
 #include "server/map/scene_snapshot.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
 /// What rounding positions leaves of the form of a scene, at full detail.
 struct FormReport {
@@ -25,6 +25,6 @@ struct FormReport {
 /// Compares every piece, and the balls of 50 to 100 and of 1,000 vertices around `seed_count` evenly taken ones (no smaller than a
 /// 20,000th of the scene's diagonal), with what a client decodes at the scene's own steps. A side that is thinner than a 4,096th of
 /// the second longest, or than eight times what floats tell apart there, is flat.
-FormReport form_of(const SceneSnapshot& scene, std::size_t seed_count);
+FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count);
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

@@ -4,7 +4,7 @@
 
 #include "fake_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using testing::patch_tile;
@@ -31,7 +31,7 @@ class Waiter final : public CacheWaiter {
 TEST(FrameCache, GivesAClaimToOneAndTellsTheOthers) {
   FrameCache cache(1 << 20);
   auto& state = *cache.state();
-  const std::shared_ptr<const Tile> tile = patch_tile({}, 3, 0, 20);
+  const std::shared_ptr<const map::Tile> tile = patch_tile({}, 3, 0, 20);
   const GeometryKey key{Identity(tile), 0.5F, 7};
   const auto waiter = std::make_shared<Waiter>();
   EXPECT_EQ(state.claim_geometry(key, {}).kind, Claim<EncodedTile>::Kind::Yours);
@@ -76,7 +76,7 @@ TEST(FrameCache, StaysWithinItsCapacityAndEvictsTheLeastRecentlyUsed) {
 TEST(FrameCache, EvictsColoursBeforeGeometry) {
   FrameCache cache(100'000);
   auto& state = *cache.state();
-  const std::shared_ptr<const Tile> tile = patch_tile({}, 3, 0, 20);
+  const std::shared_ptr<const map::Tile> tile = patch_tile({}, 3, 0, 20);
   const GeometryKey geometry_key{Identity(tile), 0.5F, 7};
   state.claim_geometry(geometry_key, {});
   state.store_geometry(geometry_key, encoding(50'000));
@@ -93,7 +93,7 @@ TEST(FrameCache, ForgetsTilesThatAreGone) {
   FrameCache cache(std::size_t{1} << 30);
   auto& state = *cache.state();
   const auto plan = std::make_shared<const PlanIdentity>();
-  const auto put = [&](const std::shared_ptr<const Tile>& tile) {
+  const auto put = [&](const std::shared_ptr<const map::Tile>& tile) {
     const GeometryKey key{Identity(tile), 0.5F, 7};
     state.claim_geometry(key, {});
     const std::uint32_t revision = state.store_geometry(key, encoding(1'000))->revision;
@@ -101,7 +101,7 @@ TEST(FrameCache, ForgetsTilesThatAreGone) {
     state.store_colours({revision, plan, 8}, colours(1'000));
     return key;
   };
-  const std::shared_ptr<const Tile> kept = patch_tile({}, 3, 0, 20);
+  const std::shared_ptr<const map::Tile> kept = patch_tile({}, 3, 0, 20);
   const GeometryKey key = put(kept);
   std::size_t after_100 = 0;
   for (int i = 0; i < 1000; ++i) {
@@ -117,7 +117,7 @@ TEST(FrameCache, ForgetsTilesThatAreGone) {
 TEST(FrameCache, AGeometryThatComesBackTheSameKeepsItsRevision) {
   FrameCache cache(0);  // Nothing is ever kept.
   auto& state = *cache.state();
-  const std::shared_ptr<const Tile> tile = patch_tile({}, 3, 0, 20);
+  const std::shared_ptr<const map::Tile> tile = patch_tile({}, 3, 0, 20);
   const GeometryKey key{Identity(tile), 0.5F, 7};
   const auto made = [&](const GeometryKey& which, int content) {
     EXPECT_EQ(state.claim_geometry(which, {}).kind, Claim<EncodedTile>::Kind::Yours);
@@ -154,10 +154,10 @@ TEST(FrameCache, KeepsColoursApartThatAreWrittenOtherwise) {
 
 TEST(FrameCache, IdentityOutlivesItsObject) {
   // Not make_shared, so that the memory of the dead tile is free for the next one.
-  auto tile = std::shared_ptr<const Tile>(new Tile());
+  auto tile = std::shared_ptr<const map::Tile>(new map::Tile());
   const Identity dead(tile);
   tile.reset();
-  tile = std::shared_ptr<const Tile>(new Tile());
+  tile = std::shared_ptr<const map::Tile>(new map::Tile());
   const Identity alive(tile);
   EXPECT_TRUE(dead < alive || alive < dead);
   EXPECT_TRUE(dead.expired());
@@ -175,4 +175,4 @@ TEST(FrameCache, PlansAreOneWhereTheyShowTheSame) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

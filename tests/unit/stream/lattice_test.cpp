@@ -9,7 +9,7 @@
 #include "fake_scene.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 TEST(LatticeStep, IsTheLargestOfItsFormThatIsNotAbove) {
@@ -143,4 +143,4 @@ TEST(TileLattice, RefusesWhatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

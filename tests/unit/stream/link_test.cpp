@@ -13,7 +13,7 @@
 #include "protocol/codec/draco_codec.hpp"
 #include "simulated_link.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -34,9 +34,9 @@ struct Drag {
   std::size_t most_in_flight_bytes = 0;
 };
 
-Drag dragged(const std::shared_ptr<const SceneSnapshot>& scene, LinkSpeed speed, StreamQuality quality = {}) {
+Drag dragged(const std::shared_ptr<const map::SceneSnapshot>& scene, LinkSpeed speed, StreamQuality quality = {}) {
   FrameCache cache(256u << 20);
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, speed);
   link.stream().set_quality(quality);
   link.stream().subscribe({});
@@ -85,8 +85,8 @@ Drag dragged(const std::shared_ptr<const SceneSnapshot>& scene, LinkSpeed speed,
 }
 
 /// Three levels of tiles of `side` x `side` vertices: 1, 4 and 16.
-std::shared_ptr<const SceneSnapshot> three_level_scene(int side) {
-  std::vector<std::shared_ptr<const Tile>> tiles;
+std::shared_ptr<const map::SceneSnapshot> three_level_scene(int side) {
+  std::vector<std::shared_ptr<const map::Tile>> tiles;
   for (std::uint8_t level = 0; level < 3; ++level) {
     const auto count = 1u << level;
     for (std::uint32_t y = 0; y < count; ++y) {
@@ -136,9 +136,9 @@ struct Answer {
   std::map<protocol::TileId, std::vector<std::byte>> colours;
 };
 
-Answer answered(const std::shared_ptr<const SceneSnapshot>& scene, StreamQuality quality) {
+Answer answered(const std::shared_ptr<const map::SceneSnapshot>& scene, StreamQuality quality) {
   FrameCache cache(256u << 20);
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, kRadio);
   link.stream().set_quality(quality);
   link.stream().subscribe({});
@@ -184,8 +184,8 @@ TEST(RadioLink, AutomaticQualityAnswersSoonerAndEndsTheSame) {
 /// The largest remainder of any channel of a tile's colours, rounded to six bits: 0 when they carry no more.
 int beyond_six_bits(const std::vector<std::byte>& payload) {
   int worst = 0;
-  const auto decoded = protocol::decoded_colours(payload);
-  for (const protocol::ColourBytes& colour : decoded.value()) {
+  const auto decoded = protocol::codec::decoded_colours(payload);
+  for (const protocol::codec::ColourBytes& colour : decoded.value()) {
     for (const std::uint8_t value : colour) worst = std::max(worst, value == 255 ? 0 : value % 4);
   }
   return worst;
@@ -196,7 +196,7 @@ TEST(RadioLink, WhatIsDrawnForAMomentCarriesFewerBitsOnASlowLinkOnly) {
   for (const LinkSpeed speed : {LinkSpeed{5e4, 0.1}, LinkSpeed{1e8, 0.002}}) {
     const bool is_slow = speed.bytes_per_s < 1e6;
     FrameCache cache(256u << 20);
-    WorkerPool pool(2);
+    jobs::WorkerPool pool(2);
     SimulatedLink link(scene, cache, pool, speed);
     link.stream().subscribe({});
     link.stream().set_plan(plan_with_alpha(*scene, 0));
@@ -219,7 +219,7 @@ TEST(RadioLink, WhatIsDrawnForAMomentCarriesFewerBitsOnASlowLinkOnly) {
 TEST(RadioLink, AViewerThatStopsAcknowledgingHoldsBoundedMemory) {
   const auto scene = three_level_scene(96);
   FrameCache cache(256u << 20);
-  WorkerPool pool(2);
+  jobs::WorkerPool pool(2);
   SimulatedLink link(scene, cache, pool, {.bytes_per_s = 1e9, .round_trip_s = 0.001});
   link.stream().subscribe({});
   link.stream().set_plan(plan_with_alpha(*scene, 0));
@@ -242,14 +242,14 @@ TEST(RadioLink, AViewerThatStopsAcknowledgingHoldsBoundedMemory) {
 TEST(RadioLink, TheRealSceneIsFollowedToo) {
   const char* folder = std::getenv("SPECTRA_TEST_DATA");
   if (folder == nullptr) GTEST_SKIP() << "SPECTRA_TEST_DATA names no folder with the real scenes";
-  auto read = fusion::read_ply(std::string(folder) + "/arco_castle_1m.ply");
+  auto read = files::read_ply(std::string(folder) + "/arco_castle_1m.ply");
   ASSERT_TRUE(read.has_value());
-  WorkerPool pool(2);
-  const auto scene = SceneSnapshot::build(std::move(read.value().mesh), 1, pool, 32'000, LevelsOfDetail::All);
+  jobs::WorkerPool pool(2);
+  const auto scene = map::SceneSnapshot::build(std::move(read.value().mesh), 1, pool, 32'000, map::LevelsOfDetail::All);
   const Drag drag = dragged(scene, kRadio);
   report("arco_castle_1m", drag, kRadio);
   expect_bars(drag, kRadio);
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -10,19 +10,19 @@
 #include "server/stream/lattice.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
-using fusion::MultispectralMesh;
-using fusion::Triangle;
-using fusion::Vec3f;
+using base::Triangle;
+using base::Vec3f;
+using mesh::MultispectralMesh;
 using testing::form_of;
 using testing::FormReport;
 
 /// Parts of a scene; what is added keeps its place.
 struct Parts {
-  std::vector<Vec3f> positions;
-  std::vector<Triangle> triangles;
+  std::vector<base::Vec3f> positions;
+  std::vector<base::Triangle> triangles;
 
   std::uint32_t add(double x, double y, double z) {
     positions.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
@@ -31,7 +31,7 @@ struct Parts {
 
   /// A grid of vertices over a parallelogram, with a height for each.
   template <class Height>
-  void grid(int columns, int rows, Vec3f corner, Vec3f along, Vec3f across, Height height) {
+  void grid(int columns, int rows, base::Vec3f corner, base::Vec3f along, base::Vec3f across, Height height) {
     const auto first = static_cast<std::uint32_t>(positions.size());
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns; ++column) {
@@ -55,7 +55,7 @@ struct Parts {
     grid(side, side, {0, 0, 0}, {spacing, 0, 0}, {0, spacing, 0}, [](int, int) { return 0.0; });
   }
 
-  void box(Vec3f low, Vec3f high) {
+  void box(base::Vec3f low, base::Vec3f high) {
     std::array<std::uint32_t, 8> v{};
     for (unsigned i = 0; i < 8; ++i)
       v[i] = add(double{(i & 1) != 0 ? high.x : low.x}, double{(i & 2) != 0 ? high.y : low.y},
@@ -68,7 +68,7 @@ struct Parts {
   }
 
   /// A tube of rings of six along a direction.
-  void tube(Vec3f start, Vec3f along, int ring_count, double radius) {
+  void tube(base::Vec3f start, base::Vec3f along, int ring_count, double radius) {
     const auto first = static_cast<std::uint32_t>(positions.size());
     // Two directions across: good enough for a tube.
     const std::array<double, 3> a{double{along.x}, double{along.y}, double{along.z}};
@@ -98,8 +98,8 @@ struct Parts {
     }
   }
 
-  MultispectralMesh mesh() const {
-    MultispectralMesh result;
+  mesh::MultispectralMesh mesh() const {
+    mesh::MultispectralMesh result;
     result.name = "parts";
     result.has_visible = true;
     result.resize_vertices(positions.size());
@@ -109,9 +109,9 @@ struct Parts {
   }
 };
 
-std::shared_ptr<const SceneSnapshot> scene_of(MultispectralMesh mesh) {
-  WorkerPool pool(2);
-  return SceneSnapshot::build(std::move(mesh), 1, pool, 4'000, LevelsOfDetail::All);
+std::shared_ptr<const map::SceneSnapshot> scene_of(mesh::MultispectralMesh mesh) {
+  jobs::WorkerPool pool(2);
+  return map::SceneSnapshot::build(std::move(mesh), 1, pool, 4'000, map::LevelsOfDetail::All);
 }
 
 std::string described(const FormReport& form) {
@@ -122,7 +122,7 @@ std::string described(const FormReport& form) {
          "; torn " + std::to_string(form.torn_count);
 }
 
-void expect_kept(MultispectralMesh mesh) {
+void expect_kept(mesh::MultispectralMesh mesh) {
   const auto scene = scene_of(std::move(mesh));
   const FormReport form = form_of(*scene, 600);
   EXPECT_TRUE(form.is_kept()) << described(form);
@@ -189,7 +189,7 @@ TEST(PositionSteps, KeepHeapsOfSmallPieces) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> place(20, 22), size(0.001F, 0.3F);
   for (int i = 0; i < 400; ++i) {
-    const Vec3f low{place(random), place(random), place(random) - 20};
+    const base::Vec3f low{place(random), place(random), place(random) - 20};
     scene.box(low, {low.x + size(random), low.y + size(random), low.z + size(random)});
   }
   expect_kept(scene.mesh());
@@ -209,7 +209,7 @@ TEST(PositionSteps, KeepTheThicknessOfRoughWallsAlongAnAxis) {
 }
 
 TEST(PositionSteps, AreTheSameForATriangleSoup) {
-  const MultispectralMesh terrain = spectra::testing::terrain({.columns = 110, .rows = 110});
+  const mesh::MultispectralMesh terrain = spectra::testing::terrain({.columns = 110, .rows = 110});
   const auto shared = scene_of(spectra::testing::copy_of(terrain)), soup = scene_of(spectra::testing::soup_of(terrain));
   EXPECT_EQ(shared->suggested_position_step_m(), soup->suggested_position_step_m());
   EXPECT_EQ(form_of(*soup, 100).torn_count, 0u);
@@ -217,7 +217,7 @@ TEST(PositionSteps, AreTheSameForATriangleSoup) {
 }
 
 TEST(PositionSteps, AreNotCoarsenedByAStrayPoint) {
-  MultispectralMesh cloud = spectra::testing::point_cloud(20'000, 3);
+  mesh::MultispectralMesh cloud = spectra::testing::point_cloud(20'000, 3);
   const auto without = scene_of(spectra::testing::copy_of(cloud));
   cloud.resize_vertices(20'001);
   cloud.positions()[20'000] = {31'000, -25'000, 900};
@@ -228,11 +228,11 @@ TEST(PositionSteps, AreNotCoarsenedByAStrayPoint) {
 }
 
 TEST(PositionSteps, AreTheSameForAnyNumberOfThreads) {
-  const MultispectralMesh cloud = spectra::testing::point_cloud(200'000, 9);
+  const mesh::MultispectralMesh cloud = spectra::testing::point_cloud(200'000, 9);
   const auto halvings = [&](unsigned thread_count) {
-    WorkerPool pool(thread_count);
-    const auto scene = SceneSnapshot::build(spectra::testing::copy_of(cloud), 1, pool);
-    std::vector<StepHalvings> all;
+    jobs::WorkerPool pool(thread_count);
+    const auto scene = map::SceneSnapshot::build(spectra::testing::copy_of(cloud), 1, pool);
+    std::vector<map::StepHalvings> all;
     for (const auto& tile : scene->tiles())
       all.insert(all.end(), tile->step_halvings.begin(), tile->step_halvings.end());
     return all;
@@ -241,4 +241,4 @@ TEST(PositionSteps, AreTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

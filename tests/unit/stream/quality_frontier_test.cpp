@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 TEST(QualityFrontier, FallsFromFullQualityStepByStep) {
@@ -63,4 +63,4 @@ TEST(FirstAnswer, IsTheFinestThatArrivesInTime) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -4,7 +4,7 @@
 #include "server/stream/frame_cache.hpp"
 #include "stream_with_viewers.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -32,13 +32,13 @@ class RawLayers : public testing::StreamWithViewers {
     }
   }
 
-  std::vector<fusion::Rgb8> fused_by_viewer(const HeldTile& held, const fusion::FusionPlan& plan) {
+  std::vector<base::Rgb8> fused_by_viewer(const HeldTile& held, const fusion::FusionPlan& plan) {
     const fusion::TemperatureCodes codes{held.temperature.table.scale, held.temperature.table.offset};
     std::vector<float> celsius(held.temperature.codes.size());
     codes.decode(held.temperature.codes, celsius);
-    std::vector<fusion::Rgb8> visible;
+    std::vector<base::Rgb8> visible;
     for (const auto& [r, g, b] : held.visible) visible.push_back({r, g, b});
-    std::vector<fusion::Rgb8> fused(celsius.size());
+    std::vector<base::Rgb8> fused(celsius.size());
     plan.fuse(celsius, visible, fused);
     return fused;
   }
@@ -179,7 +179,7 @@ TEST_F(RawLayers, OfAChangedTileComeAgain) {
   show(viewer, 0.3);
   settle(viewer);
   auto tiles = tiles_of_tree(6);
-  std::vector<std::shared_ptr<const Tile>> changed(scene_->tiles().begin(), scene_->tiles().end());
+  std::vector<std::shared_ptr<const map::Tile>> changed(scene_->tiles().begin(), scene_->tiles().end());
   changed[3] = tiles[3];
   scene_ = scene_of(changed, 2);
   viewer.stream().set_scene(scene_);
@@ -249,4 +249,4 @@ TEST_F(RawLayersInView, ComeOfWhatIsDrawnAndOfTheTopHotAndNearFirst) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

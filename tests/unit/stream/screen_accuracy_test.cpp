@@ -8,7 +8,7 @@
 
 #include "fake_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 /// Twenty-one tiles with errors of 0.4, 0.2 and 0 m; the root is node 0, its first child node 1.
@@ -53,13 +53,13 @@ TEST_F(ScreenAccuracyTest, ColoursAreThoseOfWhatIsDrawn) {
 }
 
 TEST_F(ScreenAccuracyTest, CountsColourAndTemperatureOfCoarseTiles) {
-  std::vector<std::shared_ptr<const Tile>> tiles = testing::quadtree_tiles(2, 6);
-  auto root = std::make_shared<Tile>(*tiles[0]);
+  std::vector<std::shared_ptr<const map::Tile>> tiles = testing::quadtree_tiles(2, 6);
+  auto root = std::make_shared<map::Tile>(*tiles[0]);
   root->colour_error_levels = 9;
   root->temperature_error_celsius = 0.5F;
   tiles[0] = root;
   for (std::size_t i = 1; i < tiles.size(); ++i) {
-    auto leaf = std::make_shared<Tile>(*tiles[i]);
+    auto leaf = std::make_shared<map::Tile>(*tiles[i]);
     leaf->temperature_error_celsius = i == 1 ? 0 : std::numeric_limits<float>::quiet_NaN();
     tiles[i] = leaf;
   }
@@ -80,8 +80,8 @@ TEST_F(ScreenAccuracyTest, CountsWhatIsInView) {
   colour_bits[0] = 8;
   for (const std::size_t quarter : tree_.nodes()[0].children) colour_bits[quarter] = 8;
   for (const std::size_t leaf : tree_.nodes()[tree_.nodes()[0].children[0]].children) colour_bits[leaf] = 8;
-  const Bounds& fine = tree_.nodes()[tree_.nodes()[0].children[0]].bounds;
-  const fusion::Vec3f eye{(fine.min.x + fine.max.x) / 2, (fine.min.y + fine.max.y) / 2, fine.max.z + 0.3F};
+  const base::Bounds& fine = tree_.nodes()[tree_.nodes()[0].children[0]].bounds;
+  const base::Vec3f eye{(fine.min.x + fine.max.x) / 2, (fine.min.y + fine.max.y) / 2, fine.max.z + 0.3F};
   const Camera close{.eye = eye, .target = {eye.x, eye.y, 0}, .up = {0, 1, 0}, .fov_y_deg = 50, .viewport = {800, 800}};
   EXPECT_NEAR(of(colour_bits, close).position_mm, kRoundingMm, 1e-4);
   EXPECT_EQ(of(colour_bits, close).pixel_error, 0);
@@ -92,4 +92,4 @@ TEST_F(ScreenAccuracyTest, CountsWhatIsInView) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

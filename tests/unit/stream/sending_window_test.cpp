@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <queue>
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 /// A sender that always has frames of one size, on a link of a given rate and delay, in simulated time.
@@ -153,4 +153,4 @@ TEST(SendingWindow, APauseDoesNotCountAsASlowLink) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

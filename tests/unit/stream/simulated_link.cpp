@@ -5,9 +5,9 @@
 
 #include "test_viewer.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
-SimulatedLink::SimulatedLink(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool,
+SimulatedLink::SimulatedLink(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache, jobs::WorkerPool& pool,
                              LinkSpeed speed)
     : pool_(pool), speed_(speed), stream_(ViewerStream::create(std::move(scene), cache, pool, [] {})) {}
 
@@ -59,4 +59,4 @@ void SimulatedLink::send_what_may_go() {
   }
 }
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

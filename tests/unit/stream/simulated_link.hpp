@@ -10,7 +10,7 @@
 #include "protocol/tile_frame.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
 struct LinkSpeed {
   double bytes_per_s = 5e6 / 8;
@@ -27,7 +27,8 @@ class SimulatedLink {
     std::size_t size_bytes;
   };
 
-  SimulatedLink(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool, LinkSpeed speed);
+  SimulatedLink(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache, jobs::WorkerPool& pool,
+                LinkSpeed speed);
   ~SimulatedLink();
   SimulatedLink(const SimulatedLink&) = delete;
   SimulatedLink& operator=(const SimulatedLink&) = delete;
@@ -58,7 +59,7 @@ class SimulatedLink {
 
   void send_what_may_go();
 
-  WorkerPool& pool_;
+  jobs::WorkerPool& pool_;
   LinkSpeed speed_;
   std::shared_ptr<ViewerStream> stream_;
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
@@ -69,4 +70,4 @@ class SimulatedLink {
   bool acknowledges_ = true;
 };
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

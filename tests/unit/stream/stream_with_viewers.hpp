@@ -15,7 +15,7 @@
 #include "server/stream/view_selection.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
 /// A server with one scene, to which viewers come.
 class StreamWithViewers : public ::testing::Test {
@@ -23,7 +23,7 @@ class StreamWithViewers : public ::testing::Test {
   void show(TestViewer& viewer, double alpha) { viewer.stream().set_plan(plan_with_alpha(*scene_, alpha)); }
 
   /// Expects that the viewer holds exactly the scene's tiles, in the colours of `alpha` at `colour_bits`.
-  void expect_picture(const TestViewer& viewer, const SceneSnapshot& scene, double alpha, int colour_bits = 8) {
+  void expect_picture(const TestViewer& viewer, const map::SceneSnapshot& scene, double alpha, int colour_bits = 8) {
     const auto plan = plan_with_alpha(scene, alpha);
     ASSERT_EQ(viewer.tiles.size(), scene.tiles().size());
     for (const auto& tile : scene.tiles()) {
@@ -35,8 +35,9 @@ class StreamWithViewers : public ::testing::Test {
     }
   }
 
-  static void expect_tile(const HeldTile& held, const Tile& tile, const fusion::FusionPlan& plan, int colour_bits) {
-    std::vector<fusion::Rgb8> fused(tile.positions.size());
+  static void expect_tile(const HeldTile& held, const map::Tile& tile, const fusion::FusionPlan& plan,
+                          int colour_bits) {
+    std::vector<base::Rgb8> fused(tile.positions.size());
     plan.fuse(tile.temperature_celsius, tile.visible, fused);
     const float half_step = held.geometry.position_step_m / 2 * 1.001F;
     ASSERT_EQ(held.positions_m.size(), tile.positions.size());
@@ -55,17 +56,17 @@ class StreamWithViewers : public ::testing::Test {
       }
       ASSERT_NE(source, by_x.end());
       ASSERT_LE(std::abs(p[0] - tile.positions[*source].x), half_step);
-      const fusion::Rgb8 colour = fused[*source];
-      const protocol::ColourBytes expected{protocol::rounded_channel(colour.r, colour_bits),
-                                           protocol::rounded_channel(colour.g, colour_bits),
-                                           protocol::rounded_channel(colour.b, colour_bits)};
+      const base::Rgb8 colour = fused[*source];
+      const protocol::codec::ColourBytes expected{protocol::codec::rounded_channel(colour.r, colour_bits),
+                                                  protocol::codec::rounded_channel(colour.g, colour_bits),
+                                                  protocol::codec::rounded_channel(colour.b, colour_bits)};
       ASSERT_EQ(held.colours[i], expected);
     }
   }
 
-  std::shared_ptr<const SceneSnapshot> scene_ = scene_of(tiles_of_tree(6));
+  std::shared_ptr<const map::SceneSnapshot> scene_ = scene_of(tiles_of_tree(6));
   FrameCache cache_{64u << 20};  ///< Roomy.
-  WorkerPool pool_{2};
+  jobs::WorkerPool pool_{2};
 };
 
 /// Sixteen leaves under four quarters under a root, over the square (0,0)-(4,4).
@@ -119,4 +120,4 @@ class StreamOfATree : public StreamWithViewers {
   }
 };
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 namespace {
 
 // Only a stall lasts so long; no test depends on it otherwise.
@@ -14,7 +14,7 @@ constexpr std::chrono::seconds kStall{20};
 
 }  // namespace
 
-TestViewer::TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool)
+TestViewer::TestViewer(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache, jobs::WorkerPool& pool)
     : stream_(ViewerStream::create(std::move(scene), cache, pool, [this] {
         const std::lock_guard lock(mutex_);
         ++wake_count_;
@@ -108,7 +108,7 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
   switch (header.kind) {
     case protocol::FrameKind::Geometry: {
       EXPECT_TRUE(revisions_.insert(header.revision).second) << "revision " << header.revision << " came twice";
-      const auto geometry = protocol::decoded_geometry(frame.value().payload);
+      const auto geometry = protocol::codec::decoded_geometry(frame.value().payload);
       ASSERT_TRUE(geometry.has_value());
       HeldTile& tile = tiles[header.tile];
       tile = {};
@@ -130,9 +130,9 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       EXPECT_GE(header.generation, held->second.generation);
       EXPECT_EQ(header.generation, stream_->generation());
       held->second.generation = header.generation;
-      held->second.colours = protocol::decoded_colours(frame.value().payload, colour_transform).value();
+      held->second.colours = protocol::codec::decoded_colours(frame.value().payload, colour_transform).value();
       EXPECT_EQ(held->second.colours.size(), header.vertex_count);
-      held->second.marks = protocol::decoded_marks(frame.value().payload).value();
+      held->second.marks = protocol::codec::decoded_marks(frame.value().payload).value();
       break;
     }
     case protocol::FrameKind::Temperature:
@@ -144,11 +144,11 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       EXPECT_EQ(held->second.geometry.vertex_count, header.vertex_count);
       EXPECT_EQ(held->second.geometry.origin_m, header.origin_m);
       if (header.kind == protocol::FrameKind::Temperature) {
-        held->second.temperature = protocol::decoded_temperature_codes(frame.value().payload).value();
+        held->second.temperature = protocol::codec::decoded_temperature_codes(frame.value().payload).value();
         EXPECT_EQ(held->second.temperature.codes.size(), header.vertex_count);
       } else {
         EXPECT_EQ(header.kind, protocol::visible_frame_kind(colour_transform));
-        held->second.visible = protocol::decoded_colours(frame.value().payload, colour_transform).value();
+        held->second.visible = protocol::codec::decoded_colours(frame.value().payload, colour_transform).value();
         EXPECT_EQ(held->second.visible.size(), header.vertex_count);
       }
       break;
@@ -171,7 +171,7 @@ struct HeldWorkers::State {
   bool released = false;
 };
 
-HeldWorkers::HeldWorkers(WorkerPool& pool) : state_(std::make_shared<State>()) {
+HeldWorkers::HeldWorkers(jobs::WorkerPool& pool) : state_(std::make_shared<State>()) {
   for (unsigned i = 0; i < pool.thread_count(); ++i) {
     pool.post(
         [state = state_] {
@@ -192,7 +192,7 @@ void HeldWorkers::release() {
   state_->changed.notify_all();
 }
 
-void wait_until_idle(WorkerPool& pool) {
+void wait_until_idle(jobs::WorkerPool& pool) {
   // Last in the queue on every thread: they meet only when no other job is left, neither waiting nor running.
   std::mutex mutex;
   std::condition_variable changed;
@@ -214,4 +214,4 @@ void wait_until_idle(WorkerPool& pool) {
   changed.wait(lock, [&] { return left == pool.thread_count(); });
 }
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

@@ -12,24 +12,24 @@
 #include "protocol/tile_frame.hpp"
 #include "server/stream/viewer_stream.hpp"
 
-namespace spectra::server::testing {
+namespace spectra::stream::testing {
 
 /// What a viewer holds of one tile.
 struct HeldTile {
   protocol::TileFrameHeader geometry;
   std::vector<std::array<float, 3>> positions_m;  ///< Relative to the scene origin.
   std::uint32_t generation = 0;                   ///< Of the colours; 0 = none of this connection.
-  std::vector<protocol::ColourBytes> colours;
-  std::vector<std::uint8_t> marks;             ///< That came with them, if any.
-  std::vector<protocol::ColourBytes> visible;  ///< Raw layers.
-  protocol::DecodedTemperatureCodes temperature;
+  std::vector<protocol::codec::ColourBytes> colours;
+  std::vector<std::uint8_t> marks;                    ///< That came with them, if any.
+  std::vector<protocol::codec::ColourBytes> visible;  ///< Raw layers.
+  protocol::codec::DecodedTemperatureCodes temperature;
 };
 
 /// A client on a perfect link: takes the frames of a stream, decodes them and expects of each what the protocol says
 /// (rising sequence, colours only for the revision held, no revision twice, generations never falling).
 class TestViewer {
  public:
-  TestViewer(std::shared_ptr<const SceneSnapshot> scene, FrameCache& cache, WorkerPool& pool);
+  TestViewer(std::shared_ptr<const map::SceneSnapshot> scene, FrameCache& cache, jobs::WorkerPool& pool);
   ~TestViewer();
   TestViewer(const TestViewer&) = delete;
   TestViewer& operator=(const TestViewer&) = delete;
@@ -75,7 +75,7 @@ class TestViewer {
 /// Holds every worker of a pool until it is released, so that nothing is encoded meanwhile.
 class HeldWorkers {
  public:
-  explicit HeldWorkers(WorkerPool& pool);
+  explicit HeldWorkers(jobs::WorkerPool& pool);
   ~HeldWorkers() { release(); }
   void release();
 
@@ -85,6 +85,6 @@ class HeldWorkers {
 };
 
 /// Returns when the pool has nothing waiting and nothing running.
-void wait_until_idle(WorkerPool& pool);
+void wait_until_idle(jobs::WorkerPool& pool);
 
-}  // namespace spectra::server::testing
+}  // namespace spectra::stream::testing

@@ -6,7 +6,7 @@
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -19,8 +19,8 @@ LookRules fading_at(double now_s) {
 }
 
 TEST(TileLook, IsOfAgeOnlyWhereSomethingHasAged) {
-  Tile tile;
-  tile.seen_at.distinct = {1000, 1100, kUnknownTime};
+  map::Tile tile;
+  tile.seen_at.distinct = {1000, 1100, map::kUnknownTime};
   EXPECT_EQ(look_of(tile, {}), "");
   EXPECT_EQ(look_of(tile, fading_at(1000)), "") << "all is as it would be without fading";
   const TileLook aged = look_of(tile, fading_at(1100));
@@ -33,7 +33,7 @@ TEST(TileLook, IsOfAgeOnlyWhereSomethingHasAged) {
 }
 
 TEST(TileLook, IsOfTheBaselineOnlyWhereAMethodAsksForIt) {
-  Tile tile;
+  map::Tile tile;
   tile.temperature_celsius = {20};
   LookRules rules;
   rules.baseline_mark = 3;
@@ -55,9 +55,9 @@ TEST(TileLook, IsOfTheBaselineOnlyWhereAMethodAsksForIt) {
 class StreamOfAges : public testing::StreamWithViewers {
  protected:
   StreamOfAges() {
-    std::vector<std::shared_ptr<const Tile>> tiles;
+    std::vector<std::shared_ptr<const map::Tile>> tiles;
     for (const auto& tile : testing::tiles_of_tree(6)) {
-      const auto copy = std::make_shared<Tile>(*tile);
+      const auto copy = std::make_shared<map::Tile>(*tile);
       copy->seen_at.distinct = {tiles.size() == 1 ? 1000.0 : 2000.0};
       tiles.push_back(copy);
     }
@@ -121,4 +121,4 @@ TEST_F(StreamOfAges, ViewersShareWhatLooksTheSame) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

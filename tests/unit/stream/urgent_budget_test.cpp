@@ -7,7 +7,7 @@
 
 #include "stream_with_viewers.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using std::chrono::duration_cast;
@@ -34,7 +34,7 @@ TEST(UrgentBudget, IsSpentAndComesBackSlowly) {
 class BusyStream : public testing::StreamWithViewers {
  protected:
   BusyStream() { scene_ = testing::scene_of(testing::quadtree_tiles(3, 80)); }
-  WorkerPool one_{1};
+  jobs::WorkerPool one_{1};
 };
 
 TEST_F(BusyStream, AViewerWhoHasHadHisShareTakesTurnsWithOthers) {
@@ -65,4 +65,4 @@ TEST_F(BusyStream, AViewerWhoHasHadHisShareTakesTurnsWithOthers) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

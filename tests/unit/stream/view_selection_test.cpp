@@ -10,7 +10,7 @@
 
 #include "fake_scene.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::TileId;
@@ -149,12 +149,12 @@ TEST(SelectedTiles, KeepToTheBytesWhereTheErrorIsSeenMost) {
 
 TEST(SelectedTiles, WrongColoursAreRefinedLikeWrongForm) {
   auto tiles = quadtree_tiles(2, 4);
-  auto root = std::make_shared<Tile>(*tiles[0]);
+  auto root = std::make_shared<map::Tile>(*tiles[0]);
   root->geometric_error_m = 1e-4F;
   tiles[0] = root;
   const Camera camera = camera_over(0.5F, 0.5F, 1.5F);
   EXPECT_EQ(selected_tiles(ViewTree(*scene_of(tiles)), camera, 1).size(), 1U);
-  auto blurred = std::make_shared<Tile>(*root);
+  auto blurred = std::make_shared<map::Tile>(*root);
   blurred->lost_detail_m = 0.02F;
   tiles[0] = blurred;
   const ViewTree tree(*scene_of(tiles));
@@ -166,9 +166,9 @@ TEST(SelectedTiles, WrongColoursAreRefinedLikeWrongForm) {
 
 TEST(SelectedTiles, HotOnesComeFirstAmongEquals) {
   auto tiles = quadtree_tiles(2, 4);
-  auto hot = std::make_shared<Tile>(*tiles[3]);
+  auto hot = std::make_shared<map::Tile>(*tiles[3]);
   hot->highest_celsius = 90;
-  auto unknown = std::make_shared<Tile>(*tiles[1]);
+  auto unknown = std::make_shared<map::Tile>(*tiles[1]);
   unknown->highest_celsius = std::numeric_limits<float>::quiet_NaN();
   tiles[3] = hot;
   tiles[1] = unknown;
@@ -181,7 +181,7 @@ TEST(SelectedTiles, HotOnesComeFirstAmongEquals) {
 
 TEST(ScreenError, IsTheProjectedSize) {
   const Camera camera = camera_over(0, 0, 10);
-  const Bounds floor{{-1, -1, 0}, {1, 1, 0}};
+  const base::Bounds floor{{-1, -1, 0}, {1, 1, 0}};
   // 800 pixels show 2 * 10 * tan(25 deg) metres at ten metres.
   EXPECT_NEAR(screen_error(camera, floor, 0.1), 0.1 * 800 / (20 * std::tan(25 * 3.14159265358979 / 180)), 1e-9);
   EXPECT_EQ(screen_error(camera, floor, 0), 0);
@@ -191,7 +191,7 @@ TEST(ScreenError, IsTheProjectedSize) {
 TEST(MayBeInView, KeepsWhatIsSeenAndDropsWhatIsBehindOrBeside) {
   const Camera camera{.eye = {0, 0, 0}, .target = {1, 0, 0}, .up = {0, 0, 1}, .fov_y_deg = 60, .viewport = {1600, 800}};
   const auto box = [](float x, float y, float z) {
-    return Bounds{{x - 0.1F, y - 0.1F, z - 0.1F}, {x + 0.1F, y + 0.1F, z + 0.1F}};
+    return base::Bounds{{x - 0.1F, y - 0.1F, z - 0.1F}, {x + 0.1F, y + 0.1F, z + 0.1F}};
   };
   EXPECT_TRUE(may_be_in_view(camera, box(5, 0, 0)));
   EXPECT_FALSE(may_be_in_view(camera, box(-5, 0, 0)));
@@ -212,7 +212,7 @@ TEST(MayBeInView, ReachesATenthBeyondThePicture) {
   const Camera camera{.eye = {0, 0, 0}, .target = {1, 0, 0}, .up = {0, 0, 1}, .fov_y_deg = 90, .viewport = {1600, 800}};
   for (const auto& [share, is_in_view] : {std::pair(1.05F, true), std::pair(1.15F, false)}) {
     for (const float side : {-1.0F, 1.0F}) {
-      const fusion::Vec3f beside{10, 20 * share * side, 0}, above{10, 0, 10 * share * side};
+      const base::Vec3f beside{10, 20 * share * side, 0}, above{10, 0, 10 * share * side};
       EXPECT_EQ(may_be_in_view(camera, {beside, beside}), is_in_view) << share * side;
       EXPECT_EQ(may_be_in_view(camera, {above, above}), is_in_view) << share * side;
     }
@@ -237,4 +237,4 @@ TEST(CameraIsUsable, OnlyWhenItMakesSense) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

@@ -10,7 +10,7 @@
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -147,4 +147,4 @@ TEST_F(ViewerStreamResume, WhileFramesFlowNothingIsTakenUp) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

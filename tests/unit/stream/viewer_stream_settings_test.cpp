@@ -11,7 +11,7 @@
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -185,7 +185,7 @@ TEST_F(ViewerStreamSettings, AnotherTransformWhileFramesFlowSendsColoursAnew) {
 
 TEST_F(ViewerStreamSettings, MarksComeWhereTheyAreAskedForAndSomethingIsHighlighted) {
   // A highlight of one colour, which no visible colour is.
-  constexpr fusion::Rgb8 kHighlight{1, 2, 255};
+  constexpr base::Rgb8 kHighlight{1, 2, 255};
   fusion::PaletteTable palette;
   palette.fill({kHighlight.r, kHighlight.g, kHighlight.b});
   fusion::FusionChange change;
@@ -214,7 +214,8 @@ TEST_F(ViewerStreamSettings, MarksComeWhereTheyAreAskedForAndSomethingIsHighligh
     expect_tile(held, *tile, plan, 8);
     ASSERT_EQ(held.marks.size(), held.colours.size());
     for (std::size_t i = 0; i < held.marks.size(); ++i) {
-      const bool is_highlight = held.colours[i] == protocol::ColourBytes{kHighlight.r, kHighlight.g, kHighlight.b};
+      const bool is_highlight =
+          held.colours[i] == protocol::codec::ColourBytes{kHighlight.r, kHighlight.g, kHighlight.b};
       EXPECT_EQ(held.marks[i] == 1, is_highlight) << i;
       ++(held.marks[i] == 1 ? highlighted : others);
     }
@@ -296,4 +297,4 @@ TEST_F(ViewerStreamSettings, AnEncodingThatComesBackHasANewRevisionOnTheWire) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

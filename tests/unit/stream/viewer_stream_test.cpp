@@ -15,7 +15,7 @@
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -154,10 +154,10 @@ TEST_F(ViewerStreamTest, IgnoresAcknowledgementsThatMakeNoSense) {
 
 TEST_F(ViewerStreamTest, AViewerThatDoesNotReadHoldsLittle) {
   // Colours that no predictor sees through: about 50 kB a tile.
-  std::vector<std::shared_ptr<const Tile>> tiles;
+  std::vector<std::shared_ptr<const map::Tile>> tiles;
   std::uint32_t state = 1;
   for (const auto& plain : tiles_of_tree(60, 120)) {
-    auto noisy = std::make_shared<Tile>(*plain);
+    auto noisy = std::make_shared<map::Tile>(*plain);
     for (auto& colour : noisy->visible) {
       state = state * 1'664'525 + 1'013'904'223;
       colour = {static_cast<std::uint8_t>(state >> 24), static_cast<std::uint8_t>(state >> 16),
@@ -204,7 +204,7 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
   show(viewer, 0.3);
   viewer.complete();
 
-  std::vector<std::shared_ptr<const Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
+  std::vector<std::shared_ptr<const map::Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
   const auto gone = tiles[2]->id;
   tiles[1] = patch_tile(tiles[1]->id, 14, 0, 30);
   tiles.erase(tiles.begin() + 2);
@@ -224,7 +224,7 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
 }
 
 TEST_F(ViewerStreamTest, ACoarseTileThatNobodySeesIsNotSentAgain) {
-  std::vector<std::shared_ptr<const Tile>> tiles = testing::quadtree_tiles(3, 12);
+  std::vector<std::shared_ptr<const map::Tile>> tiles = testing::quadtree_tiles(3, 12);
   const auto first = scene_of(tiles);
   TestViewer viewer(first, cache_, pool_);
   viewer.stream().subscribe({});
@@ -233,12 +233,12 @@ TEST_F(ViewerStreamTest, ACoarseTileThatNobodySeesIsNotSentAgain) {
   const std::size_t frame_count = viewer.frames.size();
 
   const auto another = [&](auto change) {
-    auto tile = std::make_shared<Tile>(*tiles[0]);
+    auto tile = std::make_shared<map::Tile>(*tiles[0]);
     change(*tile);
     tiles[0] = tile;
     return scene_of(tiles, first->revision() + 1);
   };
-  viewer.stream().set_scene(another([](Tile& tile) { tile.positions[0].z += 1; }));
+  viewer.stream().set_scene(another([](map::Tile& tile) { tile.positions[0].z += 1; }));
   EXPECT_EQ(viewer.complete().scene_revision, 2U);
   EXPECT_EQ(viewer.frames.size(), frame_count) << "its children are drawn in its place";
 
@@ -250,7 +250,7 @@ TEST_F(ViewerStreamTest, ACoarseTileThatNobodySeesIsNotSentAgain) {
 
   // A viewer has to know which children take its place.
   viewer.stream().set_camera({.eye = {2, 2, 1}, .target = {2, 2, 0}, .up = {0, 1, 0}});
-  viewer.stream().set_scene(another([](Tile& tile) { tile.child_mask ^= 0x80; }));
+  viewer.stream().set_scene(another([](map::Tile& tile) { tile.child_mask ^= 0x80; }));
   viewer.complete();
   EXPECT_EQ(viewer.frames.size(), frame_count + 4);
 }
@@ -276,7 +276,7 @@ TEST_F(ViewerStreamTest, ATileWithoutTemperatureShowsItsVisibleColour) {
 }
 
 TEST_F(ViewerStreamTest, ATileThatCannotBeEncodedIsLeftOutAndCounted) {
-  std::vector<std::shared_ptr<const Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
+  std::vector<std::shared_ptr<const map::Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
   auto broken = patch_tile(tiles[3]->id, 12, 2, 20);
   broken->positions[5].x = std::numeric_limits<float>::infinity();
   tiles[3] = broken;
@@ -387,4 +387,4 @@ TEST_F(ViewerStreamTest, SurvivesViewersThatLeaveInTheMiddle) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

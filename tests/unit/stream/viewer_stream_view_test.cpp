@@ -7,7 +7,7 @@
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
-namespace spectra::server {
+namespace spectra::stream {
 namespace {
 
 using protocol::FrameKind;
@@ -204,4 +204,4 @@ TEST_F(ViewerStreamView, TellsTheAccuracyOnTheScreen) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::stream

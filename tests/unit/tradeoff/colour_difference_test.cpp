@@ -6,7 +6,7 @@ namespace spectra::fusion {
 namespace {
 
 struct Pair {
-  Lab first, second;
+  fusion::Lab first, second;
   double difference;
 };
 
@@ -24,18 +24,19 @@ const Pair kPublished[] = {
 
 TEST(Ciede2000, GivesThePublishedDifferences) {
   for (const Pair& pair : kPublished) {
-    EXPECT_NEAR(ciede2000(pair.first, pair.second), pair.difference, 5e-5);
-    EXPECT_NEAR(ciede2000(pair.second, pair.first), pair.difference, 5e-5);
+    EXPECT_NEAR(fusion::ciede2000(pair.first, pair.second), pair.difference, 5e-5);
+    EXPECT_NEAR(fusion::ciede2000(pair.second, pair.first), pair.difference, 5e-5);
   }
 }
 
 TEST(Ciede2000, IsZeroForEqualColours) {
-  EXPECT_EQ(ciede2000({40, 0, 0}, {40, 0, 0}), 0);
-  EXPECT_EQ(ciede2000({40, 12, -7}, {40, 12, -7}), 0);
+  EXPECT_EQ(fusion::ciede2000({40, 0, 0}, {40, 0, 0}), 0);
+  EXPECT_EQ(fusion::ciede2000({40, 12, -7}, {40, 12, -7}), 0);
 }
 
 TEST(LabOf, MapsWhiteBlackAndRed) {
-  const Lab white = lab_of(Rgb8{255, 255, 255}), black = lab_of(Rgb8{0, 0, 0}), red = lab_of(Rgb8{255, 0, 0});
+  const fusion::Lab white = fusion::lab_of(base::Rgb8{255, 255, 255}), black = fusion::lab_of(base::Rgb8{0, 0, 0}),
+                    red = fusion::lab_of(base::Rgb8{255, 0, 0});
   EXPECT_NEAR(white[0], 100, 1e-3);
   EXPECT_NEAR(white[1], 0, 0.02);
   EXPECT_NEAR(white[2], 0, 0.02);

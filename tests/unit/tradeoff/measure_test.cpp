@@ -8,12 +8,12 @@
 #include "fusion/mesh/multispectral_mesh.hpp"
 #include "server/tradeoff/report.hpp"
 
-namespace spectra::server {
+namespace spectra::tradeoff {
 namespace {
 
 /// A wavy square of side 1 m with a temperature ramp.
-fusion::MultispectralMesh wavy_square(std::uint32_t side) {
-  fusion::MultispectralMesh mesh;
+mesh::MultispectralMesh wavy_square(std::uint32_t side) {
+  mesh::MultispectralMesh mesh;
   mesh.name = "wavy <square>";
   mesh.has_visible = mesh.has_temperature = true;
   mesh.resize_vertices(static_cast<std::size_t>(side) * side);
@@ -38,8 +38,8 @@ fusion::MultispectralMesh wavy_square(std::uint32_t side) {
 class Tradeoff : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    WorkerPool pool(2);
-    const auto scene = SceneSnapshot::build(wavy_square(80), 1, pool, 2000);
+    jobs::WorkerPool pool(2);
+    const auto scene = map::SceneSnapshot::build(wavy_square(80), 1, pool, 2000);
     TradeoffOptions options;
     options.sample_count = 500;
     options.encoder_speeds = {0, 10};
@@ -166,4 +166,4 @@ TEST_F(Tradeoff, ReportsEveryPointAndEscapesNames) {
 }
 
 }  // namespace
-}  // namespace spectra::server
+}  // namespace spectra::tradeoff
