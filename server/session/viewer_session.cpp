@@ -7,7 +7,6 @@
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -34,8 +33,6 @@ constexpr std::size_t kMaxWaiting = 512;
 /// Of an answer as text, at most: anything but bins, and a bin with its edge and its count.
 constexpr std::size_t kSmallAnswerBytes = 4096;
 constexpr std::size_t kBinBytes = 48;
-/// The statuses that are notes on the scene: this and the note's id.
-const std::string kNotePrefix = "scene.";
 
 /// What settings are prepared with.
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const map::SceneSnapshot>& scene) {
@@ -61,56 +58,14 @@ std::optional<double> if_positive(double value) {
 
 }  // namespace
 
-/// One round on the pool: what goes in, and what comes out.
-struct ViewerSession::Preparation {
-  std::shared_ptr<const map::SceneSnapshot> scene;
-  bool is_new_scene = false;
-  bool has_new_temperatures = false;  ///< The new scene asks for another plan.
-  bool is_first_view = false;         ///< The viewer has changed nothing yet.
-  fusion::FusionSettings settings;
-  std::vector<FusionRequest> requests;
-
-  std::optional<fusion::FusionPlan> plan;  ///< Of the newest settings that hold.
-  /// One a request: the settings in force after it, or why it changed nothing.
-  std::vector<protocol::Result<protocol::FusionState>> outcomes;
-  std::optional<std::string> reset_reason;  ///< The settings did not fit the new scene.
-
-  void run() {
-    const auto temperature = temperature_of(scene);
-    if (has_new_temperatures) {
-      if (is_first_view) settings = fusion::first_view_settings(temperature.summary);
-      auto prepared = fusion::FusionPlan::prepare(settings, temperature);
-      if (!prepared) {
-        reset_reason = prepared.error().message;
-        settings = fusion::first_view_settings(temperature.summary);
-        prepared = fusion::FusionPlan::prepare(settings, temperature);
-      }
-      if (prepared) plan = std::move(prepared).value();
-    }
-    for (const auto& request : requests) outcomes.push_back(apply(request, temperature));
-  }
-
-  protocol::Result<protocol::FusionState> apply(const FusionRequest& request,
-                                                const fusion::SceneTemperature& temperature) {
-    if (!request.change) return refused(request.change.error());
-    auto changed = fusion::with_change(settings, request.change.value());
-    if (!changed) return refused(to_rpc_error(changed.error()));
-    auto prepared = fusion::FusionPlan::prepare(changed.value(), temperature);
-    if (!prepared) return refused(to_rpc_error(prepared.error()));
-    settings = std::move(changed).value();
-    plan = std::move(prepared).value();
-    is_first_view = false;
-    return to_message(*plan, temperature.summary);
-  }
-};
-
 ViewerSession::ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, ServedScene& served,
                              const net::NetLimits& limits)
     : peer_(*peer),
       weak_peer_(peer),
       served_(served),
       limits_(limits),
-      requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s) {}
+      requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s),
+      statuses_([this](const protocol::Status& status) { notify("status", protocol::to_json(status)); }) {}
 
 void ViewerSession::opened() {
   served_.viewer_count += 1;
@@ -126,7 +81,7 @@ void ViewerSession::opened() {
     post([scene](ViewerSession& self) { self.take_scene(scene); });
   });
   progress_subscription_ = served_.progress.subscribe([post](const std::optional<std::string>& message) {
-    post([message](ViewerSession& self) { self.set_status("scene_loading", protocol::StatusLevel::Info, message); });
+    post([message](ViewerSession& self) { self.statuses_.set("scene_loading", protocol::StatusLevel::Info, message); });
   });
 
   scene_ = served_.scenes.current();
@@ -151,7 +106,7 @@ void ViewerSession::opened() {
   if (stream_) set_plan(*plan_);
   tell_notes();
   if (const auto message = served_.progress.message()) {
-    set_status("scene_loading", protocol::StatusLevel::Info, message);
+    statuses_.set("scene_loading", protocol::StatusLevel::Info, message);
   }
 }
 
@@ -479,7 +434,7 @@ void ViewerSession::take_scene(const std::shared_ptr<const map::SceneSnapshot>& 
 void ViewerSession::start_preparation() {
   if (is_preparing_ || (waiting_.empty() && !coming_scene_)) return;
   is_preparing_ = true;
-  const auto preparation = std::make_shared<Preparation>();
+  const auto preparation = std::make_shared<PlanPreparation>();
   preparation->is_new_scene = coming_scene_ != nullptr;
   preparation->scene = coming_scene_ ? std::exchange(coming_scene_, nullptr) : scene_;
   preparation->has_new_temperatures =
@@ -491,12 +446,10 @@ void ViewerSession::start_preparation() {
   served_.pool.post(
       [weak_peer = weak_peer_, weak_self = weak_from_this(), preparation] {
         try {
-          preparation->run();
+          preparation->run(temperature_of(preparation->scene));
         } catch (const std::exception& error) {
           spdlog::error("settings could not be prepared: {}", error.what());
-          preparation->plan.reset();
-          preparation->outcomes.assign(preparation->requests.size(),
-                                       refusal(RpcErrorCode::InternalError, "the settings could not be prepared"));
+          preparation->fail();
         }
         const auto peer = weak_peer.lock();
         if (!peer) return;
@@ -507,7 +460,7 @@ void ViewerSession::start_preparation() {
       jobs::kAnswerPriority);
 }
 
-void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& preparation) {
+void ViewerSession::finish_preparation(const std::shared_ptr<PlanPreparation>& preparation) {
   is_preparing_ = false;
   is_first_view_ = preparation->is_first_view;
   const bool is_taken = preparation->is_new_scene && (preparation->plan || !preparation->has_new_temperatures);
@@ -522,11 +475,11 @@ void ViewerSession::finish_preparation(const std::shared_ptr<Preparation>& prepa
   if (preparation->plan) set_plan(*preparation->plan);
   if (is_taken && preparation->has_new_temperatures) {
     notify("fusion.changed", protocol::to_json(fusion_reply()));
-    set_status("settings_reset", protocol::StatusLevel::Warning,
-               preparation->reset_reason
-                   ? std::optional("The settings did not fit the new scene and are at their defaults: " +
-                                   *preparation->reset_reason)
-                   : std::nullopt);
+    statuses_.set("settings_reset", protocol::StatusLevel::Warning,
+                  preparation->reset_reason
+                      ? std::optional("The settings did not fit the new scene and are at their defaults: " +
+                                      *preparation->reset_reason)
+                      : std::nullopt);
   }
   const std::uint32_t generation = fusion_reply().generation;
   for (std::size_t i = 0; i < preparation->requests.size(); ++i) {
@@ -556,17 +509,7 @@ void ViewerSession::begin_stream() {
 }
 
 void ViewerSession::tell_notes() {
-  std::set<std::string> held;
-  for (const files::Note& note : scene_ ? scene_->notes() : std::span<const files::Note>()) {
-    const std::string id = kNotePrefix + note.id;
-    set_status(id, note.needs_attention ? protocol::StatusLevel::Warning : protocol::StatusLevel::Info, note.message);
-    held.insert(id);
-  }
-  std::vector<std::string> outdated;
-  for (const auto& [id, message] : statuses_) {
-    if (id.starts_with(kNotePrefix) && !held.contains(id)) outdated.push_back(id);
-  }
-  for (const auto& id : outdated) set_status(id, protocol::StatusLevel::Info, std::nullopt);
+  statuses_.set_notes(scene_ ? scene_->notes() : std::span<const files::Note>());
 }
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {
@@ -584,20 +527,21 @@ void ViewerSession::tell_method_limits() {
   const fusion::Method* method = fusion::find_method(settings.method);
   const bool lacks_temperature =
       scene_ && method->needs_temperature && !scene_->temperature().summary.has_temperature();
-  set_status("no_temperature", protocol::StatusLevel::Warning,
-             lacks_temperature
-                 ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
-                 : std::nullopt);
+  statuses_.set("no_temperature", protocol::StatusLevel::Warning,
+                lacks_temperature
+                    ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")
+                    : std::nullopt);
   const bool lacks_baseline = scene_ && method->compares_with_baseline && !scene_->baseline_mark();
-  set_status("no_baseline", protocol::StatusLevel::Warning,
-             lacks_baseline ? std::optional("This scene has no baseline: " + method->label +
-                                            " shows the visible colours. Put blocks into it, or mark a baseline: then "
-                                            "what changes afterwards is shown.")
-                            : std::nullopt);
-  set_status("palette_not_fusion_safe", protocol::StatusLevel::Warning,
-             palette_warning(*method, fusion::find_palette(settings.palette)));
-  set_status("palette_not_diverging", protocol::StatusLevel::Warning,
-             direction_warning(*method, fusion::find_palette(settings.palette)));
+  statuses_.set("no_baseline", protocol::StatusLevel::Warning,
+                lacks_baseline
+                    ? std::optional("This scene has no baseline: " + method->label +
+                                    " shows the visible colours. Put blocks into it, or mark a baseline: then "
+                                    "what changes afterwards is shown.")
+                    : std::nullopt);
+  statuses_.set("palette_not_fusion_safe", protocol::StatusLevel::Warning,
+                palette_warning(*method, fusion::find_palette(settings.palette)));
+  statuses_.set("palette_not_diverging", protocol::StatusLevel::Warning,
+                direction_warning(*method, fusion::find_palette(settings.palette)));
 }
 
 protocol::FusionReply ViewerSession::fusion_reply() const {
@@ -635,22 +579,10 @@ void ViewerSession::ticked() {
   message.accuracy.temperature_celsius = stats.temperature_celsius;
   if (message.accuracy.position_mm) message.accuracy.pixel_error = stats.pixel_error;
   notify("stream.stats", protocol::to_json(message));
-  set_status("tiles_failed", protocol::StatusLevel::Error,
-             stats.failed_tiles > 0 ? std::optional(std::to_string(stats.failed_tiles) +
-                                                    " tiles of the scene could not be encoded and are not shown.")
-                                    : std::nullopt);
-}
-
-void ViewerSession::set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message) {
-  const auto told = statuses_.find(id);
-  if (!message) {
-    if (told == statuses_.end()) return;
-    statuses_.erase(told);
-  } else {
-    if (told != statuses_.end() && told->second == *message) return;
-    statuses_.insert_or_assign(id, *message);
-  }
-  notify("status", protocol::to_json(protocol::Status{id, level, std::move(message)}));
+  statuses_.set("tiles_failed", protocol::StatusLevel::Error,
+                stats.failed_tiles > 0 ? std::optional(std::to_string(stats.failed_tiles) +
+                                                       " tiles of the scene could not be encoded and are not shown.")
+                                       : std::nullopt);
 }
 
 }  // namespace spectra::session

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -17,7 +16,9 @@
 #include "server/access/token_bucket.hpp"
 #include "server/net/net_options.hpp"
 #include "server/net/viewer_link.hpp"
+#include "server/session/plan_preparation.hpp"
 #include "server/session/served_scene.hpp"
+#include "server/session/status_board.hpp"
 
 namespace spectra::session {
 
@@ -38,12 +39,6 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
  private:
   using Id = std::optional<protocol::RpcId>;
   using Answer = protocol::Result<nlohmann::json>;
-
-  struct FusionRequest {
-    Id id;
-    protocol::Result<fusion::FusionChange> change;
-  };
-  struct Preparation;
 
   /// What a request counts against.
   enum class Cost {
@@ -88,7 +83,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   void take_scene(const std::shared_ptr<const map::SceneSnapshot>& scene);
   /// Prepares the waiting changes, or the settings for a scene that has come, on the pool; one at a time.
   void start_preparation();
-  void finish_preparation(const std::shared_ptr<Preparation>& preparation);
+  void finish_preparation(const std::shared_ptr<PlanPreparation>& preparation);
   void begin_stream();
   /// Says what was noticed while the scene was read, and takes back what was said of the one before.
   void tell_notes();
@@ -99,9 +94,6 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   stream::StreamQuality quality() const;
   /// This viewer may have raw layers.
   bool gives_raw_layers() const;
-
-  /// Sends a status when it differs from what the viewer was told last.
-  void set_status(const std::string& id, protocol::StatusLevel level, std::optional<std::string> message);
 
   net::ViewerPeer& peer_;
   const std::weak_ptr<net::ViewerPeer> weak_peer_;
@@ -125,7 +117,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   stream::Subscription subscription_;
   std::optional<stream::Camera> camera_;
   stream::StreamQuality quality_;
-  std::map<std::string, std::string> statuses_;
+  StatusBoard statuses_;
 };
 
 }  // namespace spectra::session

@@ -89,7 +89,7 @@ std::vector<std::shared_ptr<TileSlot>> raw_order(const std::vector<std::shared_p
     const bool is_top = !tree.nodes()[slot->node].parent;
     if (is_top) {
       slots.push_back(slot);
-    } else if (slot->is_target) {
+    } else if (slot->wish.is_target) {
       drawn.push_back(slot);
     }
   }

@@ -4,18 +4,18 @@ namespace spectra::stream {
 
 void SendingOrder::choose(ViewerTiles& tiles, const std::vector<SelectedTile>& selected, double most_preview_vertices) {
   ++choice_count_;
-  for (const auto& slot : tiles.slots()) slot->is_wanted = false;
+  for (const auto& slot : tiles.slots()) slot->wish.is_wanted = false;
   slots_.clear();
   for (const SelectedTile& tile : selected) {
     const auto& slot = tiles.slots()[tile.node];
-    if (slot->is_target != tile.is_target) tiles.put_down(*slot);
-    slot->is_wanted = true;
-    slot->is_target = tile.is_target;
-    slot->last_wanted = choice_count_;
+    if (slot->wish.is_target != tile.is_target) tiles.put_down(*slot);
+    slot->wish.is_wanted = true;
+    slot->wish.is_target = tile.is_target;
+    slot->wish.last_wanted = choice_count_;
     slots_.push_back(slot);
   }
   for (const auto& slot : tiles.slots()) {
-    if (!slot->is_wanted) tiles.put_down(*slot);
+    if (!slot->wish.is_wanted) tiles.put_down(*slot);
   }
   choose_previews(tiles.tree(), most_preview_vertices);
   rewind();
@@ -28,10 +28,10 @@ void SendingOrder::choose_previews(const ViewTree& tree, double most_vertices) {
     const auto level = slots_[index]->tile->id.level;
     std::size_t end = index;
     for (; end < slots_.size() && slots_[end]->tile->id.level == level; ++end) {
-      if (!slots_[end]->is_target) preview_vertices += static_cast<double>(slots_[end]->tile->positions.size());
+      if (!slots_[end]->wish.is_target) preview_vertices += static_cast<double>(slots_[end]->tile->positions.size());
     }
     for (; index < end; ++index) {
-      slots_[index]->is_preview = !tree.nodes()[slots_[index]->node].parent || preview_vertices <= most_vertices;
+      slots_[index]->wish.is_preview = !tree.nodes()[slots_[index]->node].parent || preview_vertices <= most_vertices;
     }
   }
 }

@@ -57,10 +57,10 @@ TileFrameHeader header_of(const TileSlot& slot, FrameKind kind) {
   header.kind = kind;
   header.child_mask = slot.tile->child_mask;
   header.tile = slot.tile->id;
-  header.revision = slot.held_name;
-  header.vertex_count = static_cast<std::uint32_t>(slot.geometry->input_of_decoded.size());
-  header.origin_m = slot.geometry->origin_m;
-  header.position_step_m = slot.geometry->position_step_m;
+  header.revision = slot.held.wire_revision;
+  header.vertex_count = static_cast<std::uint32_t>(slot.prepared.geometry->input_of_decoded.size());
+  header.origin_m = slot.prepared.geometry->origin_m;
+  header.position_step_m = slot.prepared.geometry->position_step_m;
   header.geometric_error_m = slot.tile->geometric_error_m;
   header.colour_error_levels = slot.tile->colour_error_levels;
   header.temperature_error_celsius = slot.tile->temperature_error_celsius;
@@ -214,26 +214,27 @@ class Stream final : public ViewerStream, public CacheWaiter {
       if (tiles_.has_removals()) return next_removal(now_s);
       if (slot->work == TileSlot::Work::Idle) preparation_.look_up(*slot, demand_);
       if (slot->work != TileSlot::Work::Ready) break;
-      if (slot->held_revision != slot->geometry->revision) {
-        if (!window_.admits(frame_size(slot->geometry->payload))) return std::nullopt;
-        const std::uint32_t name =
-            slot->geometry->revision > slot->held_name ? slot->geometry->revision : cache_->unused_revision();
-        if (name <= slot->held_name) {
+      if (slot->held.revision != slot->prepared.geometry->revision) {
+        if (!window_.admits(frame_size(slot->prepared.geometry->payload))) return std::nullopt;
+        const std::uint32_t name = slot->prepared.geometry->revision > slot->held.wire_revision
+                                       ? slot->prepared.geometry->revision
+                                       : cache_->unused_revision();
+        if (name <= slot->held.wire_revision) {
           // Resumed under a revision that never was; what replaces it has to be newer.
           tiles_.remove_from_viewer(*slot);
           continue;
         }
         tiles_.give_geometry(*slot, name, demand_.geometry_epoch);
-        auto frame = given_out(header_of(*slot, FrameKind::Geometry), slot->geometry->payload, now_s);
+        auto frame = given_out(header_of(*slot, FrameKind::Geometry), slot->prepared.geometry->payload, now_s);
         if (!demand_.fused) note_geometry_alone(*slot);
         return frame;
       }
       note_geometry(*slot);
       std::optional<OutgoingFrame> frame;
       if (!slot->has_colours(demand_)) {
-        const bool is_first_picture = slot->held_colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
-        const std::size_t size_bytes = frame_size(slot->colours);
-        const auto urgency = slot->is_target ? SendingWindow::Urgency::Detail : SendingWindow::Urgency::Answer;
+        const bool is_first_picture = slot->held.colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
+        const std::size_t size_bytes = frame_size(slot->prepared.colours);
+        const auto urgency = slot->wish.is_target ? SendingWindow::Urgency::Detail : SendingWindow::Urgency::Answer;
         if (!window_.admits(size_bytes, urgency) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
           if (window_.admits(size_bytes)) window_.on_idle();  // It is we who wait, not the link.
           return std::nullopt;
@@ -241,9 +242,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
         auto header = header_of(*slot, protocol::colour_frame_kind(demand_.colour_transform));
         header.generation = generation_;
         tiles_.give_colours(*slot, demand_.colour_epoch);
-        colour_cost_.learn(slot->colour_bits, header.vertex_count, slot->colours->size());
-        frame = given_out(header, slot->colours, now_s);
-        if (slot->is_target && !is_refining_due()) tiles_.remove_outdated_beneath(*slot, demand_);
+        colour_cost_.learn(slot->prepared.colour_bits, header.vertex_count, slot->prepared.colours->size());
+        frame = given_out(header, slot->prepared.colours, now_s);
+        if (slot->wish.is_target && !is_refining_due()) tiles_.remove_outdated_beneath(*slot, demand_);
       }
       tiles_.put_down(*slot);
       if (frame) {
@@ -281,8 +282,8 @@ class Stream final : public ViewerStream, public CacheWaiter {
     for (const auto& slot : tiles_.slots())
       held.push_back({!slot->is_drawable()     ? 0
                       : slot->has_raw_layers() ? 8
-                                               : slot->held_colour_bits,
-                      slot->held_position_step_m});
+                                               : slot->held.colour_bits,
+                      slot->held.position_step_m});
     const ScreenAccuracy accuracy = screen_accuracy(tiles_.tree(), held, camera_);
     const int colour_bits_drawn = std::min(accuracy.colour_bits, demand_.colour_bits);
     const double rounding_levels = colour_bits_drawn < 8 ? 1 << (7 - colour_bits_drawn) : 0;
@@ -339,9 +340,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
     StreamComplete complete{
         .generation = generation_, .scene_revision = scene_->revision(), .tile_count = 0, .vertex_count = 0};
     for (const auto& slot : order_.slots()) {
-      if (demand_.fused ? slot->held_colour_epoch != demand_.colour_epoch : slot->held_name == 0) continue;
+      if (demand_.fused ? slot->held.colour_epoch != demand_.colour_epoch : slot->held.wire_revision == 0) continue;
       ++complete.tile_count;
-      complete.vertex_count += slot->held_vertex_count;
+      complete.vertex_count += slot->held.vertex_count;
     }
     is_followed = raw_head().has_value();
     return complete;
@@ -449,7 +450,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void remove_outdated() {
     if (!demand_.plan || !demand_.fused || is_refining_due()) return;
     for (const auto& slot : order_.slots()) {
-      if (slot->is_target && slot->held_geometry_epoch == demand_.geometry_epoch && slot->has_colours(demand_))
+      if (slot->wish.is_target && slot->held.geometry_epoch == demand_.geometry_epoch && slot->has_colours(demand_))
         tiles_.remove_outdated_beneath(*slot, demand_);
     }
   }
@@ -481,10 +482,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   // A tile's geometry has gone out and is the one in force.
   void note_geometry(TileSlot& slot) {
-    slot.held_geometry_epoch = demand_.geometry_epoch;
-    slot.held_position_step_m = slot.geometry->position_step_m;
-    slot.held_vertex_count = static_cast<std::uint32_t>(slot.geometry->input_of_decoded.size());
-    slot.held_origin_m = slot.geometry->origin_m;
+    slot.held.geometry_epoch = demand_.geometry_epoch;
+    slot.held.position_step_m = slot.prepared.geometry->position_step_m;
+    slot.held.vertex_count = static_cast<std::uint32_t>(slot.prepared.geometry->input_of_decoded.size());
+    slot.held.origin_m = slot.prepared.geometry->origin_m;
   }
 
   // The same where nothing more of the tile follows in this lane.
@@ -554,10 +555,10 @@ class Stream final : public ViewerStream, public CacheWaiter {
         layer == kTemperature ? FrameKind::Temperature : protocol::visible_frame_kind(demand_.colour_transform);
     header.child_mask = slot.tile->child_mask;
     header.tile = slot.tile->id;
-    header.revision = slot.held_name;
-    header.vertex_count = slot.held_vertex_count;
-    header.origin_m = slot.held_origin_m;
-    header.position_step_m = slot.held_position_step_m;
+    header.revision = slot.held.wire_revision;
+    header.vertex_count = slot.held.vertex_count;
+    header.origin_m = slot.held.origin_m;
+    header.position_step_m = slot.held.position_step_m;
     header.geometric_error_m = slot.tile->geometric_error_m;
     header.colour_error_levels = slot.tile->colour_error_levels;
     header.temperature_error_celsius = slot.tile->temperature_error_celsius;
@@ -567,7 +568,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   }
 
   ColourKey raw_key(const RawDue& due) const {
-    return demand_.raw_key(due.slot->held_revision, RawDemand::kLayers[due.layer]);
+    return demand_.raw_key(due.slot->held.revision, RawDemand::kLayers[due.layer]);
   }
 
   void make_raw_ready(const RawDue& due, Payload payload) {
@@ -607,7 +608,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
           break;
         case Claim<std::vector<std::byte>>::Kind::Yours:
           due->raw().work = TileSlot::Work::Busy;
-          return RawEncoding{due->slot, due->slot->tile, demand_, due->layer, due->slot->held_revision};
+          return RawEncoding{due->slot, due->slot->tile, demand_, due->layer, due->slot->held.revision};
       }
     }
     return std::nullopt;
@@ -617,7 +618,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     TileSlot::Raw& raw = done.slot->raw[done.layer];
     raw.work = TileSlot::Work::Idle;
     const bool is_current =
-        done.slot->held_revision == done.revision && demand_.raw.epoch[done.layer] == done.demand.raw.epoch[done.layer];
+        done.slot->held.revision == done.revision && demand_.raw.epoch[done.layer] == done.demand.raw.epoch[done.layer];
     if (!done.made && is_current) {
       ++failed_tile_count_;
       raw.failed_epoch = done.demand.raw.epoch[done.layer];
@@ -641,7 +642,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   }
 
   bool is_needed(const TileSlot& slot) const {
-    return !closed_ && subscribed_ && !slot.is_gone && slot.is_wanted && !tiles_.is_satisfied(slot, demand_);
+    return !closed_ && subscribed_ && !slot.is_gone && slot.wish.is_wanted && !tiles_.is_satisfied(slot, demand_);
   }
 
   bool may_start(std::size_t index) const {
@@ -671,9 +672,9 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void note_failure(const Encoding& encoding) {
     ++failed_tile_count_;
     if (encoding.geometry) {
-      encoding.slot->failed_colour_epoch = encoding.demand.colour_epoch;
+      encoding.slot->failed.colour_epoch = encoding.demand.colour_epoch;
     } else {
-      encoding.slot->failed_geometry_epoch = encoding.demand.geometry_epoch;
+      encoding.slot->failed.geometry_epoch = encoding.demand.geometry_epoch;
     }
   }
 

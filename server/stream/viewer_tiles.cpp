@@ -11,15 +11,7 @@ using protocol::TileFrameHeader;
 using protocol::TileId;
 
 void TileSlot::forget_held() {
-  held_revision = 0;
-  held_name = 0;
-  held_vertex_count = 0;
-  held_child_mask = 0;
-  held_bytes = 0;
-  held_geometry_epoch = 0;
-  held_colour_epoch = 0;
-  held_colour_bits = 0;
-  held_look.clear();
+  held = {};
   forget_raw();
 }
 
@@ -44,10 +36,10 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
       if (known->second->tile == tile) {
         slot = known->second;
       } else {
-        slot->held_revision = known->second->held_revision;
-        slot->held_name = known->second->held_name;
-        slot->held_child_mask = known->second->held_child_mask;
-        slot->held_bytes = known->second->held_bytes;
+        slot->held.revision = known->second->held.revision;
+        slot->held.wire_revision = known->second->held.wire_revision;
+        slot->held.child_mask = known->second->held.child_mask;
+        slot->held.bytes = known->second->held.bytes;
         abandon(*known->second);
       }
       known_slots.erase(known);
@@ -72,9 +64,9 @@ void ViewerTiles::clear() {
 void ViewerTiles::make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> geometry, Payload colours,
                              int colour_bits) {
   slot.work = TileSlot::Work::Ready;
-  slot.geometry = std::move(geometry);
-  slot.colours = std::move(colours);
-  slot.colour_bits = colour_bits;
+  slot.prepared.geometry = std::move(geometry);
+  slot.prepared.colours = std::move(colours);
+  slot.prepared.colour_bits = colour_bits;
   prepared_bytes_ += prepared_size(slot);
 }
 
@@ -82,25 +74,25 @@ void ViewerTiles::put_down(TileSlot& slot) {
   if (slot.work != TileSlot::Work::Ready) return;
   prepared_bytes_ -= prepared_size(slot);
   slot.work = TileSlot::Work::Idle;
-  slot.geometry = nullptr;
-  slot.colours = nullptr;
+  slot.prepared.geometry = nullptr;
+  slot.prepared.colours = nullptr;
 }
 
 void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch) {
-  prepared_bytes_ -= slot.geometry->payload->size();
-  slot.held_name = name;
-  slot.held_revision = slot.geometry->revision;
-  slot.held_child_mask = slot.tile->child_mask;
-  slot.held_bytes = decoded_bytes(*slot.tile);
-  slot.held_geometry_epoch = geometry_epoch;
-  slot.held_colour_epoch = 0;
+  prepared_bytes_ -= slot.prepared.geometry->payload->size();
+  slot.held.wire_revision = name;
+  slot.held.revision = slot.prepared.geometry->revision;
+  slot.held.child_mask = slot.tile->child_mask;
+  slot.held.bytes = decoded_bytes(*slot.tile);
+  slot.held.geometry_epoch = geometry_epoch;
+  slot.held.colour_epoch = 0;
   slot.forget_raw();
 }
 
 void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
-  slot.held_colour_epoch = colour_epoch;
-  slot.held_colour_bits = slot.colour_bits;
-  slot.held_look = slot.look;
+  slot.held.colour_epoch = colour_epoch;
+  slot.held.colour_bits = slot.prepared.colour_bits;
+  slot.held.look = slot.look;
 }
 
 std::size_t ViewerTiles::set_looks(const LookRules& rules) {
@@ -112,26 +104,26 @@ std::size_t ViewerTiles::set_looks(const LookRules& rules) {
     if (look == slot->look) continue;
     slot->look = std::move(look);
     put_down(*slot);
-    if (slot->is_wanted) ++changed_count;
+    if (slot->wish.is_wanted) ++changed_count;
   }
   return changed_count;
 }
 
 std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
-  return (slot.colours ? slot.colours->size() : 0) +
-         (slot.held_revision == slot.geometry->revision ? 0 : slot.geometry->payload->size());
+  return (slot.prepared.colours ? slot.prepared.colours->size() : 0) +
+         (slot.held.revision == slot.prepared.geometry->revision ? 0 : slot.prepared.geometry->payload->size());
 }
 
 bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const {
-  if (slot.failed_geometry_epoch == demand.geometry_epoch) return true;
-  if (slot.held_geometry_epoch == demand.geometry_epoch &&
-      (slot.has_colours(demand) || slot.failed_colour_epoch == demand.colour_epoch)) {
+  if (slot.failed.geometry_epoch == demand.geometry_epoch) return true;
+  if (slot.held.geometry_epoch == demand.geometry_epoch &&
+      (slot.has_colours(demand) || slot.failed.colour_epoch == demand.colour_epoch)) {
     return true;
   }
-  if (slot.is_target) return false;
-  if (!slot.is_preview && slot.is_drawable() && are_children_drawable(slot)) return true;
-  const bool is_of_before = slot.held_name != 0 && slot.held_geometry_epoch == 0;
-  return is_of_before && slot.held_child_mask == slot.tile->child_mask && is_covered(slot, demand);
+  if (slot.wish.is_target) return false;
+  if (!slot.wish.is_preview && slot.is_drawable() && are_children_drawable(slot)) return true;
+  const bool is_of_before = slot.held.wire_revision != 0 && slot.held.geometry_epoch == 0;
+  return is_of_before && slot.held.child_mask == slot.tile->child_mask && is_covered(slot, demand);
 }
 
 bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
@@ -167,16 +159,21 @@ std::uint32_t ViewerTiles::resume(std::span<const ResumedTile> claims, const Dem
 bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand,
                                const FrameCache::State& cache) {
   put_down(slot);
+  // A claim does not say these; where this stream has given the geometry out before, it knows them.
+  const float position_step_m = slot.held.position_step_m;
+  const auto origin_m = slot.held.origin_m;
   slot.forget_held();
-  slot.held_name = revision;
+  slot.held.position_step_m = position_step_m;
+  slot.held.origin_m = origin_m;
+  slot.held.wire_revision = revision;
   if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
-  slot.held_revision = revision;
-  slot.held_vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
-  slot.held_child_mask = slot.tile->child_mask;
-  slot.held_bytes = decoded_bytes(*slot.tile);
-  slot.held_geometry_epoch = demand.geometry_epoch;
-  slot.held_colour_epoch = Demand::kEarlierColourEpoch;
-  slot.held_colour_bits = demand.colour_bits;
+  slot.held.revision = revision;
+  slot.held.vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+  slot.held.child_mask = slot.tile->child_mask;
+  slot.held.bytes = decoded_bytes(*slot.tile);
+  slot.held.geometry_epoch = demand.geometry_epoch;
+  slot.held.colour_epoch = Demand::kEarlierColourEpoch;
+  slot.held.colour_bits = demand.colour_bits;
   return true;
 }
 
@@ -202,7 +199,7 @@ void ViewerTiles::push_removal(TileId tile, std::uint32_t revision) {
 }
 
 void ViewerTiles::remove_from_viewer(TileSlot& slot) {
-  if (slot.held_name != 0) push_removal(slot.tile->id, slot.held_name);
+  if (slot.held.wire_revision != 0) push_removal(slot.tile->id, slot.held.wire_revision);
   slot.forget_held();
 }
 
@@ -210,15 +207,15 @@ void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {
   std::uint64_t bytes = 0;
   std::vector<TileSlot*> unused;
   for (const auto& slot : slots_) {
-    bytes += slot->is_wanted ? decoded_bytes(*slot->tile) : slot->held_bytes;
-    if (!slot->is_wanted && slot->held_name != 0) unused.push_back(slot.get());
+    bytes += slot->wish.is_wanted ? decoded_bytes(*slot->tile) : slot->held.bytes;
+    if (!slot->wish.is_wanted && slot->held.wire_revision != 0) unused.push_back(slot.get());
   }
   if (bytes <= most_bytes) return;
   std::sort(unused.begin(), unused.end(),
-            [](const TileSlot* a, const TileSlot* b) { return a->last_wanted < b->last_wanted; });
+            [](const TileSlot* a, const TileSlot* b) { return a->wish.last_wanted < b->wish.last_wanted; });
   for (TileSlot* slot : unused) {
     if (bytes <= most_bytes) break;
-    bytes -= slot->held_bytes;
+    bytes -= slot->held.bytes;
     remove_from_viewer(*slot);
   }
 }
@@ -226,7 +223,7 @@ void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {
 void ViewerTiles::remove_outdated_beneath(const TileSlot& slot, const Demand& demand) {
   for (const std::size_t child : tree_.nodes()[slot.node].children) {
     TileSlot& outdated = *slots_[child];
-    const bool is_outdated = outdated.held_name != 0 && outdated.held_colour_epoch != demand.colour_epoch;
+    const bool is_outdated = outdated.held.wire_revision != 0 && outdated.held.colour_epoch != demand.colour_epoch;
     if (is_outdated && !is_covered(outdated, demand)) remove_from_viewer(outdated);
     remove_outdated_beneath(outdated, demand);
   }
@@ -236,7 +233,7 @@ bool ViewerTiles::is_covered(const TileSlot& slot, const Demand& demand) const {
   const auto& children = tree_.nodes()[slot.node].children;
   return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
     const TileSlot& child = *slots_[index];
-    const bool is_current = child.is_drawable() && child.held_colour_epoch == demand.colour_epoch;
+    const bool is_current = child.is_drawable() && child.held.colour_epoch == demand.colour_epoch;
     return is_current || is_covered(child, demand);
   });
 }

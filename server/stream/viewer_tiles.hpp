@@ -22,67 +22,81 @@ struct TileSlot {
     Idle,     ///< Nobody is at it.
     Busy,     ///< A job of this viewer encodes it.
     Waiting,  ///< A job of another viewer encodes it.
-    Ready,    ///< `geometry` and `colours` answer the present demand.
+    Ready,    ///< `prepared` answers the present demand.
   };
 
   std::shared_ptr<const map::Tile> tile;
   std::size_t node = 0;  ///< In the tree.
   bool is_gone = false;  ///< No longer part of the scene, or the stream has ended.
 
-  bool is_wanted = false;   ///< The camera asks for it, ...
-  bool is_target = false;   ///< ... as a tile to be drawn in the end, not only until its children are there.
-  bool is_preview = false;  ///< Coloured even when its children take its place.
-  std::uint64_t last_wanted = 0;
-
-  Work work = Work::Idle;
-  std::shared_ptr<const EncodedTile> geometry;  ///< While Ready.
-  Payload colours;                              ///< While Ready.
-  int colour_bits = 0;                          ///< Of `colours`.
-  TileLook look;                                ///< That is to be shown, and that `colours` have.
-
-  /// What was given out last; 0 = nothing. The name of a geometry is its revision on the wire: it rises with each
-  /// geometry of the tile, even when an encoding comes back that the viewer had before.
-  std::uint32_t held_revision = 0;
-  std::uint32_t held_name = 0;
-  std::uint32_t held_vertex_count = 0;
-  std::uint8_t held_child_mask = 0;
-  std::uint64_t held_bytes = 0;  ///< Decoded.
-  std::uint64_t held_geometry_epoch = 0;
-  std::uint64_t held_colour_epoch = 0;
-  int held_colour_bits = 0;
-  TileLook held_look;
-  float held_position_step_m = 0;  ///< The coarsest of the tile.
-  std::array<float, 3> held_origin_m{};
+  /// What the camera asks for.
+  struct Wish {
+    bool is_wanted = false;   ///< It, ...
+    bool is_target = false;   ///< ... as a tile to be drawn in the end, not only until its children are there.
+    bool is_preview = false;  ///< Coloured even when its children take its place.
+    std::uint64_t last_wanted = 0;
+  };
+  /// While Ready: the frames that are next.
+  struct Prepared {
+    std::shared_ptr<const EncodedTile> geometry;
+    Payload colours;
+    int colour_bits = 0;  ///< Of `colours`.
+  };
+  /// What was given out last; 0 = nothing.
+  struct Held {
+    std::uint32_t revision = 0;
+    /// The revision of its geometry on the wire: it rises with each geometry of the tile, even when an encoding comes back that the viewer had before.
+    std::uint32_t wire_revision = 0;
+    std::uint32_t vertex_count = 0;
+    std::uint8_t child_mask = 0;
+    std::uint64_t bytes = 0;  ///< Decoded.
+    std::uint64_t geometry_epoch = 0;
+    std::uint64_t colour_epoch = 0;
+    int colour_bits = 0;
+    TileLook look;
+    float position_step_m = 0;  ///< The coarsest of the tile.
+    std::array<float, 3> origin_m{};
+  };
+  /// Of the demand for which the tile could not be encoded; 0 = none.
+  struct Failed {
+    std::uint64_t geometry_epoch = 0;
+    std::uint64_t colour_epoch = 0;
+  };
   /// A raw layer on its way to the viewer.
   struct Raw {
     Work work = Work::Idle;
-    Payload payload;               ///< While Ready; of `held_revision`.
+    Payload payload;               ///< While Ready; of `held.revision`.
     std::uint64_t held_epoch = 0;  ///< Of RawDemand; 0 = the viewer does not have it.
     std::uint64_t failed_epoch = 0;
   };
+
+  Wish wish;
+  Work work = Work::Idle;
+  Prepared prepared;
+  TileLook look;  ///< That is to be shown, and that `prepared.colours` have.
+  Held held;
+  Failed failed;
   std::array<Raw, RawDemand::kLayers.size()> raw;  ///< In the order of RawDemand::kLayers.
-  std::uint64_t failed_geometry_epoch = 0;
-  std::uint64_t failed_colour_epoch = 0;
 
   int wanted_colour_bits(const Demand& demand) const {
-    return is_target ? demand.colour_bits : demand.preview_colour_bits;
+    return wish.is_target ? demand.colour_bits : demand.preview_colour_bits;
   }
   /// Holds the newest colours, as exact as the tile's part in the picture asks for.
   bool has_colours(const Demand& demand) const {
     if (!demand.fused) return true;
-    return held_colour_epoch == demand.colour_epoch && held_colour_bits >= wanted_colour_bits(demand) &&
-           held_look == look;
+    return held.colour_epoch == demand.colour_epoch && held.colour_bits >= wanted_colour_bits(demand) &&
+           held.look == look;
   }
   /// With colours, or with what the viewer makes them of.
-  bool is_drawable() const { return held_geometry_epoch != 0 && (held_colour_epoch != 0 || has_raw_layers()); }
+  bool is_drawable() const { return held.geometry_epoch != 0 && (held.colour_epoch != 0 || has_raw_layers()); }
   bool has_raw_layers() const {
     return std::all_of(raw.begin(), raw.end(), [](const Raw& layer) { return layer.held_epoch != 0; });
   }
   /// Holds that geometry, and a raw layer of it is wanted and not there.
   bool lacks_raw(std::size_t layer, const Demand& demand) const {
     const std::uint64_t epoch = demand.raw.epoch[layer];
-    return demand.raw.is_wanted[layer] && !is_gone && is_wanted && held_revision != 0 &&
-           held_geometry_epoch == demand.geometry_epoch && raw[layer].held_epoch != epoch &&
+    return demand.raw.is_wanted[layer] && !is_gone && wish.is_wanted && held.revision != 0 &&
+           held.geometry_epoch == demand.geometry_epoch && raw[layer].held_epoch != epoch &&
            raw[layer].failed_epoch != epoch;
   }
   void forget_held();
