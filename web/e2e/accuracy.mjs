@@ -5,7 +5,9 @@ import { drawn, openClient, screenshot, settled, startServer, test } from './har
 import { startLink } from './link.mjs';
 
 const MOMENTS = Number(process.env.SPECTRA_MOMENTS ?? 6);
-const MOMENTS_A_SESSION = 7;
+const SCENE = process.env.SPECTRA_SCENE === undefined ? '--demo' : process.env.SPECTRA_SCENE;
+/** The first sessions are short, with little but the first picture in them; later ones go on until most of the scene has come. */
+const momentsOfSession = (session) => 4 + 8 * session;
 const VIEWPORT = { width: 900, height: 640 };
 const NOTHING = '#ff00ff';
 const RANGE = { min: 5, max: 60 };
@@ -108,7 +110,7 @@ function difference(a, b, isThermal) {
 
 export function addAccuracyTests(browser) {
   test('What the bar says of colours and temperatures is never less than what they are off, on 1 Mbit/s', async () => {
-    const server = await startServer(['--demo']);
+    const server = await startServer([SCENE]);
     const link = await startLink(server.port);
     const full = await openFull(browser, server);
     // The program of the page is in the cache: it is not what is slow.
@@ -121,8 +123,11 @@ export function addAccuracyTests(browser) {
     let fusion = VISIBLE;
     let coarse = 0;
     const untrue = [];
+    let [session, begins] = [0, 0];
     for (let moment = 0; moment < MOMENTS; moment += 1) {
-      if (moment % MOMENTS_A_SESSION === 0) {
+      if (moment === begins) {
+        begins += momentsOfSession(session);
+        session += 1;
         await page?.close();
         link.rate = MBIT_BYTES_PER_S;
         ({ page } = await openClient(context, link.url, null));

@@ -22,6 +22,7 @@ import { addAccessTests } from './access.mjs';
 import { addAccuracyTests } from './accuracy.mjs';
 import { addFusingTests } from './fusing.mjs';
 import { addLayoutTests } from './layout.mjs';
+import { addLetteringTests } from './lettering.mjs';
 import { addLinkTests } from './links.mjs';
 import { addLiveTests } from './live.mjs';
 import { addLoadTests } from './load.mjs';
@@ -519,6 +520,7 @@ test('Nothing broke the content policy', () => {
 addAccuracyTests(browser);
 addFusingTests(browser);
 addLayoutTests(browser);
+addLetteringTests(browser);
 addLinkTests(browser);
 addLiveTests(browser);
 addLoadTests(browser, scratch);
