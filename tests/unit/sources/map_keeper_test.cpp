@@ -125,7 +125,7 @@ TEST_F(MapKeeperTest, ChangesOfABlockTakeEffectInTheirOrderHoweverLongTheyAreRea
 TEST_F(MapKeeperTest, ALongReadKeepsNoOtherBlockWaiting) {
   put("first", square(3, 1000));
   ASSERT_EQ(answers().size(), 1U);
-  put("large", square(300));
+  put("large", square(600));
   put("small", square(3, 2000));
   EXPECT_EQ(answers()[1], "small has 9");
 }
