@@ -154,7 +154,8 @@ int run(const Arguments& arguments) {
   }
   bool is_reached = true;
   for (const fusion::Method* method : fusion::all_methods()) {
-    if (!method->needs_temperature) continue;
+    // What compares with a past shows nothing of a scene that has none.
+    if (!method->needs_temperature || method->compares_with_baseline) continue;
     if (!arguments.method.empty() && arguments.method != method->id) continue;
     is_reached = print_findings(list, *method, arguments.params) && is_reached;
   }
