@@ -54,15 +54,26 @@ void find_up(LoadedScene& scene, const std::optional<base::UpAxis>& wanted) {
                              "; --up z takes z"});
 }
 
+/// Whether a short name of a unit, which is a word or a letter elsewhere, is all that is said of it: "units: m", not "in m, ...".
+bool is_whole_unit(const std::vector<std::string>& words, std::size_t at) {
+  return at > 0 && (words[at - 1] == "=" || words[at - 1].starts_with("unit")) &&
+         (at + 1 == words.size() || words[at + 1] == ",");
+}
+
+bool is_denied(const std::vector<std::string>& words, std::size_t at) {
+  return (at > 0 && words[at - 1] == "not") || (at > 1 && words[at - 1] == "in" && words[at - 2] == "not");
+}
+
 bool speaks_of_metres(const LoadedScene& scene) {
   return std::any_of(scene.comments.begin(), scene.comments.end(), [](const std::string& comment) {
-    std::string text = comment;
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    for (std::size_t at = 0; (at = text.find("met", at)) != std::string::npos; ++at) {
-      const std::string_view rest = std::string_view(text).substr(at);
-      const bool is_word = at == 0 || text[at - 1] < 'a' || text[at - 1] > 'z';
-      if (is_word && (rest.starts_with("metre") || rest.starts_with("meter"))) return true;
+    const std::vector<std::string> words = comment_words(comment);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      const std::string& word = words[i];
+      const bool is_metre = word.starts_with("metre") || word.starts_with("meter");
+      const bool is_letter =
+          word == "m" && is_whole_unit(words, i) &&
+          std::any_of(words.begin(), words.end(), [](const std::string& other) { return other.starts_with("unit"); });
+      if ((is_metre || is_letter) && !is_denied(words, i)) return true;
     }
     return false;
   });
@@ -95,9 +106,9 @@ const LengthUnit* unit_told(const std::vector<std::string>& comments) {
     const auto about = std::find_if(words.begin(), words.end(), is_about_all);
     for (auto word = about; word != words.end(); ++word) {
       // "in" is an inch only where it is all that is said of the unit.
-      const bool is_whole = word != about && (*(word - 1) == "=" || (word - 1)->starts_with("unit")) &&
-                            (word + 1 == words.end() || *(word + 1) == ",");
-      if (*word == "in" && !is_whole) continue;
+      const auto at = static_cast<std::size_t>(word - words.begin());
+      if (*word == "in" && (word == about || !is_whole_unit(words, at))) continue;
+      if (is_denied(words, at)) continue;
       if (word != words.begin() && is_number(*(word - 1))) continue;
       for (const LengthUnit& unit : kLengthUnits) {
         if (std::find(unit.words.begin(), unit.words.end(), *word) != unit.words.end()) return &unit;

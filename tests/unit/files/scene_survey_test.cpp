@@ -178,6 +178,11 @@ TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
   EXPECT_FALSE(is_metric({"comment millimetres", "comment parameters"}));
   EXPECT_TRUE(is_metric({"comment xyz metres; a quarry"}));
   EXPECT_TRUE(is_metric({"obj_info unit: meter"}));
+  EXPECT_TRUE(is_metric({"comment units: m"}));
+  EXPECT_TRUE(is_metric({"obj_info unit=M, z up"}));
+  EXPECT_FALSE(is_metric({"comment not in metres"}));
+  EXPECT_FALSE(is_metric({"comment m"})) << "a letter, unless it is said to be the unit";
+  EXPECT_FALSE(is_metric({"comment units: m of a map"}));
   EXPECT_TRUE(is_metric({}, 0.001));
   EXPECT_TRUE(is_metric({}, 1)) << "said, although it changes nothing";
 }
