@@ -92,7 +92,7 @@ namespace {
 enum class Mode { Substitute, Scale };
 
 struct InverseIntensityHue {
-  double k = 0.5;
+  double k = 1;
   Mode mode = Mode::Substitute;
 };
 

@@ -29,7 +29,7 @@ namespace spectra::fusion::methods {
 namespace {
 
 struct Blend {
-  double alpha = 0.4;
+  double alpha = 0.5;
 };
 
 ParameterSchema<Blend> schema() {

@@ -20,7 +20,7 @@ FusionChange to_method(const std::string& id, ParameterValues params = {}) {
 TEST(FusionSettings, DefaultsAreABlendInIron) {
   const FusionSettings settings = default_settings();
   EXPECT_EQ(settings.method, "thermal_visible_blend");
-  EXPECT_EQ(settings.params, (ParameterValues{{"alpha", 0.4}}));
+  EXPECT_EQ(settings.params, (ParameterValues{{"alpha", 0.5}}));
   EXPECT_EQ(settings.palette, "iron");
   EXPECT_EQ(settings.range, RangeSetting{});
   EXPECT_EQ(settings.missing, std::nullopt);
