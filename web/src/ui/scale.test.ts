@@ -1,7 +1,16 @@
 import { describe, expect, it } from 'vitest';
-import { positionOf, roundTicks, sharesBeyond, spreadApart, travelOf, valueAt } from './scale';
+import { mostImportant, positionOf, roundTicks, sharesBeyond, spreadApart, travelOf, valueAt } from './scale';
 
 const base = { label: '', help: '' };
+
+describe('mostImportant', () => {
+  it('keeps those of lowest rank where they stand', () => {
+    const rank = (word: string) => word.length;
+    expect(mostImportant(['ccc', 'a', 'bb', 'd'], 3, rank)).toEqual(['a', 'bb', 'd']);
+    expect(mostImportant(['a', 'd', 'e'], 2, rank)).toEqual(['a', 'd']);
+    expect(mostImportant(['a', 'd'], 5, rank)).toEqual(['a', 'd']);
+  });
+});
 
 describe('sharesBeyond', () => {
   const histogram = { edges: [0, 10, 20, 30, 40], counts: [10, 60, 20, 10] };

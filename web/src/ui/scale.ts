@@ -14,6 +14,12 @@ export function roundTicks(lo: number, hi: number, wanted: number): { values: nu
   return { values, step, decimals: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
 }
 
+/** Those `count` of the items, in their order, whose rank is lowest; the first of equals. */
+export function mostImportant<T>(items: readonly T[], count: number, rank: (item: T) => number): T[] {
+  const kept = new Set([...items.keys()].sort((a, b) => rank(items[a]!) - rank(items[b]!) || a - b).slice(0, count));
+  return items.filter((_, index) => kept.has(index));
+}
+
 /** The travel of a slider: where values are between its two ends. */
 export interface Travel {
   min: number;
