@@ -5,13 +5,12 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "fused_in_memory.hpp"
 #include "fusion/files/ply_fuse.hpp"
 #include "fusion/files/ply_reader.hpp"
-#include "fusion/files/ply_writer.hpp"
 #include "fusion/fusion_plan.hpp"
 #include "fusion/registry.hpp"
 #include "fusion/statistics/temperature_statistics.hpp"
@@ -284,26 +283,6 @@ TEST(FieldFiles, SaturatedPixelsAreNotMissing) {
   EXPECT_EQ(scene.mesh.temperature_celsius()[11], infinity);
 }
 
-/// What read_ply(), FusionPlan and write_ply() make of the scene.
-std::string fused_in_memory(const LoadedScene& loaded, const fusion::FusionSettings& settings) {
-  const mesh::MultispectralMesh& mesh = loaded.mesh;
-  fusion::SceneTemperature temperature;
-  temperature.summary = summary_of(loaded);
-  temperature.histogram = [&](std::uint32_t bins) {
-    fusion::Histogram histogram{temperature.summary.minimum, temperature.summary.maximum,
-                                std::vector<std::uint64_t>(bins)};
-    fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
-    return histogram;
-  };
-  const auto plan = fusion::FusionPlan::prepare(settings, temperature);
-  EXPECT_TRUE(plan);
-  std::vector<base::Rgb8> fused(mesh.vertex_count());
-  plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
-  std::ostringstream out;
-  EXPECT_TRUE(write_ply(out, mesh, fused));
-  return out.str();
-}
-
 TEST(FieldFiles, AreFusedInBlocksAsInMemory) {
   const test::TemporaryFolder folder;
   const auto out = folder.path() / "fused.ply";
@@ -324,7 +303,7 @@ TEST(FieldFiles, AreFusedInBlocksAsInMemory) {
           EXPECT_EQ(fused.error().message, scene.error().message);
           continue;
         }
-        EXPECT_TRUE(test::file_bytes(out) == fused_in_memory(scene.value(), settings)) << method;
+        EXPECT_TRUE(test::file_bytes(out) == test::fused_in_memory(scene.value(), settings)) << method;
         ASSERT_EQ(fused.value().notes.size(), scene.value().notes.size());
         for (std::size_t i = 0; i < scene.value().notes.size(); ++i) {
           EXPECT_EQ(fused.value().notes[i].message, scene.value().notes[i].message);

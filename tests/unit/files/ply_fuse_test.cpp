@@ -5,12 +5,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "allocation_meter.hpp"
-#include "fusion/files/ply_writer.hpp"
+#include "fused_in_memory.hpp"
 #include "fusion/registry.hpp"
 #include "loaded.hpp"
 
@@ -23,28 +22,10 @@ fusion::FusionSettings settings_of(const std::string& method) {
   return fusion::with_change(fusion::default_settings(), change).value();
 }
 
-/// What read_ply(), FusionPlan and write_ply() make of the file.
 std::string fused_in_memory(const std::filesystem::path& in, const fusion::FusionSettings& settings) {
   const auto scene = read_ply(in);
   EXPECT_TRUE(scene);
-  const mesh::MultispectralMesh& mesh = scene.value().mesh;
-  fusion::TemperatureAccumulator temperatures;
-  temperatures.add(mesh.temperature_celsius());
-  fusion::SceneTemperature temperature;
-  temperature.summary = temperatures.summary();
-  temperature.histogram = [&](std::uint32_t bins) {
-    fusion::Histogram histogram{temperature.summary.minimum, temperature.summary.maximum,
-                                std::vector<std::uint64_t>(bins)};
-    fusion::add_to_histogram(mesh.temperature_celsius(), histogram);
-    return histogram;
-  };
-  const auto plan = fusion::FusionPlan::prepare(settings, temperature);
-  EXPECT_TRUE(plan);
-  std::vector<base::Rgb8> fused(mesh.vertex_count());
-  plan.value().fuse(mesh.temperature_celsius(), mesh.visible(), fused);
-  std::ostringstream out;
-  EXPECT_TRUE(write_ply(out, mesh, fused));
-  return out.str();
+  return test::fused_in_memory(scene.value(), settings);
 }
 
 void expect_same_bytes(const test::TemporaryFolder& folder, const std::filesystem::path& in,
