@@ -64,11 +64,14 @@ class StreamOfAges : public testing::StreamWithViewers {
     scene_ = testing::scene_of(std::move(tiles));
   }
 
+  fusion::FusionPlan plan_with(const fusion::FusionChange& change) const {
+    const auto settings = fusion::with_change(fusion::default_settings(), change).value();
+    return fusion::FusionPlan::prepare(settings, scene_->temperature()).value();
+  }
   fusion::FusionPlan fading_plan() const {
     fusion::FusionChange change;
     change.age = {fusion::AgeMode::Fade, kHalfLife_s};
-    const auto settings = fusion::with_change(fusion::default_settings(), change).value();
-    return fusion::FusionPlan::prepare(settings, scene_->temperature()).value();
+    return plan_with(change);
   }
 };
 
@@ -111,7 +114,7 @@ TEST_F(StreamOfAges, ViewersShareWhatLooksTheSame) {
   EXPECT_EQ(cache_.miss_count(), made);
   // Without fading, at the same settings, the fresh ones are the same again.
   other.stream().set_time(2000);
-  other.stream().set_plan(testing::plan_with_alpha(*scene_, 0.5));
+  other.stream().set_plan(plan_with({}));
   other.complete();
   const auto plain = cache_.miss_count();
   one.stream().set_time(2000);
