@@ -86,7 +86,7 @@ export function addLetteringTests(browser) {
     assert.ok(rest.vertices < full.vertices, `${rest.vertices} vertices at rest, ${full.vertices} in full: nothing is compared`);
     const [shown, wanted] = [contrastOf(rest.png), contrastOf(full.png)];
     assert.ok(
-      shown > 0.85 * wanted,
+      shown > 0.95 * wanted,
       `the sign has a contrast of ${shown.toFixed(1)} levels at rest, ${wanted.toFixed(1)} in full`,
     );
     const words = await readBy(browser, rest.png);
