@@ -5,7 +5,6 @@ import { drawn, openClient, screenshot, settled, startServer, test } from './har
 import { startLink } from './link.mjs';
 
 const MOMENTS = Number(process.env.SPECTRA_MOMENTS ?? 6);
-const SCENE = process.env.SPECTRA_SCENE === undefined ? '--demo' : process.env.SPECTRA_SCENE;
 /** The first sessions are short, with little but the first picture in them; later ones go on until most of the scene has come. */
 const momentsOfSession = (session) => 4 + 8 * session;
 const VIEWPORT = { width: 900, height: 640 };
@@ -110,7 +109,7 @@ function difference(a, b, isThermal) {
 
 export function addAccuracyTests(browser) {
   test('What the bar says of colours and temperatures is never less than what they are off, on 1 Mbit/s', async () => {
-    const server = await startServer([SCENE]);
+    const server = await startServer(['--demo']);
     const link = await startLink(server.port);
     const full = await openFull(browser, server);
     // The program of the page is in the cache: it is not what is slow.
