@@ -144,6 +144,7 @@ mesh::MultispectralMesh formed(const SurfaceMesh& scene) {
   mesh.name = "demo";
   mesh.up = base::UpAxis::Y;
   mesh.is_metric = true;
+  mesh.told = {mesh.up, "metres"};
   mesh.has_visible = true;
   mesh.has_temperature = true;
   mesh.resize_vertices(scene.positions.size());

@@ -10,6 +10,7 @@
 #include "fusion/files/ply_encoder.hpp"
 #include "fusion/files/ply_stream.hpp"
 #include "fusion/files/scene_origin.hpp"
+#include "fusion/files/told_coordinates.hpp"
 #include "fusion/mesh/multispectral_mesh.hpp"
 
 namespace spectra::files {
@@ -98,13 +99,14 @@ fusion::Hues file_hues(PlyStream& stream, std::optional<base::Error>& error) {
 
 /// The last pass: every block fused and written. What the file does not have is filled in as MultispectralMesh does.
 base::Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, const fusion::FusionPlan& plan,
-                                  PlyEncoder::Sink sink) {
+                                  const ReadOptions& options, PlyEncoder::Sink sink) {
   PlyLayout layout;
   layout.vertex_count = stream.vertex_count();
   layout.triangle_count = facts.faces.triangle_count;
   layout.origin = facts.origin;
   layout.double_positions = stream.has_double_positions();
   layout.has_temperature = stream.has_temperature();
+  layout.comment = comment_of(told_coordinates(stream.header().comments, options));
   PlyEncoder encoder(layout, std::move(sink));
 
   mesh::MultispectralMesh block_mesh;
@@ -177,7 +179,7 @@ base::Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::fi
   begin_share = 0;
   end_share = 1;
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(out));
-  BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(),
+  BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(), options,
                                    [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
   BOOST_OUTCOME_TRY(file.commit());
   return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.faces.triangle_count,

@@ -9,6 +9,7 @@
 #include "fusion/files/ply_values.hpp"
 #include "fusion/files/scene_origin.hpp"
 #include "fusion/files/thermal_join.hpp"
+#include "fusion/files/told_coordinates.hpp"
 
 namespace spectra::files {
 
@@ -177,6 +178,7 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
   }
   scene.notes = stream.notes(facts);
   scene.comments = stream.header().comments;
+  mesh.told = told_coordinates(scene.comments, options);
   return scene;
 }
 

@@ -6,6 +6,7 @@
 
 #include "fusion/files/output_file.hpp"
 #include "fusion/files/ply_encoder.hpp"
+#include "fusion/files/told_coordinates.hpp"
 
 namespace spectra::files {
 
@@ -38,7 +39,7 @@ base::Result<void> encode(const mesh::MultispectralMesh& mesh, std::span<const b
   layout.origin = mesh.origin;
   layout.double_positions = mesh.double_positions;
   layout.has_temperature = mesh.has_temperature;
-  layout.comment = comment;
+  layout.comment = comment.empty() ? comment_of(mesh.told) : comment;
   PlyEncoder encoder(layout, std::move(sink));
   if (colours.size() != mesh.vertex_count()) {
     return base::failure(base::ErrorCode::Inconsistent, "a mesh of " + std::to_string(mesh.vertex_count()) +

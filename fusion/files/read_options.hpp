@@ -38,7 +38,7 @@ struct ReadOptions {
   std::optional<double> metres_per_unit;
   /// What positions are to be relative to, in metres; absent: chosen as scene_origin.hpp says.
   std::optional<base::Vec3d> origin;
-  /// Which way is up; absent: found out. Reading does not need it, survey() does.
+  /// Which way is up; absent: found out, by survey().
   std::optional<base::UpAxis> up;
   /// Is told how far the reading is, as kReadingPhase, and of a second file as kReadingThermalPhase and kJoiningPhase.
   base::Progress progress;

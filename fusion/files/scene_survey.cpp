@@ -5,10 +5,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "fusion/base/distance_text.hpp"
-#include "fusion/files/comment_words.hpp"
+#include "fusion/files/told_coordinates.hpp"
 #include "fusion/files/up_search.hpp"
 #include "fusion/mesh/stray_points.hpp"
 
@@ -39,11 +38,11 @@ void find_strays(LoadedScene& scene) {
 }
 
 void find_up(LoadedScene& scene, const std::optional<base::UpAxis>& wanted) {
+  const auto& told = scene.mesh.told.up;
   if (wanted) {
     scene.mesh.up = *wanted;
     return;
   }
-  const auto told = up_told(scene.comments);
   const auto seen = told ? std::nullopt : up_seen(scene.mesh, *scene.core_bounds);
   scene.mesh.up = told.value_or(seen.value_or(base::UpAxis::Z));
   if (scene.mesh.up == base::UpAxis::Z) return;
@@ -54,73 +53,9 @@ void find_up(LoadedScene& scene, const std::optional<base::UpAxis>& wanted) {
                              "; --up z takes z"});
 }
 
-/// Whether a short name of a unit, which is a word or a letter elsewhere, is all that is said of it: "units: m", not "in m, ...".
-bool is_whole_unit(const std::vector<std::string>& words, std::size_t at) {
-  return at > 0 && (words[at - 1] == "=" || words[at - 1].starts_with("unit")) &&
-         (at + 1 == words.size() || words[at + 1] == ",");
-}
-
-bool is_denied(const std::vector<std::string>& words, std::size_t at) {
-  return (at > 0 && words[at - 1] == "not") || (at > 1 && words[at - 1] == "in" && words[at - 2] == "not");
-}
-
-bool speaks_of_metres(const LoadedScene& scene) {
-  return std::any_of(scene.comments.begin(), scene.comments.end(), [](const std::string& comment) {
-    const std::vector<std::string> words = comment_words(comment);
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      const std::string& word = words[i];
-      const bool is_metre = word.starts_with("metre") || word.starts_with("meter");
-      const bool is_letter =
-          word == "m" && is_whole_unit(words, i) &&
-          std::any_of(words.begin(), words.end(), [](const std::string& other) { return other.starts_with("unit"); });
-      if ((is_metre || is_letter) && !is_denied(words, i)) return true;
-    }
-    return false;
-  });
-}
-
-struct LengthUnit {
-  std::string_view name;
-  std::string_view metres;  ///< In one of it.
-  std::array<std::string_view, 6> words;
-};
-
-constexpr std::array<LengthUnit, 5> kLengthUnits = {
-    {{"millimetres", "0.001", {"mm", "millimetre", "millimetres", "millimeter", "millimeters", "millimetric"}},
-     {"centimetres", "0.01", {"cm", "centimetre", "centimetres", "centimeter", "centimeters", "centimetric"}},
-     {"inches", "0.0254", {"inch", "inches", "in"}},
-     {"feet", "0.3048", {"foot", "feet", "ft"}},
-     {"micrometres", "0.000001", {"um", "micrometre", "micrometres", "micrometer", "micrometers", "microns"}}}};
-
-/// The unit of length that a comment gives the positions. A bare "2 mm" may be the accuracy of a scanner.
-const LengthUnit* unit_told(const std::vector<std::string>& comments) {
-  const auto is_about_all = [](const std::string& word) {
-    constexpr std::array<std::string_view, 12> kWords = {"unit",     "units",      "values", "coordinates",
-                                                         "coords",   "positions",  "points", "lengths",
-                                                         "vertices", "dimensions", "xyz",    "distances"};
-    return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
-  };
-  const auto is_number = [](const std::string& word) { return word.find_first_of("0123456789") != std::string::npos; };
-  for (const std::string& comment : comments) {
-    const std::vector<std::string> words = comment_words(comment);
-    const auto about = std::find_if(words.begin(), words.end(), is_about_all);
-    for (auto word = about; word != words.end(); ++word) {
-      // "in" is an inch only where it is all that is said of the unit.
-      const auto at = static_cast<std::size_t>(word - words.begin());
-      if (*word == "in" && (word == about || !is_whole_unit(words, at))) continue;
-      if (is_denied(words, at)) continue;
-      if (word != words.begin() && is_number(*(word - 1))) continue;
-      for (const LengthUnit& unit : kLengthUnits) {
-        if (std::find(unit.words.begin(), unit.words.end(), *word) != unit.words.end()) return &unit;
-      }
-    }
-  }
-  return nullptr;
-}
-
 /// True when there was something to say.
 bool judge_unit(LoadedScene& scene) {
-  const LengthUnit* const unit = scene.mesh.is_metric ? nullptr : unit_told(scene.comments);
+  const LengthUnit* const unit = scene.mesh.is_metric ? nullptr : length_unit(scene.mesh.told.unit);
   if (unit == nullptr) return false;
   scene.notes.push_back({"unit_told", 1,
                          "The file's comments speak of " + std::string(unit->name) + ": --scale " +
@@ -149,8 +84,9 @@ void judge_size(LoadedScene& scene) {
 
 void survey(LoadedScene& scene, const ReadOptions& options) {
   find_strays(scene);
+  scene.mesh.told = told_coordinates(scene.comments, options);
   find_up(scene, options.up);
-  scene.mesh.is_metric = scene.mesh.is_metric || options.metres_per_unit || speaks_of_metres(scene);
+  scene.mesh.is_metric = scene.mesh.is_metric || scene.mesh.told.unit == kMetres;
   if (!judge_unit(scene)) judge_size(scene);
 }
 

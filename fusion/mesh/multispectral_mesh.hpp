@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,12 @@ struct LeftOutVertex {
   base::Vec3d position;  ///< As it was.
   base::Rgb8 visible;
   float temperature_celsius = 0;
+};
+
+/// What somebody has said of a scene's coordinates: its file, or who had it read.
+struct ToldCoordinates {
+  std::optional<base::UpAxis> up;
+  std::string unit;  ///< "metres", "millimetres" ...; empty: nobody has named one.
 };
 
 /// A scene in memory: per vertex a position, a visible colour and a temperature, and triangles (none: a point cloud).
@@ -57,6 +64,7 @@ class MultispectralMesh {
   base::Vec3d origin;
   std::vector<LeftOutVertex> left_out;  ///< Rising; vertex i of the mesh is the i-th of the others.
   base::UpAxis up = base::UpAxis::Z;
+  ToldCoordinates told;           ///< A PLY file that is written says it again.
   bool is_metric = false;         ///< Somebody has said that positions are in metres; otherwise they are taken for it.
   bool has_visible = false;       ///< The input had colours; otherwise visible() is mid grey.
   bool has_temperature = false;   ///< The input had a temperature property, or a thermal file was joined.

@@ -1,7 +1,5 @@
 #include "fusion/demo/demo_scene.hpp"
 
-#include <string>
-
 #include "fusion/files/ply_writer.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
@@ -15,8 +13,7 @@ int run_demo_scene(const DemoSceneFileOptions& options) {
   ProgressLine line({{base::kModellingPhase, "modelling the demo scene", 14},
                      {base::kWritingPhase, "writing " + options.output.filename().string(), 1}});
   const auto mesh = demo::demo_scene({options.vertex_count, options.seed}, line.sink());
-  const auto written = files::write_ply(options.output, mesh, mesh.visible(),
-                                        "up " + std::string(to_string(mesh.up)) + "; positions in metres", line.sink());
+  const auto written = files::write_ply(options.output, mesh, mesh.visible(), {}, line.sink());
   line.end();
   return written ? kDone : fail(written.error());
 }

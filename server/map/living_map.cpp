@@ -242,6 +242,7 @@ MapVersion LivingMap::version(std::uint32_t revision) {
     facts.name = first->second->facts.name;
     facts.up = first->second->facts.up;
     facts.is_metric = first->second->facts.is_metric;
+    facts.told = first->second->facts.told;
   }
   if (!options_.name.empty()) facts.name = options_.name;
   if (blocks_.size() == 1) facts.left_out = blocks_.begin()->second->facts.left_out;

@@ -13,6 +13,7 @@ MeshFacts facts_of(const mesh::MultispectralMesh& mesh) {
           .left_out = mesh.left_out,
           .up = mesh.up,
           .is_metric = mesh.is_metric,
+          .told = mesh.told,
           .vertex_count = mesh.vertex_count(),
           .triangle_count = mesh.triangle_count()};
 }
@@ -28,6 +29,7 @@ mesh::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const Map
   mesh.left_out = facts.left_out;
   mesh.up = facts.up;
   mesh.is_metric = facts.is_metric;
+  mesh.told = facts.told;
   mesh.resize_vertices(static_cast<std::size_t>(facts.vertex_count));
   mesh.triangles().resize(static_cast<std::size_t>(facts.triangle_count));
   const std::span<base::Vec3f> positions = mesh.positions();

@@ -25,6 +25,7 @@ struct MeshFacts {
   std::vector<mesh::LeftOutVertex> left_out;
   base::UpAxis up = base::UpAxis::Z;
   bool is_metric = false;
+  mesh::ToldCoordinates told;
   std::uint64_t vertex_count = 0, triangle_count = 0;
 };
 

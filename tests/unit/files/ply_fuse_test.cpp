@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "allocation_meter.hpp"
 #include "fused_in_memory.hpp"
+#include "fusion/files/scene_survey.hpp"
 #include "fusion/registry.hpp"
 #include "loaded.hpp"
 
@@ -22,8 +25,9 @@ fusion::FusionSettings settings_of(const std::string& method) {
   return fusion::with_change(fusion::default_settings(), change).value();
 }
 
-std::string fused_in_memory(const std::filesystem::path& in, const fusion::FusionSettings& settings) {
-  const auto scene = read_ply(in);
+std::string fused_in_memory(const std::filesystem::path& in, const fusion::FusionSettings& settings,
+                            const ReadOptions& options = {}) {
+  const auto scene = read_ply(in, options);
   EXPECT_TRUE(scene);
   return test::fused_in_memory(scene.value(), settings);
 }
@@ -104,6 +108,53 @@ TEST(PlyFuse, WritesHolesInTheirPlace) {
   EXPECT_EQ(out.value().mesh.left_out[1].input_index, 7U);
   EXPECT_EQ(out.value().mesh.left_out[1].position, (base::Vec3d{0, 0, 0}));
   EXPECT_EQ(out.value().mesh.left_out[1].visible, (base::Rgb8{9, 8, 7}));
+}
+
+/// Up and unit of a file as told, or as the options say, are those of what is written from it.
+TEST(PlyFuse, SaysAgainWhatWasToldOfTheCoordinates) {
+  struct Case {
+    const char* comments;
+    std::optional<base::UpAxis> wanted_up;
+    std::optional<double> metres_per_unit;
+    const char* written;
+  };
+  const test::TemporaryFolder folder;
+  const auto out = folder.path() / "out.ply";
+  for (const Case& one : std::initializer_list<Case>{
+           {"", {}, {}, ""},
+           {"obj_info num_cols 2\ncomment made by hand\n", {}, {}, ""},
+           {"comment Y-up\n", {}, {}, "comment up y\n"},
+           {"comment xyz metres, y = elevation\n", {}, {}, "comment up y; positions in metres\n"},
+           {"comment gravity 0 0 9.81\nobj_info units: mm\n", {}, {}, "comment up -z; positions in millimetres\n"},
+           {"comment coordinates in inches\n", {}, {}, "comment positions in inches\n"},
+           {"comment units = um\n", {}, {}, "comment positions in micrometres\n"},
+           {"comment unit: ft\n", {}, {}, "comment positions in feet\n"},
+           {"comment values in cm\n", {}, {}, "comment positions in centimetres\n"},
+           {"comment x up\ncomment y up\n", {}, {}, ""},
+           {"comment x up\n", base::UpAxis::MinusX, {}, "comment up -x\n"},
+           {"comment x up\ncomment units: mm\n", {}, 0.001, "comment up x; positions in metres\n"},
+           {"", base::UpAxis::Z, 1.0, "comment up z; positions in metres\n"}}) {
+    const auto in =
+        folder.write("in.ply", "ply\nformat ascii 1.0\n" + std::string(one.comments) + "element vertex 2\n" +
+                                   std::string(test::kXyz) + "end_header\n0 0 0\n1 1 1\n");
+    ReadOptions options;
+    options.up = one.wanted_up;
+    options.metres_per_unit = one.metres_per_unit;
+    ASSERT_TRUE(fuse_ply(in, out, settings_of("visible_only"), options));
+    const std::string bytes = test::file_bytes(out);
+    EXPECT_EQ(bytes, fused_in_memory(in, settings_of("visible_only"), options));
+    const std::string head = "ply\nformat binary_little_endian 1.0\ncomment written by Spectra\n";
+    EXPECT_EQ(bytes.substr(0, bytes.find("element")), head + one.written) << one.comments;
+    auto scene = read_ply(in, options);
+    auto again = read_ply(out);
+    ASSERT_TRUE(scene && again);
+    survey(scene.value(), options);
+    survey(again.value());
+    EXPECT_EQ(again.value().mesh.up, scene.value().mesh.up) << one.comments;
+    EXPECT_EQ(again.value().mesh.is_metric, scene.value().mesh.is_metric) << one.comments;
+    EXPECT_EQ(test::note_count(again.value(), "unit_told"), test::note_count(scene.value(), "unit_told"));
+    EXPECT_EQ(again.value().mesh.told.unit, scene.value().mesh.told.unit);
+  }
 }
 
 TEST(PlyFuse, ReportsWhatItDid) {

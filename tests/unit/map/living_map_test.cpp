@@ -148,10 +148,13 @@ TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
 TEST_F(LivingMapTest, IsNamedByTheBlockThatCameFirst) {
   mesh::MultispectralMesh mesh = terrain(1, 0);
   mesh.up = base::UpAxis::MinusY;
+  mesh.told = {mesh.up, "feet"};
   apply(put("m", std::move(mesh)));
   const auto scene = apply(put("a", terrain(2, 39)));
   EXPECT_EQ(scene->name(), "m.ply");
   EXPECT_EQ(scene->up(), base::UpAxis::MinusY);
+  EXPECT_EQ(scene->whole_mesh().told.up, base::UpAxis::MinusY);
+  EXPECT_EQ(scene->whole_mesh().told.unit, "feet");
 }
 
 TEST_F(LivingMapTest, SaysANoteOfAKindOnceHoweverManyBlocksHaveIt) {
