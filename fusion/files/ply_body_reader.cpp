@@ -1,6 +1,7 @@
 #include "fusion/files/ply_body_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -33,6 +34,10 @@ struct Box {
 bool is_position(const base::Vec3d& p) {
   return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
          std::abs(p.z) <= kLargestCoordinate;
+}
+
+bool is_float(double coordinate) {
+  return static_cast<double>(static_cast<float>(coordinate)) == coordinate;
 }
 
 }  // namespace
@@ -148,6 +153,11 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   sample_.conclude(interpretation_.metres_per_unit);
   facts_.bulk = sample_.bulk();
   facts_.origin = interpretation_.origin.value_or(scene_origin(facts_.min, facts_.max, facts_.bulk));
+  // Near 0 every number of a text has more digits than a float, and loses nothing that can be seen.
+  const std::array<double, 3> origin = {facts_.origin.x, facts_.origin.y, facts_.origin.z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    facts_.is_finer_than_declared = facts_.is_finer_than_declared || (origin[axis] != 0 && has_more_digits_[axis]);
+  }
   if (interpretation_.hole) return;
   facts_.hole = sample_.coordinate_hole();
   const auto& hole = sample_.hole();
@@ -163,6 +173,14 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
 
 /// Brings the positions to metres, and finds those that are none.
 void PlyBodyReader::judge_positions(std::span<base::Vec3d> positions, std::uint64_t first_vertex) {
+  if (header_.format == PlyFormat::Ascii) {
+    for (const base::Vec3d& p : positions) {
+      if (!is_position(p)) continue;
+      has_more_digits_[0] = has_more_digits_[0] || !is_float(p.x);
+      has_more_digits_[1] = has_more_digits_[1] || !is_float(p.y);
+      has_more_digits_[2] = has_more_digits_[2] || !is_float(p.z);
+    }
+  }
   if (const double metres = interpretation_.metres_per_unit; metres != 1) {
     for (base::Vec3d& p : positions) p = {p.x * metres, p.y * metres, p.z * metres};
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -42,6 +43,7 @@ class PlyBodyReader {
   std::vector<std::uint32_t> left_out_;  ///< Of the block.
   std::vector<base::Rgb8> colours_;
   std::vector<float> temperatures_;
+  std::array<bool, 3> has_more_digits_{};  ///< Of a text: coordinates that are no floats were seen.
   bool handler_has_failed_ = false;
 };
 

@@ -104,7 +104,7 @@ base::Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, 
   layout.vertex_count = stream.vertex_count();
   layout.triangle_count = facts.faces.triangle_count;
   layout.origin = facts.origin;
-  layout.double_positions = stream.has_double_positions();
+  layout.double_positions = stream.has_double_positions(facts);
   layout.has_temperature = stream.has_temperature();
   layout.comment = comment_of(told_coordinates(stream.header().comments, options));
   PlyEncoder encoder(layout, std::move(sink));

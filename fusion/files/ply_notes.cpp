@@ -150,17 +150,21 @@ class Notes {
       const float next = std::nextafter(stored, 0.0F);
       rounding = std::max(rounding, (static_cast<double>(stored) - static_cast<double>(next)) * options_.scale());
     }
-    // Float coordinates far from 0 have been rounded before they came here.
+    // Float coordinates far from 0 have been rounded before they came here, unless they are text.
     constexpr double kTooCoarse = 1.0 / 20'000;
     constexpr double kNoticed = 1e-5;  // metres
     if (facts_.origin != base::Vec3d{} && rounding > std::max(kNoticed, kTooCoarse * bulk.extent())) {
       add("rounded_positions", vertices_.count,
           "Positions are declared as floats and far from 0, where floats are rounded to " + short_number(rounding) +
-              " m; declare them as double, or write them closer to 0");
+              " m; " +
+              (facts_.is_finer_than_declared
+                   ? "this text has more digits than that, and all are kept, but other programs will lose them: "
+                   : "") +
+              "declare them as double, or write them closer to 0");
     }
     constexpr double kMillimetre = 0.001;
     const double kept = largest_rounding(bulk, facts_.origin);
-    if (!is_all_float && kept > kMillimetre) {
+    if ((!is_all_float || facts_.is_finer_than_declared) && kept > kMillimetre) {
       add("coarse_positions", vertices_.count,
           "Positions are kept as floats from " + number_text(facts_.origin.x) + " " + number_text(facts_.origin.y) +
               " " + number_text(facts_.origin.z) + ": the farthest of this large scene are off by up to " +

@@ -107,12 +107,11 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
   mesh.triangles().reserve(static_cast<std::size_t>(stream.triangle_count_limit()));
   mesh.has_visible = stream.has_visible();
   mesh.has_temperature = stream.has_temperature();
-  mesh.double_positions = stream.has_double_positions();
   mesh.name = path.filename().string();
 
-  // Doubles wait for the origin, which is known when all are read; floats can move there without loss, unless they are
-  // scaled.
-  const bool is_exact = mesh.double_positions || options.scale() != 1;
+  // Doubles, and text, wait for the origin, which is known when all are read; floats can move there without loss, unless
+  // they are scaled.
+  const bool is_exact = stream.has_double_positions() || stream.is_text() || options.scale() != 1;
   std::vector<base::Vec3d> exact_positions(is_exact ? mesh.vertex_count() : 0);
   std::size_t kept_count = 0;
   const auto keep = [&](const PlyVertexBlock& block, std::size_t begin, std::size_t end) {
@@ -168,6 +167,7 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
   exact_positions.resize(is_exact ? kept_count : 0);
 
   mesh.origin = facts.origin;
+  mesh.double_positions = stream.has_double_positions(facts);
   if (is_exact) {
     std::transform(exact_positions.begin(), exact_positions.end(), mesh.positions().begin(),
                    [&](const base::Vec3d& position) { return relative_to(mesh.origin, position); });

@@ -47,6 +47,8 @@ struct PlyBodyFacts {
   base::Vec3d min, max;      ///< Of all positions.
   std::optional<Bulk> bulk;  ///< Where nearly all of them are, when that is more than one place.
   base::Vec3d origin;        ///< What to tell them from, as scene_origin.hpp says.
+  /// Text whose coordinates, far from 0, have more digits than the floats that they are declared as: they are kept as doubles.
+  bool is_finer_than_declared = false;
   /// What stands for holes, found in this reading: PlyStream::leave_out_hole() takes it.
   std::optional<Hole> hole;
   FaceFacts faces;
@@ -87,8 +89,12 @@ class PlyStream {
   std::uint64_t triangle_count_limit() const;
   bool has_visible() const;
   bool has_temperature() const;
-  /// Some coordinate has a type that a float cannot hold.
+  /// Some coordinate has a type that a float cannot hold; or, as a reading has shown, is text with more digits than that.
   bool has_double_positions() const;
+  bool has_double_positions(const PlyBodyFacts& facts) const {
+    return has_double_positions() || facts.is_finer_than_declared;
+  }
+  bool is_text() const { return header_.format == PlyFormat::Ascii; }
 
   /// Reads the whole body from its beginning; may be called again.
   base::Result<PlyBodyFacts> read(const PlyHandlers& handlers);

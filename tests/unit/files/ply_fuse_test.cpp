@@ -110,6 +110,13 @@ TEST(PlyFuse, WritesHolesInTheirPlace) {
   EXPECT_EQ(out.value().mesh.left_out[1].visible, (base::Rgb8{9, 8, 7}));
 }
 
+TEST(PlyFuse, HasThemOfTextWithMoreDigitsThanItDeclares) {
+  const test::TemporaryFolder folder;
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex 2\n" + std::string(test::kXyz) + "end_header\n";
+  expect_same_bytes(folder, folder.write("fine.ply", head + "4512345.678 1.1 2\n4512345.111 1.2 3\n"), "visible_only");
+  expect_same_bytes(folder, folder.write("coarse.ply", head + "4512345.5 1.1 2\n4512346 1.2 3\n"), "visible_only");
+}
+
 /// Up and unit of a file as told, or as the options say, are those of what is written from it.
 TEST(PlyFuse, SaysAgainWhatWasToldOfTheCoordinates) {
   struct Case {

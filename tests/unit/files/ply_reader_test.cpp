@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <string>
 
 #include "allocation_meter.hpp"
 #include "fusion/files/ply_stream.hpp"
+#include "fusion/files/ply_writer.hpp"
 #include "loaded.hpp"
 
 namespace spectra::files {
@@ -459,6 +461,42 @@ TEST(PlyStream, EndsWithTheErrorOfAHandler) {
   ASSERT_FALSE(facts);
   EXPECT_EQ(facts.error().code, base::ErrorCode::FileUnwritable);
   EXPECT_EQ(facts.error().field, "out.ply");
+}
+
+/// "property float" of a text tells what wrote it, not what it wrote.
+TEST(PlyReader, KeepsEveryDigitOfATextFarFromZero) {
+  const auto scene = [](const std::string& type, const std::string& rows, const ReadOptions& options = {}) {
+    return test::loaded("ply\nformat ascii 1.0\nelement vertex 3\nproperty " + type + " x\nproperty " + type +
+                            " y\nproperty " + type + " z\nend_header\n" + rows,
+                        options);
+  };
+  const std::string utm = "691234.123 4512345.678 12.345\n691234.133 4512345.668 12.355\n691234.143 4512345.688 12\n";
+  const LoadedScene fine = scene("float", utm);
+  EXPECT_TRUE(fine.mesh.double_positions) << "an output keeps them, too";
+  const auto y = [](const LoadedScene& one, std::size_t v) {
+    return one.mesh.origin.y + static_cast<double>(one.mesh.positions()[v].y);
+  };
+  EXPECT_NEAR(y(fine, 0), 4512345.678, 1e-8);
+  EXPECT_NEAR(y(fine, 1), 4512345.668, 1e-8);
+  EXPECT_EQ(note_count(fine, "rounded_positions"), 3U);
+  EXPECT_EQ(test::loaded([&] {
+              std::ostringstream out;
+              EXPECT_TRUE(write_ply(out, fine.mesh, fine.mesh.visible()));
+              return out.str();
+            }())
+                .mesh.positions()[1],
+            fine.mesh.positions()[1]);
+  ReadOptions feet;
+  feet.metres_per_unit = 0.3048;
+  EXPECT_NEAR(y(scene("float", utm, feet), 1), 4512345.668 * 0.3048, 1e-6);
+
+  // Written by a program that had floats.
+  const LoadedScene rounded = scene("float", "691234.125 4512345.5 12\n691234.25 4512346 12\n691235 4512346 12\n");
+  EXPECT_FALSE(rounded.mesh.double_positions);
+  EXPECT_EQ(note_count(rounded, "rounded_positions"), 3U);
+  EXPECT_FALSE(scene("float", "0.1 0.2 0.3\n0.4 0.5 0.6\n0.7 0.8 0.9\n").mesh.double_positions) << "no origin";
+  EXPECT_FALSE(scene("float", "512 0.2 0.3\n512.5 0.5 0.6\n512.25 0.8 0.9\n").mesh.double_positions)
+      << "an origin on the axis of floats only";
 }
 
 }  // namespace
