@@ -7,6 +7,8 @@ import { drawn, openClient, screenshot, settled, startServer, test } from './har
 const SCREENS = [
   { width: 360, height: 740, touch: true },
   { width: 390, height: 844, touch: true },
+  // What is left of 1280 x 720 at a zoom of 200 %.
+  { width: 640, height: 360 },
   { width: 820, height: 1180, touch: true },
   { width: 1280, height: 720 },
   { width: 1440, height: 900 },
@@ -57,14 +59,36 @@ function boxes(page) {
           problems.push(`the status bar cuts ${name(item)}`);
       }
     }
-    // Numbers of the axis: a digit that the edge swallows makes 27.4 a 7.4.
-    for (const number of document.querySelectorAll('.axis svg text')) {
-      const box = number.getBoundingClientRect();
-      const edge = number.closest('svg').getBoundingClientRect();
-      if (box.left < edge.left - 0.5 || box.right > edge.right + 0.5) problems.push(`${name(number)} is cut by the axis`);
+    // Texts of the axis: a digit that the edge swallows makes 27.4 a 7.4, and two over each other are none.
+    const axis = document.querySelector('.axis');
+    const labels = texts
+      .filter((element) => axis?.contains(element) && !element.matches('.announced, .announced *'))
+      .map((element) => {
+        const range = document.createRange();
+        range.selectNodeContents(element);
+        return { of: name(element), box: range.getBoundingClientRect(), room: element.closest('svg, button, .axis') };
+      });
+    for (const { of, box, room } of labels) {
+      const edge = room.getBoundingClientRect();
+      if (
+        box.left < edge.left - 0.5 ||
+        box.right > edge.right + 0.5 ||
+        box.top < edge.top - 0.5 ||
+        box.bottom > edge.bottom + 0.5
+      )
+        problems.push(`${of} is cut by the axis: ${JSON.stringify(plain(box))} of ${JSON.stringify(plain(edge))}`);
     }
+    // The box of a text is a line high; two of its pixels at either end are empty under digits.
+    const emptyAbove = 2;
+    for (const [i, a] of labels.entries())
+      for (const b of labels.slice(i + 1)) {
+        const width = Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left);
+        const height = Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top);
+        if (width > 0.5 && height > emptyAbove)
+          problems.push(`${a.of} and ${b.of} of the axis lie over each other: ${width.toFixed(1)} x ${height.toFixed(1)}`);
+      }
     const parts = [
-      ...document.querySelectorAll('.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .card, .show'),
+      ...document.querySelectorAll('.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .strong, .card, .show'),
     ].filter(seen);
     for (const [i, a] of parts.entries())
       for (const b of parts.slice(i + 1)) {
@@ -123,7 +147,7 @@ export function addLayoutTests(browser) {
         await drawn(page);
         await look(`with a reading at the ${side}`);
       }
-      for (const method of ['colour_mapped_threshold', 'thermal_highlighting', 'histogram_bin']) {
+      for (const method of ['colour_mapped_threshold', 'thermal_highlighting', 'histogram_bin', 'thermal_change']) {
         await page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
         await settled(page, 180_000);
         await look(method);
@@ -138,10 +162,30 @@ export function addLayoutTests(browser) {
       await page.getByLabel('Show the controls').click();
       await page.locator('aside.panel').waitFor();
       assert.deepEqual(problems, []);
-      await context.close();
       await server.stop();
+      await page.getByText('Reconnecting').waitFor();
+      await look('without a link');
+      await context.close();
     });
   }
+
+  test('Nothing is cut and nothing lies over something else with two device pixels a pixel', async () => {
+    const server = await startServer(['--demo']);
+    const context = await browser.newContext({ viewport: SCREENS[0], deviceScaleFactor: 2 });
+    const { page, problems } = await openClient(context, server.url, null);
+    await settled(page, 180_000);
+    for (const { width, height } of SCREENS) {
+      // One page that changes its size, and no wait for the scene: that many pixels take long without a GPU.
+      await page.setViewportSize({ width, height });
+      await page.waitForFunction((wide) => globalThis.spectra.viewport.size[0] === wide, width);
+      for (let i = 0; i < 2; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+      assert.equal(await page.evaluate(() => devicePixelRatio), 2);
+      assert.deepEqual((await boxes(page)).problems, [], `${width} x ${height}`);
+    }
+    assert.deepEqual(problems, []);
+    await context.close();
+    await server.stop();
+  });
 
   test('One tab stop a group, arrow keys inside', async () => {
     const server = await startServer(['--demo']);

@@ -7,8 +7,13 @@ export interface Box {
   bottom: number;
 }
 
+const isTouched = typeof matchMedia === 'function' && matchMedia('(pointer: coarse)').matches;
+
 /** Width and height of the orientation gizmo: under a finger every ball is 44 px wide, and the whole so large that they stand apart. */
-export const GIZMO_SIZE = typeof matchMedia === 'function' && matchMedia('(pointer: coarse)').matches ? 148 : 76;
+export const GIZMO_SIZE = isTouched ? 148 : 76;
+
+/** Height of the status bar, which may hold a button; app.css has the same. */
+export const BAR_HEIGHT = isTouched ? 44 : 30;
 
 /** The panel becomes a sheet below the scene where it would leave too little beside it: phones, and tablets held upright. */
 export function isNarrow(width: number, height: number): boolean {
