@@ -256,6 +256,10 @@ export function addViewTests(browser, scratch) {
     await settled(page);
     assert.equal(await field.inputValue(), '31.5');
     assert.match(await page.locator('.axis').innerText(), /colours before blending/);
+    await page.locator('[data-parameter="alpha"] input[type=number]').fill('1');
+    await page.keyboard.press('Enter');
+    await settled(page);
+    assert.doesNotMatch(await page.locator('.axis').innerText(), /blending/, 'an opacity of 1 mixes nothing');
     assert.match(await page.locator('[data-fares]').innerText(), /^With all colours: .+\nRed-green blind: .+\nIn grey: .+$/);
     await field.fill('99');
     await field.press('Enter');
