@@ -97,6 +97,14 @@ function boxes(page) {
         const height = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
         if (width > 1 && height > 1) problems.push(`${name(a)} lies over ${name(b)}`);
       }
+    // The frame of a lost link is drawn over the scene, and over no number beside it.
+    const frame = document.querySelector('.stale')?.getBoundingClientRect();
+    for (const part of frame === undefined ? [] : document.querySelectorAll('.axis, .panel, footer')) {
+      const box = part.getBoundingClientRect();
+      const width = Math.min(frame.right, box.right) - Math.max(frame.left, box.left);
+      const height = Math.min(frame.bottom, box.bottom) - Math.max(frame.top, box.top);
+      if (seen(part) && width > 1 && height > 1) problems.push(`the frame of a lost link lies over ${name(part)}`);
+    }
     const targets = [
       ...document.querySelectorAll(
         'button, summary, label:has(> input), input:not(label > input), [role="button"], [role="slider"]',

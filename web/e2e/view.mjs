@@ -198,6 +198,77 @@ export function addViewTests(browser, scratch) {
     await server.stop();
   });
 
+  test('Odd scenes and a tiny window show a clear state each', async () => {
+    const header = (vertices, faces) =>
+      `ply\nformat ascii 1.0\nelement vertex ${vertices}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n` +
+      `property uchar green\nproperty uchar blue\nproperty float temperature\nelement face ${faces}\n` +
+      'property list uchar int vertex_indices\nend_header\n';
+    const sheet = (temperatures) =>
+      `${header(4, 2)}${temperatures.map((t, i) => `${i % 2} ${i >> 1} 0 200 180 140 ${t}`).join('\n')}\n3 0 1 2\n3 1 3 2\n`;
+    const scenes = {
+      'one temperature': { text: sheet([21.5, 21.5, 21.5, 21.5]), says: /low 21\.5.*high 21\.5/, axis: /all 21\.5/ },
+      'all missing': { text: sheet(['nan', 'nan', 'nan', 'nan']), says: /no thermal data/ },
+      'some missing': { text: sheet([20, 'nan', 30, 'nan']), says: /low 20\.0.*high 30\.0/, axis: /hottest 30\.0/, isGrey: true },
+      'one vertex': { text: `${header(1, 0)}1 2 3 200 180 140 25\n`, says: /1 of 1 vertices/, axis: /all 25\.0/ },
+      'two vertices': {
+        text: `${header(2, 0)}1 2 3 200 180 140 25\n2 2 3 20 180 140 30\n`,
+        says: /2 of 2 vertices/,
+        axis: /coldest 25\.0/,
+      },
+    };
+    const context = await browser.newContext({ viewport: { width: 1440, height: 720 } });
+    for (const [name, { text, says, axis, isGrey }] of Object.entries(scenes)) {
+      const file = join(scratch, 'odd.ply');
+      writeFileSync(file, text);
+      const server = await startServer([file]);
+      const { page, problems } = await openClient(context, server.url, null);
+      await settled(page);
+      const look = async (where) => {
+        const html = await page.locator('main').evaluate((main) => main.outerHTML);
+        assert.doesNotMatch(html, /NaN|undefined|Infinity|∞|\[object/, `${name} ${where}`);
+        assert.deepEqual(problems, [], `${name} ${where}`);
+      };
+      assert.match((await page.locator('footer').innerText()).replaceAll(/\s+/g, ' '), says, name);
+      if (axis === undefined) assert.equal(await page.locator('.axis').count(), 0, name);
+      else assert.match((await page.locator('.axis').innerText()).replaceAll(/\s+/g, ' '), axis, name);
+      await look('as it opens');
+      if (axis !== undefined) {
+        // Every method, every view, and the ways there.
+        for (const key of ['1', '2', '3', 'f', 'e', 'l', 'p', 'r']) {
+          await page.locator('canvas').press(key);
+          await settled(page);
+          if (key === '1' && isGrey) {
+            assert.match(await page.locator('[data-unmeasured]').innerText(), /no temperature/);
+            const place = await page.evaluate(() => globalThis.spectra.viewport.project([0.98, 0.5, 0]));
+            const [red, green, blue] = (await screenshot(page, 'unmeasured')).at(place.x, place.y);
+            assert.ok(Math.max(red, green, blue) - Math.min(red, green, blue) < 9, `${red} ${green} ${blue} is no grey`);
+          }
+        }
+        for (const method of isGrey ? [] : await page.evaluate(() => globalThis.spectra.store.methods.map(({ id }) => id))) {
+          await page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
+          await settled(page);
+          await look(method);
+        }
+      }
+      await page.setViewportSize({ width: 200, height: 150 });
+      await page.getByText('The controls need a larger window.').waitFor();
+      await page.waitForFunction(() => globalThis.spectra.viewport.size[0] === 200);
+      await drawn(page);
+      assert.equal(await page.locator('.axis, .panel, [aria-label="Orientation"]').count(), 0);
+      for (const part of ['footer', 'p.tiny']) {
+        const box = await page.locator(part).boundingBox();
+        assert.ok(box.x >= 0 && box.x + box.width <= 200 && box.y + box.height <= 150, `${part}: ${JSON.stringify(box)}`);
+      }
+      assert.equal((await page.locator('footer').innerText()).trim(), 'up to date');
+      await look('in a tiny window');
+      await page.setViewportSize({ width: 1440, height: 720 });
+      await page.locator('.panel').waitFor();
+      await page.close();
+      await server.stop();
+    }
+    await context.close();
+  });
+
   test('A lost graphics context is said, counted, and restored with everything', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);

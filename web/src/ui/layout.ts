@@ -20,6 +20,11 @@ export function isNarrow(width: number, height: number): boolean {
   return width < 720 || (width < 1100 && height > width);
 }
 
+/** Too small for controls: the scene and how old it is are all there is room for. */
+export function isTiny(width: number, height: number): boolean {
+  return width < 280 || height < 220;
+}
+
 /** How much larger the controls are on a screen of very many pixels; app.css has the same bound. */
 export function controlZoom(width: number): number {
   return width >= 2800 ? 1.5 : 1;

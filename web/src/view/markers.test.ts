@@ -49,6 +49,12 @@ describe('Markers', () => {
     expect(marks()).toEqual([]);
   });
 
+  it('marks nothing where all is of one temperature', () => {
+    const { markers, marks } = setUp(() => null);
+    markers.extremesAre({ ...extremes, coldest: { position: [4, 4, 0], temperature: 57 } });
+    expect(marks()).toEqual([]);
+  });
+
   it('marks as the hottest what the sensor could not tell any more', () => {
     const { markers, marks } = setUp(() => null);
     markers.extremesAre({ ...extremes, over_range: [5, 5, 0], under_range: [-5, 5, 0] });

@@ -97,6 +97,9 @@ export class Markers {
   }
 
   #marks(): Mark[] {
+    const [hottest, coldest] = KINDS.map((kind) => extremeOf(this.#extremes, kind));
+    // Where all is of one temperature, no place is the hottest.
+    if (hottest != null && hottest.temperature === coldest?.temperature) return [];
     const mark = (kind: Kind, of: Mark['of'], extreme: Extreme): Mark[] => {
       const place = this.#placeOf(extreme);
       if (place === null) return [];
