@@ -47,8 +47,9 @@ class BlockFile {
   void skip(std::uint64_t count);
   void seek(std::uint64_t position);
 
-  /// `watcher` is told, at every read of a block, the share of the file that lies before its end.
-  void set_watcher(std::function<void(double share)> watcher) { watcher_ = std::move(watcher); }
+  using Watcher = std::function<void(double share)>;
+  /// `watcher` is told, at every read of a block, the share of the file that lies before its end. Returns the one before.
+  Watcher set_watcher(Watcher watcher) { return std::exchange(watcher_, std::move(watcher)); }
 
   /// errno of the read that failed, or 0.
   int read_error() const { return read_error_; }
@@ -66,7 +67,7 @@ class BlockFile {
   std::size_t end_ = 0;
   int read_error_ = 0;
   std::vector<unsigned char> buffer_;
-  std::function<void(double)> watcher_;
+  Watcher watcher_;
 };
 
 }  // namespace spectra::files

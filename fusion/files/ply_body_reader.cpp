@@ -43,11 +43,12 @@ bool is_float(double coordinate) {
 }  // namespace
 
 PlyBodyReader::PlyBodyReader(BlockFile& file, const PlyHeader& header, const PlyInterpretation& interpretation,
-                             const PlyHandlers& handlers)
+                             const PlyHandlers& handlers, std::vector<base::Vec3f>& polygon_positions)
     : file_(file),
       header_(header),
       interpretation_(interpretation),
       handlers_(handlers),
+      polygon_positions_(polygon_positions),
       sample_(header.find("vertex")->count) {}
 
 base::Result<PlyBodyFacts> PlyBodyReader::read() {
@@ -62,14 +63,15 @@ base::Result<PlyBodyFacts> PlyBodyReader::read() {
   const bool has_faces_first = std::any_of(header_.elements.data(), vertices,
                                            [](const PlyElement& element) { return is_face_element(element); });
   PlyCursor cursor(file_, header_);
+  const auto positions = [this] { return polygon_positions(); };
   if (has_faces_first) {
     // Which faces are left out is known once the vertices are.
     PlyCursor first(file_, header_);
-    PlyFaceReader none(first, vertices->count, is_left_out_, handlers_.triangles);
+    PlyFaceReader none(first, vertices->count, is_left_out_, handlers_.triangles, positions);
     BOOST_OUTCOME_TRY(read_part(Part::Vertices, none, first));
     file_.seek(header_.size_bytes);
   }
-  PlyFaceReader faces(cursor, vertices->count, is_left_out_, handlers_.triangles);
+  PlyFaceReader faces(cursor, vertices->count, is_left_out_, handlers_.triangles, positions);
   const auto result = read_part(has_faces_first ? Part::Faces : Part::Everything, faces, cursor);
   handler_has_failed_ = handler_has_failed_ || faces.sink_has_failed();
   BOOST_OUTCOME_TRY(result);
@@ -115,6 +117,43 @@ base::Result<void> PlyBodyReader::read_vertices(PlyCursor& cursor, const PlyElem
     return base::failure(base::ErrorCode::BadValue, "no vertex has a position (a finite one, within 1e30 m)");
   }
   return base::success();
+}
+
+/// Told from the first of them: read once more, since few files have polygons, and kept for the next reading.
+base::Result<std::span<const base::Vec3f>> PlyBodyReader::polygon_positions() {
+  if (!polygon_positions_.empty()) return std::span<const base::Vec3f>(polygon_positions_);
+  const std::uint64_t place = file_.position();
+  auto watcher = file_.set_watcher({});
+  const auto read = [&]() -> base::Result<void> {
+    PlyCursor cursor(file_, header_);
+    const PlyElement* const vertices = header_.find("vertex");
+    for (const PlyElement* element = header_.elements.data(); element != vertices; ++element) {
+      cursor.begin_element(*element);
+      BOOST_OUTCOME_TRY(cursor.skip_element(*element));
+    }
+    cursor.begin_element(*vertices);
+    PlyVertexReader reader(cursor, *vertices, interpretation_.schema);
+    std::vector<base::Vec3f> positions;
+    positions.reserve(static_cast<std::size_t>(vertices->count));
+    std::optional<base::Vec3d> origin;
+    for (;;) {
+      BOOST_OUTCOME_TRY(const PlyRawVertices raw, reader.next());
+      if (raw.positions.empty()) break;
+      for (const base::Vec3d& in_file : raw.positions) {
+        const double metres = interpretation_.metres_per_unit;
+        const base::Vec3d p = {in_file.x * metres, in_file.y * metres, in_file.z * metres};
+        if (!origin && is_position(p)) origin = p;
+        positions.push_back(is_position(p) ? relative_to(*origin, p) : base::Vec3f{});
+      }
+    }
+    polygon_positions_ = std::move(positions);
+    return base::success();
+  };
+  const base::Result<void> result = read();
+  file_.seek(place);
+  file_.set_watcher(std::move(watcher));
+  BOOST_OUTCOME_TRY(result);
+  return std::span<const base::Vec3f>(polygon_positions_);
 }
 
 base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& element) {

@@ -14,9 +14,9 @@ namespace spectra::files {
 /// One reading of the body of a PLY file: the vertices first, then the faces, wherever they stand in it. Used once.
 class PlyBodyReader {
  public:
-  /// All of it outlives the reader.
+  /// All of it outlives the reader. `polygon_positions` is filled where a polygon needs it, and may be given again.
   PlyBodyReader(BlockFile& file, const PlyHeader& header, const PlyInterpretation& interpretation,
-                const PlyHandlers& handlers);
+                const PlyHandlers& handlers, std::vector<base::Vec3f>& polygon_positions);
   base::Result<PlyBodyFacts> read();
   /// The error of read() came from a handler: it is not about this file.
   bool handler_has_failed() const { return handler_has_failed_; }
@@ -31,11 +31,13 @@ class PlyBodyReader {
   base::Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
   void conclude_positions(const PlyFaceReader& faces);
   void convert_temperatures(const PlyRawVertices& raw);
+  base::Result<std::span<const base::Vec3f>> polygon_positions();
 
   BlockFile& file_;
   const PlyHeader& header_;
   const PlyInterpretation& interpretation_;
   const PlyHandlers& handlers_;
+  std::vector<base::Vec3f>& polygon_positions_;
   PlyBodyFacts facts_;
   PositionSample sample_;
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "fusion/files/ply_values.hpp"
 
@@ -46,8 +47,12 @@ std::uint64_t VertexBits::count() const {
 }
 
 PlyFaceReader::PlyFaceReader(PlyCursor& cursor, std::uint64_t vertex_count, const VertexBits& left_out,
-                             const Sink& sink)
-    : cursor_(cursor), vertex_count_(vertex_count), left_out_(left_out), sink_(sink) {
+                             const Sink& sink, Positions positions)
+    : cursor_(cursor),
+      vertex_count_(vertex_count),
+      left_out_(left_out),
+      sink_(sink),
+      fetch_positions_(std::move(positions)) {
   is_referenced_.resize(vertex_count);
   triangles_.reserve(kBlockTriangles);
 }
@@ -118,7 +123,7 @@ base::Result<void> PlyFaceReader::read_face(const PlyElement& element, std::size
     }
   }
   BOOST_OUTCOME_TRY(cursor_.end_entry());
-  return add_fan();
+  return add_face();
 }
 
 base::Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std::uint64_t vertex_count,
@@ -135,7 +140,7 @@ base::Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std:
   return base::success();
 }
 
-base::Result<void> PlyFaceReader::add_fan() {
+base::Result<void> PlyFaceReader::add_face() {
   if (corners_.size() < 3) {
     ++facts_.incomplete_face_count;
     return base::success();
@@ -145,15 +150,31 @@ base::Result<void> PlyFaceReader::add_fan() {
     ++facts_.left_out_face_count;
     return base::success();
   }
-  for (std::size_t i = 2; i < corners_.size(); ++i) {
-    const base::Triangle triangle = {corners_[0], corners_[i - 1], corners_[i]};
-    if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) {
-      ++facts_.degenerate_triangle_count;
-      continue;
-    }
-    BOOST_OUTCOME_TRY(add_triangle(triangle));
+  if (corners_.size() > 3) return add_polygon();
+  return add_triangle({corners_[0], corners_[1], corners_[2]});
+}
+
+base::Result<void> PlyFaceReader::add_polygon() {
+  ++facts_.polygon_count;
+  if (positions_.empty()) {
+    BOOST_OUTCOME_TRY(positions_, fetch_positions_());
   }
-  if (corners_.size() > 3) ++facts_.polygon_count;
+  corner_positions_.clear();
+  for (const std::uint32_t corner : corners_) corner_positions_.push_back(positions_[corner]);
+  const auto result = cutter_.cut(corner_positions_);
+  if (result == mesh::PolygonCutter::Result::Ears) {
+    for (const base::Triangle& ear : cutter_.triangles()) {
+      BOOST_OUTCOME_TRY(add_triangle({corners_[ear[0]], corners_[ear[1]], corners_[ear[2]]}));
+    }
+    return base::success();
+  }
+  if (result == mesh::PolygonCutter::Result::Failed) {
+    const bool is_large = corners_.size() > mesh::PolygonCutter::kMostCorners;
+    ++(is_large ? facts_.large_polygon_count : facts_.crossing_polygon_count);
+  }
+  for (std::size_t i = 2; i < corners_.size(); ++i) {
+    BOOST_OUTCOME_TRY(add_triangle({corners_[0], corners_[i - 1], corners_[i]}));
+  }
   return base::success();
 }
 
@@ -207,6 +228,10 @@ base::Result<void> PlyFaceReader::read_strip(const PlyProperty& list) {
 }
 
 base::Result<void> PlyFaceReader::add_triangle(const base::Triangle& triangle) {
+  if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0]) {
+    ++facts_.degenerate_triangle_count;
+    return base::success();
+  }
   triangles_.push_back(triangle);
   return triangles_.size() < kBlockTriangles ? base::success() : flush();
 }

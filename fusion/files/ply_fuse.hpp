@@ -24,7 +24,7 @@ struct FusedFile {
 
 /// Writes the PLY file `in`, fused, to `out` (which appears whole or not at all, and may be the same file) without ever
 /// holding it: one pass for the statistics, one more for a method that asks for a histogram, one to fuse and write. Memory
-/// is constant but for one bit a vertex. The bytes are those of read_ply(), FusionPlan::fuse() and write_ply(). Errors are
+/// is constant but for one bit a vertex, or 12 bytes where faces have more than three corners. The bytes are those of read_ply(), FusionPlan::fuse() and write_ply(). Errors are
 /// theirs too; safe on untrusted input. The progress of `options` is told of kReadingPhase, kHistogramPhase and kFusingPhase.
 base::Result<FusedFile> fuse_ply(const std::filesystem::path& in, const std::filesystem::path& out,
                                  const fusion::FusionSettings& settings, const ReadOptions& options = {});

@@ -60,9 +60,9 @@ std::vector<std::string> unused_names(const PlyElement& element, const PlySlots&
 }
 
 /// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
-constexpr std::array<std::string_view, 9> kNeedAttention = {
-    "hole_vertices", "crowded_place",  "rounded_positions", "coarse_positions",        "clamped_colours",
-    "texture",       "unused_options", "no_temperature",    "implausible_temperatures"};
+constexpr std::array<std::string_view, 11> kNeedAttention = {
+    "hole_vertices",  "crowded_place",  "rounded_positions",        "coarse_positions",  "clamped_colours", "texture",
+    "unused_options", "no_temperature", "implausible_temperatures", "crossing_polygons", "large_polygons"};
 
 class Notes {
  public:
@@ -418,8 +418,17 @@ class Notes {
     add("triangulated_strips", faces.strip_count,
         counted(faces.strip_count, "triangle strip", "triangle strips") + " cut into triangles");
     add("triangulated_polygons", faces.polygon_count,
-        counted(faces.polygon_count, "polygon", "polygons") +
-            " of more than three corners cut into triangles from the first corner, which is right for convex ones");
+        counted(faces.polygon_count, "polygon", "polygons") + " of more than three corners cut into triangles");
+    add("crossing_polygons", faces.crossing_polygon_count,
+        counted(faces.crossing_polygon_count, "polygon crosses itself", "polygons cross themselves") +
+            ": cut into fans from the first corner, which may cover what is outside; triangulate such polygons in the "
+            "program that made them");
+    add("large_polygons", faces.large_polygon_count,
+        counted(faces.large_polygon_count, "concave polygon", "concave polygons") + " of more than " +
+            std::to_string(mesh::PolygonCutter::kMostCorners) +
+            " corners cut into fans from the first corner, which cover what is outside; triangulate such polygons in "
+            "the "
+            "program that made them");
     add("degenerate_faces", faces.degenerate_triangle_count,
         counted(faces.degenerate_triangle_count, "triangle", "triangles") + " with the same vertex twice left out");
     add("incomplete_faces", faces.incomplete_face_count,

@@ -40,8 +40,8 @@ struct LoadedScene {
 /// - Temperature: a scalar whose name says so, or that the options name, of the vertices or the faces. Scaled to degC as the
 ///   options say. NaN, at or below -273.15 degC, or a value that the options name: missing (NaN). +inf and what is beyond
 ///   the largest float is +inf (over range), -inf stays -inf.
-/// - Faces: the list vertex_indices or vertex_index, and triangle strips. Polygons are cut into fans from their first
-///   corner; triangles with a vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are
+/// - Faces: the list vertex_indices or vertex_index, and triangle strips. Polygons are cut into triangles as polygon_cutter.hpp
+///   says; triangles with a vertex twice and faces of fewer than three corners are left out. Vertices of no triangle are
 ///   kept.
 /// Everything else is skipped. What was guessed, cut, left out, converted or skipped is in the notes.
 /// Errors: those of check_read_options(), FileNotFound, FileUnreadable, BadHeader, Truncated, BadValue (also for an empty scene), Unsupported, TooLarge;

@@ -137,7 +137,7 @@ bool PlyStream::has_double_positions() const {
 }
 
 base::Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
-  PlyBodyReader reader(file_, header_, interpretation_, handlers);
+  PlyBodyReader reader(file_, header_, interpretation_, handlers, polygon_positions_);
   base::Result<PlyBodyFacts> facts = reader.read();
   return reader.handler_has_failed() ? std::move(facts) : located(with_reason(std::move(facts)), name_);
 }

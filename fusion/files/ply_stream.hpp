@@ -37,7 +37,7 @@ struct PlyVertexBlock {
 /// empty one is not called.
 struct PlyHandlers {
   std::function<base::Result<void>(const PlyVertexBlock&)> vertices;
-  /// Triangles as they will be drawn: polygons cut into fans, strips into triangles, indices checked and of the file's
+  /// Triangles as they will be drawn: polygons cut into triangles, strips into triangles, indices checked and of the file's
   /// order, none with a vertex twice or one that is left out.
   std::function<base::Result<void>(std::span<const base::Triangle>)> triangles;
 };
@@ -75,7 +75,8 @@ struct PlyInterpretation {
   std::optional<Hole> hole;           ///< Vertices there are no part of the scene.
 };
 
-/// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (and what ply_survey() says): the
+/// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (12 bytes where faces have more than
+/// three corners; and what ply_survey() says): the
 /// ground of read_ply(), and the way to work on files larger than memory. Safe on untrusted input. What is accepted, and what
 /// colours and temperatures are recognised, is told at read_ply().
 class PlyStream {
@@ -119,6 +120,7 @@ class PlyStream {
   ReadOptions options_;
   PlyHeader header_;
   PlyInterpretation interpretation_;
+  std::vector<base::Vec3f> polygon_positions_;  ///< Of all vertices, once a polygon has needed them.
 };
 
 }  // namespace spectra::files

@@ -117,6 +117,19 @@ TEST(PlyFuse, HasThemOfTextWithMoreDigitsThanItDeclares) {
   expect_same_bytes(folder, folder.write("coarse.ply", head + "4512345.5 1.1 2\n4512346 1.2 3\n"), "visible_only");
 }
 
+TEST(PlyFuse, HasThemOfConcavePolygons) {
+  const test::TemporaryFolder folder;
+  const std::string head = "ply\nformat ascii 1.0\n";
+  const std::string vertices = "element vertex 7\n" + std::string(test::kXyz) + "property float temperature\n";
+  const std::string faces = "element face 2\n" + std::string(test::kFaces);
+  const std::string vertex_lines = "9 9 nan 1\n0 0 0 1\n3 0 0 2\n3 1 0 3\n1 1 0 4\n1 3 0 5\n0 3 0 6\n";
+  const std::string face_lines = "6 2 3 4 5 6 1\n4 3 4 5 2\n";
+  expect_same_bytes(folder, folder.write("a.ply", head + vertices + faces + "end_header\n" + vertex_lines + face_lines),
+                    "histogram_bin");
+  expect_same_bytes(folder, folder.write("b.ply", head + faces + vertices + "end_header\n" + face_lines + vertex_lines),
+                    "thermal_only");
+}
+
 /// Up and unit of a file as told, or as the options say, are those of what is written from it.
 TEST(PlyFuse, SaysAgainWhatWasToldOfTheCoordinates) {
   struct Case {

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "allocation_meter.hpp"
 #include "fusion/files/ply_stream.hpp"
@@ -247,6 +250,59 @@ TEST(PlyReader, CutsPolygonsIntoFans) {
   EXPECT_EQ(scene.mesh.triangles(),
             (std::vector<base::Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 1, 3}, {0, 3, 4}}));
   EXPECT_EQ(note_count(scene, "triangulated_polygons"), 2U);
+}
+
+/// An L from its outer end, an arrow from its wing, a bow tie: in text and binary, faces before and after the vertices, at
+/// map coordinates, and with a vertex that is left out before them.
+TEST(PlyReader, CutsConcavePolygonsAlongTheirInside) {
+  const std::vector<std::array<double, 2>> points = {{0, 0}, {3, 0}, {3, 1}, {1, 1}, {1, 3}, {0, 3}, {2, 2}, {4, 2}};
+  const std::vector<std::vector<int>> faces = {{1, 2, 3, 4, 5, 0}, {1, 2, 3}, {1, 3, 5, 0}, {6, 0, 7, 1}};
+  const auto area = [](const LoadedScene& scene, const base::Triangle& t) {
+    const auto p = [&](std::size_t corner) { return scene.mesh.positions()[t[corner]]; };
+    return (p(1).x - p(0).x) * (p(2).y - p(0).y) - (p(1).y - p(0).y) * (p(2).x - p(0).x);
+  };
+  for (const bool is_text : {true, false}) {
+    for (const bool has_faces_first : {false, true}) {
+      for (const double away : {0.0, 4'500'000.0}) {
+        std::string vertices, text_faces;
+        PlyBytes vertex_bytes, face_bytes;
+        for (std::size_t v = 0; v <= points.size(); ++v) {
+          const double x = v == 0 ? std::nan("") : points[v - 1][0] + away, y = v == 0 ? 0 : points[v - 1][1] - away;
+          vertices += (v == 0 ? "nan" : std::to_string(x)) + " " + std::to_string(y) + " 0\n";
+          vertex_bytes.le(x).le(y).le(0.0);
+        }
+        for (const auto& face : faces) {
+          text_faces += std::to_string(face.size());
+          face_bytes.le(static_cast<std::uint8_t>(face.size()));
+          for (const int corner : face) {
+            text_faces += " " + std::to_string(corner + 1);
+            face_bytes.le(corner + 1);
+          }
+          text_faces += "\n";
+        }
+        const std::string vertex_head = "element vertex 9\nproperty double x\nproperty double y\nproperty double z\n";
+        const std::string face_head = "element face 4\n" + std::string(kFaces);
+        std::string bytes = std::string("ply\nformat ") + (is_text ? "ascii" : "binary_little_endian") + " 1.0\n" +
+                            (has_faces_first ? face_head + vertex_head : vertex_head + face_head) + "end_header\n";
+        const std::string body_faces = is_text ? text_faces : face_bytes.bytes();
+        const std::string body_vertices = is_text ? vertices : vertex_bytes.bytes();
+        bytes += has_faces_first ? body_faces + body_vertices : body_vertices + body_faces;
+        const LoadedScene scene = loaded(bytes);
+        ASSERT_EQ(scene.mesh.triangle_count(), 9U);
+        double l_area = 0;
+        for (std::size_t t = 0; t < 4; ++t) {
+          const double one = static_cast<double>(area(scene, scene.mesh.triangles()[t]));
+          EXPECT_GE(one, 0);
+          l_area += one / 2;
+        }
+        EXPECT_NEAR(l_area, 5, 1e-3) << "a fan from that corner would cover more";
+        EXPECT_EQ(scene.mesh.triangles()[4], (base::Triangle{1, 2, 3}));
+        EXPECT_EQ(note_count(scene, "triangulated_polygons"), 3U);
+        EXPECT_EQ(note_count(scene, "crossing_polygons"), 1U);
+        EXPECT_EQ(note_count(scene, "large_polygons"), 0U);
+      }
+    }
+  }
 }
 
 TEST(PlyReader, LeavesOutFacesWithoutAreaAndSaysSo) {
