@@ -177,6 +177,20 @@ export function addLayoutTests(browser) {
     });
   }
 
+  test('On a phone too, the marks tell the hottest of all that is seen', async () => {
+    const server = await startServer(['--demo']);
+    const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+    const { page } = await openClient(context, server.url, null);
+    await settled(page);
+    // The hottest place is beside the orientation, and nothing stands in front of it.
+    await page.locator('[data-mark="hottest"][data-of="scene"]:not(.hidden)').waitFor();
+    // Marks of what is in view come once the camera has rested.
+    await page.waitForTimeout(1000);
+    assert.equal(await page.locator('[data-mark="hottest"]').count(), 1);
+    await context.close();
+    await server.stop();
+  });
+
   test('Nothing is cut and nothing lies over something else with two device pixels a pixel', async () => {
     const server = await startServer(['--demo']);
     const context = await browser.newContext({ viewport: SCREENS[0], deviceScaleFactor: 2 });

@@ -58,6 +58,11 @@ describe('labelPlaces', () => {
     expect(second).toEqual({ left: 263, top: 94 });
   });
 
+  it('lies not over what is kept free', () => {
+    const kept = [{ left: 210, top: 80, right: 320, bottom: 120 }];
+    expect(labelPlaces([label(200, 100)], room, 13, kept)).toEqual([{ left: 107, top: 90 }]);
+  });
+
   it('is left out where there is no room', () => {
     expect(labelPlaces([label(110, 10)], { ...room, right: 150, bottom: 20 }, 13)).toEqual([null]);
   });

@@ -55,19 +55,18 @@ function clamp(value: number, low: number, high: number): number {
 
 /**
  * Left and top of labels beside their places, in order: right, left, above or below, wherever a label is within `room` and lies over
- * none that has been set before; null where there is no such place.
+ * none that has been set before, nor over what is `kept` free; null where there is no such place.
  */
 export function labelPlaces(
   labels: readonly { x: number; y: number; width: number; height: number }[],
   room: Box,
   gap: number,
+  kept: readonly Box[] = [],
 ): ({ left: number; top: number } | null)[] {
-  const taken: Box[] = labels.map(({ x, y }) => ({
-    left: x - gap / 2,
-    top: y - gap / 2,
-    right: x + gap / 2,
-    bottom: y + gap / 2,
-  }));
+  const taken: Box[] = [
+    ...kept,
+    ...labels.map(({ x, y }) => ({ left: x - gap / 2, top: y - gap / 2, right: x + gap / 2, bottom: y + gap / 2 })),
+  ];
   return labels.map(({ x, y, width, height }) => {
     const sides = [
       { left: x + gap, top: y - height / 2 },
