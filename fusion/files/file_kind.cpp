@@ -1,6 +1,7 @@
 #include "fusion/files/file_kind.hpp"
 
 #include <array>
+#include <cstddef>
 
 namespace spectra::files {
 
@@ -44,6 +45,10 @@ constexpr std::array<Kind, 23> kKinds = {{
 }  // namespace
 
 std::string_view file_kind(std::string_view first_bytes) {
+  constexpr std::size_t kTarMark = 257;
+  if (first_bytes.size() > kTarMark && first_bytes.substr(kTarMark).starts_with("ustar")) {
+    return "a tar archive: unpack it first";
+  }
   for (const Kind& kind : kKinds) {
     if (first_bytes.starts_with(kind.beginning)) return kind.name;
   }

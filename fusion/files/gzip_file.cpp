@@ -45,12 +45,12 @@ base::Result<GzipFile> GzipFile::open(int descriptor, std::uint64_t packed_bytes
     int status = Z_OK;
     ::gzerror(opened, &status);
     if (status == Z_BUF_ERROR) {
-      return base::failure(base::ErrorCode::Truncated, "the gzip data end early, after " +
-                                                           std::to_string(file.unpacked_bytes_) + " unpacked bytes");
+      return base::failure(base::ErrorCode::Truncated,
+                           "the gzip data end early: the file was cut; copy it again whole");
     }
     if (count < 0 || status != Z_OK) {
-      return base::failure(base::ErrorCode::BadValue, "the gzip data are damaged after " +
-                                                          std::to_string(file.unpacked_bytes_) + " unpacked bytes");
+      return base::failure(base::ErrorCode::BadValue,
+                           "the gzip data are damaged: copy the file again, as binary, or pack it again");
     }
     if (count == 0) break;
     file.unpacked_bytes_ += static_cast<std::uint64_t>(count);

@@ -9,6 +9,12 @@ namespace spectra::files {
 namespace {
 
 constexpr double kCelsiusAtZeroKelvin = -273.15;
+/// Factors outside of 1/kMost .. kMost are slips: nanometres and light years are inside, what comes out of the others overflows.
+constexpr double kMost = 1e16;
+
+bool is_sensible(double factor) {
+  return factor >= 1 / kMost && factor <= kMost;
+}
 
 CelsiusScale scale_of(TemperatureUnit unit) {
   switch (unit) {
@@ -49,12 +55,16 @@ base::Result<void> check_read_options(const ReadOptions& options) {
     return base::failure(base::ErrorCode::Inconsistent,
                          "temperature-unit excludes temperature-scale and temperature-offset", "temperature_unit");
   }
-  if (options.temperature_scale && (!std::isfinite(*options.temperature_scale) || *options.temperature_scale == 0)) {
-    return base::failure(base::ErrorCode::OutOfRange, "temperature-scale is a finite number other than 0",
+  if (options.temperature_scale && !is_sensible(std::abs(*options.temperature_scale))) {
+    return base::failure(base::ErrorCode::OutOfRange,
+                         "temperature-scale is the degC in one unit of the file, from 1e-16 to 1e16 or negative: "
+                         "0.01 for hundredths of a degree",
                          "temperature_scale");
   }
-  if (options.temperature_offset && !std::isfinite(*options.temperature_offset)) {
-    return base::failure(base::ErrorCode::OutOfRange, "temperature-offset is a finite number", "temperature_offset");
+  if (options.temperature_offset && !(std::abs(*options.temperature_offset) <= kMost)) {
+    return base::failure(base::ErrorCode::OutOfRange,
+                         "temperature-offset is a number of degC, at most 1e16: -273.15 for kelvin",
+                         "temperature_offset");
   }
   for (const double value : options.no_data) {
     if (std::isnan(value)) {
@@ -62,9 +72,10 @@ base::Result<void> check_read_options(const ReadOptions& options) {
                            "no_data");
     }
   }
-  if (!std::isfinite(options.scale()) || options.scale() <= 0) {
+  if (!is_sensible(options.scale())) {
     return base::failure(base::ErrorCode::OutOfRange,
-                         "scale is the metres in one unit of the file, a finite number above 0", "scale");
+                         "scale is the metres in one unit of the file, from 1e-16 to 1e16: 0.001 for millimetres",
+                         "scale");
   }
   return base::success();
 }

@@ -12,6 +12,7 @@
 #include <variant>
 
 #include "fusion/demo/demo_scene.hpp"
+#include "fusion/files/ply_values.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/config_file.hpp"
@@ -51,9 +52,17 @@ void add_reading(CLI::App& command, files::ReadOptions& options) {
   };
   command.add_option_function<std::string>("--up", set_up, "Which way is up: x, y, z, -x, -y, -z or auto");
   const CLI::Validator is_something([](const std::string& text) { return text.empty() ? "it is empty" : ""; }, "");
-  for (const char* name :
-       {"--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
-    command.get_option(name)->check(is_something);
+  const CLI::Validator is_number(
+      [](const std::string& text) -> std::string {
+        if (text.empty()) return "it is empty";
+        if (files::parse_number(text)) return {};
+        const bool has_comma = text.find(',') != std::string::npos;
+        return text + " is no number" + (has_comma ? "; write it with a decimal point" : "");
+      },
+      "");
+  command.get_option("--temperature-property")->check(is_something);
+  for (const char* name : {"--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
+    command.get_option(name)->check(is_number);
   }
 }
 

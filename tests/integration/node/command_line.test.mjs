@@ -37,6 +37,8 @@ test("wrong usage is 2 and names what is wrong", () => {
   fails(2, /listen|address|port/i, "serve", "--listen", "127.0.0.1:99999");
   for (const option of ["--scale", "--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data"]) {
     fails(2, new RegExp(`${option}: it is empty`), "info", demo, option, "");
+    if (option === "--temperature-property") continue;
+    fails(2, new RegExp(`${option}: 1,5 is no number; write it with a decimal point`), "info", demo, option, "1,5");
   }
 });
 

@@ -629,7 +629,8 @@ TEST(FieldKinds, OtherFilesAreCalledByTheirNames) {
       {"<html>", "HTML"},
       {"OFF\n3 1 0\n", "OFF"},
       {std::string("\xff\xfep\0l\0y\0\n\0", 10), "UTF-16"},
-      {"version https://git-lfs.github.com/spec/v1\n", "Git LFS"}};
+      {"version https://git-lfs.github.com/spec/v1\n", "Git LFS"},
+      {"scene.ply" + std::string(248, '\0') + "ustar" + std::string(250, '\0'), "tar"}};
   for (const auto& [bytes, name] : files) {
     const auto scene = test::read_bytes(bytes);
     ASSERT_FALSE(scene);
@@ -712,7 +713,16 @@ TEST(FieldKinds, GzipIsUnpackedWithinBounds) {
   const auto cut = test::read_bytes(std::string_view(packed).substr(0, packed.size() / 2));
   ASSERT_FALSE(cut);
   EXPECT_EQ(cut.error().code, base::ErrorCode::Truncated);
-  EXPECT_NE(cut.error().message.find("gzip"), std::string::npos) << cut.error().message;
+  EXPECT_NE(cut.error().message.find("gzip data end early: the file was cut"), std::string::npos)
+      << cut.error().message;
+  for (const std::size_t size : {std::size_t{2}, std::size_t{9}, packed.size() - 8, packed.size() - 1}) {
+    const auto shorter = test::read_bytes(std::string_view(packed).substr(0, size));
+    ASSERT_FALSE(shorter) << size;
+    EXPECT_EQ(shorter.error().code, base::ErrorCode::Truncated) << size;
+  }
+  const auto twice = test::read_bytes(gzipped(packed));
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().message.find("gzip data: unpack it first"), std::string::npos) << twice.error().message;
   std::string damaged = packed;
   damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 0x55);
   const auto broken = test::read_bytes(damaged);

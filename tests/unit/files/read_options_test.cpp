@@ -127,7 +127,7 @@ TEST(ReadOptions, ScalePositions) {
 TEST(ReadOptions, AreRefusedWhenTheyCannotBeMeant) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  std::vector<ReadOptions> bad(8);
+  std::vector<ReadOptions> bad(15);
   bad[0].temperature_scale = 0;
   bad[1].temperature_scale = infinity;
   bad[2].temperature_offset = nan;
@@ -137,11 +137,28 @@ TEST(ReadOptions, AreRefusedWhenTheyCannotBeMeant) {
   bad[6].metres_per_unit = infinity;
   bad[7].temperature_unit = TemperatureUnit::Kelvin;
   bad[7].temperature_offset = 1;
+  bad[8].metres_per_unit = nan;
+  bad[9].metres_per_unit = 1e300;
+  bad[10].metres_per_unit = 1e-300;
+  bad[11].temperature_scale = -1e300;
+  bad[12].temperature_scale = 1e-300;
+  bad[13].temperature_scale = nan;
+  bad[14].temperature_offset = -1e308;
   for (std::size_t i = 0; i < bad.size(); ++i) {
     const auto scene = test::read_bytes(cloud("float temperature", {"20"}), bad[i]);
     ASSERT_FALSE(scene) << i;
     EXPECT_LT(static_cast<int>(scene.error().code), static_cast<int>(base::ErrorCode::FileNotFound)) << i;
     EXPECT_FALSE(scene.error().field.empty()) << i;
+  }
+}
+
+TEST(ReadOptions, LengthsFromAtomsToLightYearsAreTaken) {
+  for (const double metres : {1e-10, 9.46e15}) {
+    ReadOptions options;
+    options.metres_per_unit = metres;
+    const LoadedScene scene = loaded(cloud("float temperature", {"20"}), options);
+    EXPECT_EQ(scene.mesh.origin.x + static_cast<double>(scene.mesh.positions()[0].x), 1000 * metres);
+    EXPECT_TRUE(scene.notes.empty());
   }
 }
 
