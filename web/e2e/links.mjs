@@ -17,6 +17,9 @@ function sample(image) {
 /** Of the client itself, everything up to the first picture, headers with it. */
 const LARGEST_CLIENT_BYTES = 210_000;
 
+/** And of all that a first visit loads, methods and palettes and what makes colours in the browser with it. */
+const LARGEST_VISIT_BYTES = 400_000;
+
 /**
  * What a link of 1 Mbit/s and 200 ms may take for everything up to the first picture, by its bytes and round trips: two for the page, one
  * for what it asks for, one from scene.subscribe to the first tile.
@@ -152,6 +155,23 @@ export function addLinkTests(browser) {
       times.some((picture_ms) => picture_ms <= LONGEST_TO_PICTURE_MS),
       `on the screen after ${times.join(', ')} ms`,
     );
+    const { page } = await openClient(browser, server.url, undefined, { fusing: 'automatic' });
+    await settled(page);
+    await page.waitForFunction(
+      () => globalThis.spectra.store.fusingPlace === 'here' && globalThis.spectra.store.palettes.length > 0,
+    );
+    // What a worker was the first to ask for counts as transferred with nothing: its body does.
+    const visit_bytes = await page.evaluate(() =>
+      ['navigation', 'resource']
+        .flatMap((kind) => performance.getEntriesByType(kind))
+        .reduce((sum, { transferSize, encodedBodySize }) => sum + Math.max(transferSize, encodedBodySize), 0),
+    );
+    console.log(`        a first visit loads ${visit_bytes} bytes`);
+    assert.ok(
+      visit_bytes > LARGEST_CLIENT_BYTES && visit_bytes < LARGEST_VISIT_BYTES,
+      `a first visit loads ${visit_bytes} bytes`,
+    );
+    await page.close();
     await server.stop();
   });
 
