@@ -503,7 +503,11 @@ test('A scene without thermal data says so and shows the visible colours', async
   assert.deepEqual(image.at(place.x, place.y), [40, 90, 200]);
   assert.equal(await tab.locator('section.axis').count(), 0);
   assert.ok(await tab.getByRole('radio', { name: 'Thermal' }).isDisabled());
-  assert.match(await tab.locator('main').innerText(), /no t(hermal|emperature)/i);
+  const notice = tab.locator('[data-no-thermal]');
+  assert.match(await notice.innerText(), /no thermal data/);
+  await notice.getByRole('button', { name: 'Close this note' }).click();
+  await notice.waitFor({ state: 'detached' });
+  assert.match(await tab.locator('footer').innerText(), /no thermal data/);
   assert.deepEqual(tabProblems, []);
   await tab.close();
   await other.stop();
