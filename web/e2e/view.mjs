@@ -437,6 +437,62 @@ export function addViewTests(browser, scratch) {
     await server.stop();
   });
 
+  test('In a point cloud, highlights are outlined, marks are seen where they are, and points have a size of their own', async () => {
+    const points = [];
+    for (let i = 0; i < 160; i += 1) {
+      for (let j = 0; j < 160; j += 1) {
+        const [x, y] = [i / 40, j / 40];
+        const isWarm = Math.hypot(x - 2, y - 2) < 0.5;
+        points.push(`${x} ${y} 0 110 100 90 ${isWarm ? 36 : 20 + Math.sin(i * 7 + j * 3)}`);
+      }
+    }
+    const file = join(scratch, 'cloud.ply');
+    writeFileSync(
+      file,
+      `ply\nformat ascii 1.0\nelement vertex ${points.length}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n` +
+        `property uchar green\nproperty uchar blue\nproperty float temperature\nend_header\n${points.join('\n')}\n`,
+    );
+    const server = await startServer([file]);
+    const { page, problems } = await openClient(browser, server.url);
+    await settled(page);
+    assert.match(await page.locator('[data-highlight]').innerText(), /of the points/);
+    // Once the camera rests it is known what is in front of the marked places.
+    await page.locator('[data-mark="hottest"][data-of="scene"]:not(.hidden)').waitFor();
+    await page.locator('[data-mark="coldest"][data-of="scene"]:not(.hidden)').waitFor();
+    await page.evaluate(() => (globalThis.spectra.store.marksShown = false));
+    const picture = async (outline) => {
+      await page.locator(`[data-outline="${outline}"]`).click();
+      await settled(page);
+      return screenshot(page, `cloud-outline-${outline}`);
+    };
+    const [outlined, plain] = [await picture('on'), await picture('off')];
+    const found = { light: 0, dark: 0 };
+    for (let x = 200; x < 1100; x += 1) {
+      for (let y = 40; y < 860; y += 1) {
+        const [pixel, before] = [outlined.at(x, y), plain.at(x, y)];
+        if (Math.max(...pixel.map((value, channel) => Math.abs(value - before[channel]))) < 40) continue;
+        if (Math.min(...pixel) > 180) found.light += 1;
+        else if (Math.max(...pixel) < 75) found.dark += 1;
+      }
+    }
+    assert.ok(found.light > 100 && found.dark > 100, `the outline has ${found.light} light and ${found.dark} dark pixels`);
+    // Small points let the background through.
+    const ground = (image) => {
+      let count = 0;
+      for (let x = 500; x < 800; x += 1) for (let y = 430; y < 470; y += 1) count += Math.max(...image.at(x, y)) < 40 ? 1 : 0;
+      return count;
+    };
+    await page.locator('#point-diameter').fill('0.002');
+    await page.keyboard.press('Enter');
+    await settled(page);
+    const small = await screenshot(page, 'cloud-small-points');
+    assert.ok(ground(small) > ground(plain) + 1000, `${ground(small)} pixels of ground, ${ground(plain)} before`);
+    assert.match(await page.locator('label[for="point-diameter"] ~ *').last().innerText(), /units/);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
   test('A slow machine draws less while the camera moves, and everything at rest', async () => {
     const server = await startServer(['--demo']);
     const { page } = await openClient(browser, server.url);

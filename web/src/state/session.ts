@@ -22,7 +22,7 @@ import { Connection, ConnectionLost } from '../transport/connection';
 import { FirstLook } from '../view/first_look';
 import { flightTo } from '../view/flight';
 import { highlightContrast } from '../view/highlight_contrast';
-import { Markers, type Window } from '../view/markers';
+import { FLATTEST, MARK_REACH_PX, Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
 import { Fusing, type FusingWish } from './fusing';
 import { Progress } from './progress';
@@ -115,7 +115,9 @@ export class Session {
       (depth) => {
         const drawn_m = Math.max((store.quality?.position_step_mm ?? 0) / 1000, store.drawnError?.position_m ?? 0);
         const pixel_m = (2 * depth * Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360)) / this.viewport.size[1];
-        return Math.max(2 * drawn_m, pixel_m);
+        // A point is drawn as a disc, which sticks out of the sheet that it lies in.
+        const disc_m = store.scene?.point_cloud === true ? (MARK_REACH_PX * pixel_m) / FLATTEST : 0;
+        return Math.max(2 * drawn_m, pixel_m, disc_m);
       },
       (camera, window) => this.readings.extremesInView(camera, window),
       (marks) => {

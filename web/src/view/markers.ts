@@ -5,7 +5,7 @@ export interface Marking {
   readonly pose: CameraPose;
   readonly size: [number, number];
   project(point: Vec3): { x: number; y: number; depth: number } | null;
-  pick(x: number, y: number): Promise<Vec3 | null>;
+  pick(x: number, y: number, reach_px: number): Promise<Vec3 | null>;
 }
 
 /** How far what is drawn at a place may be from the place itself, metres; `depth`: distance from the camera. */
@@ -40,6 +40,10 @@ export function extremeOf(extremes: Extremes | null, kind: Kind): Extreme | null
 
 /** Casting rays through the scene is work, and so is finding what is seen: it waits until the camera rests. */
 const REST_MS = 250;
+/** Radius of the points of a cloud that may hide a marked place. */
+export const MARK_REACH_PX = 1.5;
+/** Tangent of the flattest angle at which a sheet of points is looked at and still hides nothing of itself. */
+export const FLATTEST = 1 / 4;
 const KINDS = ['hottest', 'coldest'] as const;
 
 /** Marks the hottest and the coldest place of the scene, and of what is on the screen once the camera rests. */
@@ -125,7 +129,7 @@ export class Markers {
       const extreme = extremeOf(this.#extremes, kind);
       const place = extreme && this.#placeOf(extreme);
       if (extreme === null || place === null) continue;
-      const hit = await this.viewport.pick(place.x, place.y);
+      const hit = await this.viewport.pick(place.x, place.y, MARK_REACH_PX);
       if (check !== this.#check) return;
       const { eye } = this.viewport.pose;
       const away = (point: Vec3) => Math.hypot(point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]);

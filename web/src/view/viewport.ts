@@ -306,15 +306,15 @@ export class Viewport {
     });
   }
 
-  /** Point of the scene under a place on the canvas (CSS pixels from its corner), or null. */
-  async pick(x: number, y: number): Promise<Vec3 | null> {
+  /** Point of the scene under a place on the canvas (CSS pixels from its corner), or null; points of a cloud have a radius of `reach_px`. */
+  async pick(x: number, y: number, reach_px = 4): Promise<Vec3 | null> {
     const [width, height] = this.#size;
     const [right, top] = this.#tangents;
     const { eye } = this.#look;
     const across: Vec3 = [((x / width) * 2 - 1) * right, (1 - (y / height) * 2) * top, -1];
     const length = Math.hypot(...across);
     const direction = directionInScene(this.#look, across.map((value) => value / length) as Vec3);
-    const cone = (4 * top * 2) / height;
+    const cone = (reach_px * top * 2) / height;
     const reply = await this.#ask((id) => ({ kind: 'pick', id, ray: { origin: eye, direction }, cone }));
     if (reply.kind !== 'picked' || reply.distance === null) return null;
     const { distance } = reply;
