@@ -4,6 +4,7 @@ import { spawnSync } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { assertAccessible } from './axe.mjs';
 import { openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
 
 export function addAccessTests(browser) {
@@ -19,9 +20,11 @@ export function addAccessTests(browser) {
     const requests = [];
     page.on('request', (request) => requests.push(new URL(request.url()).pathname));
     await screenshot(page, 'login');
+    await assertAccessible(page, 'the page to log in');
     await page.keyboard.type('wrong');
     await page.keyboard.press('Enter');
     await page.getByText('That is not known').waitFor();
+    await assertAccessible(page, 'a token that is not known');
     const others = requests.filter((path) => path !== '/icon.svg' && path !== '/api/v1/session');
     assert.deepEqual(others, [], 'nothing of the program comes before');
     problems.length = 0; // The browser notes every 401.
@@ -43,6 +46,8 @@ export function addAccessTests(browser) {
     // Out, and in again.
     await page.keyboard.press('?');
     await page.getByRole('link', { name: 'Log out' }).click();
+    await page.getByRole('button', { name: 'Log out' }).waitFor();
+    await assertAccessible(page, 'logged in');
     await page.getByRole('button', { name: 'Log out' }).click();
     await page.locator('#token').waitFor();
     await page.goto(server.url);

@@ -1,6 +1,7 @@
 // A second program puts blocks into a live map while the browser watches.
 import assert from 'node:assert/strict';
 import { patch } from '../../tests/integration/node/patch.mjs';
+import { assertAccessible } from './axe.mjs';
 import { decodePng, drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 
 const SIDE = 41;
@@ -116,6 +117,7 @@ export function addLiveTests(browser) {
       places.map((place) => spread(at(faded, place)) < 8),
       [true, true, true, false],
     );
+    await assertAccessible(page, 'age and change');
     // A step of it comes by itself.
     await half_life.fill('3');
     await half_life.press('Enter');

@@ -20,6 +20,7 @@ import {
 } from './harness.mjs';
 import { addAccessTests } from './access.mjs';
 import { addAccuracyTests } from './accuracy.mjs';
+import { addAxeTests } from './axe.mjs';
 import { addFusingTests } from './fusing.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLetteringTests } from './lettering.mjs';
@@ -522,6 +523,7 @@ test('Nothing broke the content policy', () => {
 });
 
 addAccuracyTests(browser);
+addAxeTests(browser);
 addFusingTests(browser);
 addLayoutTests(browser);
 addLetteringTests(browser);

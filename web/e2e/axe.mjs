@@ -1,0 +1,50 @@
+// axe-core over the controls: what a checker of accessibility finds without a person.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { openClient, settled, startServer, test } from './harness.mjs';
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+
+/** Nothing that axe-core finds on the page as it is now; rules of WCAG 2.2 AA and its good practice. */
+export async function assertAccessible(page, what) {
+  // Evaluated by the debugger: the content policy of the page stands.
+  await page.evaluate(AXE);
+  const found = await page.evaluate(async () => {
+    const { violations } = await globalThis.axe.run(document, { resultTypes: ['violations'] });
+    return violations.flatMap(({ id, nodes }) =>
+      nodes.map(({ target, failureSummary }) => `${id}: ${target}: ${failureSummary}`),
+    );
+  });
+  assert.deepEqual(found, [], what);
+}
+
+export function addAxeTests(browser) {
+  test('axe finds nothing in the controls, dark and light, with a reading, the help and colours made here', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url, { width: 1280, height: 720 }, { fusing: 'here' });
+    await settled(page);
+    await page.waitForFunction(() => globalThis.spectra.store.fusingPlace === 'here');
+    await page.evaluate(() => globalThis.spectra.pin({ x: 500, y: 400 }));
+    await page.locator('.card').waitFor();
+    for (const scheme of ['dark', 'light']) {
+      await page.getByRole('radio', { name: scheme, exact: true }).check({ force: true });
+      await assertAccessible(page, scheme);
+    }
+    // A note: there is no past to compare with.
+    await page.evaluate(() => globalThis.spectra.settings.setMethod('thermal_change'));
+    await page.locator('[data-notice]').waitFor();
+    await assertAccessible(page, 'a note on light controls');
+    await page.locator('canvas').press('?');
+    await page.locator('dialog[open]').waitFor();
+    await assertAccessible(page, 'help');
+    await page.keyboard.press('Escape');
+    await page.getByText('Details', { exact: true }).click();
+    await page.setViewportSize({ width: 390, height: 844 });
+    await assertAccessible(page, 'a phone');
+    await server.stop();
+    await page.getByText('Reconnecting').waitFor();
+    await assertAccessible(page, 'without a link');
+    await page.close();
+  });
+}
