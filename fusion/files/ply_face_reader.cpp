@@ -14,11 +14,31 @@ namespace {
 
 constexpr std::size_t kBlockTriangles = 4096;
 
-base::Result<std::uint32_t> vertex_index(const PlyCursor& cursor, std::int64_t value, std::uint64_t vertex_count) {
+/// The bytes of a whole number of the type the other way round.
+std::int64_t swapped(std::int64_t value, PlyScalar type) {
+  switch (type) {
+    case PlyScalar::Int16:
+    case PlyScalar::UInt16:
+      return __builtin_bswap16(static_cast<std::uint16_t>(value));
+    case PlyScalar::Int32:
+    case PlyScalar::UInt32:
+      return __builtin_bswap32(static_cast<std::uint32_t>(value));
+    default:
+      return value;
+  }
+}
+
+base::Result<std::uint32_t> vertex_index(const PlyCursor& cursor, std::int64_t value, PlyScalar type,
+                                         std::uint64_t vertex_count) {
   if (value < 0 || static_cast<std::uint64_t>(value) >= vertex_count) {
-    return base::failure(base::ErrorCode::BadValue, cursor.where() + " refers to vertex " + std::to_string(value) +
-                                                        ", but there are " + std::to_string(vertex_count) +
-                                                        " vertices, counted from 0");
+    const std::int64_t other = cursor.is_text() ? value : swapped(value, type);
+    const bool is_swapped = other != value && other >= 0 && static_cast<std::uint64_t>(other) < vertex_count;
+    return base::failure(base::ErrorCode::BadValue,
+                         cursor.where() + " refers to vertex " + std::to_string(value) + ", but there are " +
+                             std::to_string(vertex_count) + " vertices, counted from 0" +
+                             (is_swapped ? "; with its bytes the other way round it would be vertex " +
+                                               std::to_string(other) + ": the header may name the wrong byte order"
+                                         : ""));
   }
   return static_cast<std::uint32_t>(value);
 }
@@ -134,7 +154,7 @@ base::Result<void> read_corners(PlyCursor& cursor, const PlyProperty& list, std:
   if (count < 3) return cursor.skip_values(count, list.type);
   for (std::uint64_t corner = 0; corner < count; ++corner) {
     BOOST_OUTCOME_TRY(const std::int64_t value, cursor.read_whole_number(list.type));
-    BOOST_OUTCOME_TRY(const std::uint32_t index, vertex_index(cursor, value, vertex_count));
+    BOOST_OUTCOME_TRY(const std::uint32_t index, vertex_index(cursor, value, list.type, vertex_count));
     corners.push_back(index);
   }
   return base::success();
@@ -209,7 +229,7 @@ base::Result<void> PlyFaceReader::read_strip(const PlyProperty& list) {
       length = 0;
       continue;
     }
-    BOOST_OUTCOME_TRY(const std::uint32_t vertex, vertex_index(cursor_, value, vertex_count_));
+    BOOST_OUTCOME_TRY(const std::uint32_t vertex, vertex_index(cursor_, value, list.type, vertex_count_));
     if (++length == 1) ++facts_.strip_count;
     if (length >= 3 && before != last && last != vertex && vertex != before) {
       const bool is_left_out = !left_out_.is_empty() && (left_out_[before] || left_out_[last] || left_out_[vertex]);

@@ -14,6 +14,8 @@ namespace spectra::files {
 
 namespace {
 
+constexpr int kMostOfOneName = 100;
+
 struct TypeName {
   std::string_view name;
   PlyScalar type;
@@ -179,9 +181,13 @@ class HeaderParser {
     if (!type) return bad(base::ErrorCode::BadHeader, "unknown type " + quoted(words[word_count - 2]));
     property.type = *type;
     property.name = words[word_count - 1];
-    if (!property_names_.insert(property.name).second) {
-      return bad(base::ErrorCode::BadHeader,
-                 "a second property " + quoted(property.name) + " in element " + quoted(header_.elements.back().name));
+    // Only the first one of a name is found by it.
+    for (int number = 2; !property_names_.insert(property.name).second; ++number) {
+      property.name = std::string(words[word_count - 1]) + " (" + std::to_string(number) + ")";
+      if (number > kMostOfOneName) {
+        return bad(base::ErrorCode::BadHeader, "too many properties " + quoted(words[word_count - 1]) + " in element " +
+                                                   quoted(header_.elements.back().name));
+      }
     }
     header_.elements.back().properties.push_back(std::move(property));
     return base::success();

@@ -36,7 +36,9 @@ struct PlyElement {
 /// The header of a PLY file: what its body is said to hold.
 struct PlyHeader {
   PlyFormat format = PlyFormat::Ascii;
-  std::vector<PlyElement> elements;   ///< In the order of the body; names are unique, as are properties in each.
+  std::vector<PlyElement>
+      elements;  ///< In the order of the body; names are unique, as are those of properties in each:
+                 ///< a second one of a name is called "name (2)".
   std::vector<std::string> comments;  ///< The lines "comment ..." and "obj_info ...", whole, in order.
   std::uint64_t size_bytes = 0;       ///< The body begins here.
   std::uint64_t line_count = 0;

@@ -413,8 +413,19 @@ class Notes {
     }
   }
 
+  void about_corners(std::string_view name, const std::optional<std::size_t>& list) {
+    if (!list) return;
+    const PlyElement& element = *header_.find(name);
+    const std::string& property = element.properties[*list].name;
+    const std::string lower = lower_case(property);
+    if (lower == "vertex_indices" || lower == "vertex_index") return;
+    add("corner_list", element.count, "The corners of the faces are taken from the list '" + printable(property) + "'");
+  }
+
   void about_faces() {
     const FaceFacts& faces = facts_.faces;
+    about_corners("face", schema_.corner_list);
+    about_corners("tristrips", schema_.strip_list);
     add("triangulated_strips", faces.strip_count,
         counted(faces.strip_count, "triangle strip", "triangle strips") + " cut into triangles");
     add("triangulated_polygons", faces.polygon_count,

@@ -39,9 +39,11 @@ std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& sl
     std::array<std::string_view, 3> names;
     ColourCoding coding;
   };
-  constexpr std::array<Names, 6> kNames = {{{{"red", "green", "blue"}, ColourCoding::Channels},
+  constexpr std::array<Names, 8> kNames = {{{{"red", "green", "blue"}, ColourCoding::Channels},
                                             {{"diffuse_red", "diffuse_green", "diffuse_blue"}, ColourCoding::Channels},
                                             {{"r", "g", "b"}, ColourCoding::Channels},
+                                            {{"scalar_red", "scalar_green", "scalar_blue"}, ColourCoding::Channels},
+                                            {{"scalar_r", "scalar_g", "scalar_b"}, ColourCoding::Channels},
                                             {{"rgb", "rgb", "rgb"}, ColourCoding::Packed},
                                             {{"rgba", "rgba", "rgba"}, ColourCoding::Packed},
                                             {{"f_dc_0", "f_dc_1", "f_dc_2"}, ColourCoding::Splat}}};
@@ -106,6 +108,14 @@ base::Result<void> find_temperatures(const PlyElement& vertices, const PlyElemen
   return base::success();
 }
 
+/// Whether a list may hold vertices, whatever its name: whole numbers, and none of a texture.
+bool may_hold_corners(const PlyProperty& property) {
+  const std::string name = lower_case(property.name);
+  const bool is_of_texture = name.starts_with("tex") || name.find("_tex") != std::string::npos ||
+                             name.find("texture") != std::string::npos || name.find("uv") != std::string::npos;
+  return property.is_list && !is_floating(property.type) && !is_of_texture;
+}
+
 /// The list of vertices that an element of faces or strips has.
 base::Result<std::size_t> find_corner_list(const PlyElement& element) {
   const auto is_corner_list = [](const PlyProperty& property) {
@@ -115,7 +125,14 @@ base::Result<std::size_t> find_corner_list(const PlyElement& element) {
   const auto list = std::find_if(element.properties.begin(), element.properties.end(), is_corner_list);
   const std::string subject = "element '" + printable(element.name) + "' has ";
   if (list == element.properties.end() || !list->is_list) {
-    return base::failure(base::ErrorCode::BadHeader, subject + "no list 'vertex_indices' or 'vertex_index'");
+    const auto only = std::find_if(element.properties.begin(), element.properties.end(), may_hold_corners);
+    if (list == element.properties.end() && only != element.properties.end() &&
+        std::none_of(std::next(only), element.properties.end(), may_hold_corners)) {
+      return static_cast<std::size_t>(only - element.properties.begin());
+    }
+    return base::failure(base::ErrorCode::BadHeader, subject +
+                                                         "no list 'vertex_indices' or 'vertex_index': give the list of "
+                                                         "its corners that name");
   }
   if (std::find_if(std::next(list), element.properties.end(), is_corner_list) != element.properties.end()) {
     return base::failure(base::ErrorCode::BadHeader, subject + "both 'vertex_indices' and 'vertex_index'");
@@ -128,6 +145,17 @@ base::Result<std::size_t> find_corner_list(const PlyElement& element) {
   return static_cast<std::size_t>(list - element.properties.begin());
 }
 
+base::Error no_vertices(const PlyHeader& header) {
+  std::string names;
+  for (const PlyElement& element : header.elements) {
+    if (names.size() < 120) names += (names.empty() ? "'" : ", '") + printable(element.name) + "'";
+  }
+  return {base::ErrorCode::BadHeader,
+          "the header has no element 'vertex'" +
+              (names.empty() ? "" : " (it has " + names + "): give the one with the positions that name"),
+          {}};
+}
+
 const PlyElement* with_entries(const PlyHeader& header, std::string_view name) {
   const PlyElement* const element = header.find(name);
   return element != nullptr && element->count > 0 ? element : nullptr;
@@ -137,7 +165,7 @@ const PlyElement* with_entries(const PlyHeader& header, std::string_view name) {
 
 base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options) {
   const PlyElement* const vertices = header.find("vertex");
-  if (vertices == nullptr) return base::failure(base::ErrorCode::BadHeader, "the header has no element 'vertex'");
+  if (vertices == nullptr) return no_vertices(header);
   if (vertices->count == 0) return base::failure(base::ErrorCode::BadValue, "the scene is empty: it has 0 vertices");
   PlySchema schema;
   BOOST_OUTCOME_TRY(find_positions(*vertices, schema.vertex));

@@ -1,6 +1,7 @@
 #include "fusion/files/ply_stream.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -38,6 +39,31 @@ bool is_damaged_as_text(BlockFile& file, const PlyHeader& header) {
     file.consume(bytes.size());
   }
   return count >= kFewest;
+}
+
+/// What the body is when it is not what the header says; empty when nothing is known.
+std::string_view told_wrongly(BlockFile& file, const PlyHeader& header) {
+  constexpr std::size_t kLookedAt = 4096;
+  file.seek(header.size_bytes);
+  auto bytes = file.ready(kLookedAt);
+  if (bytes.size() > kLookedAt) bytes = bytes.first(kLookedAt);
+  const auto is_text = [](unsigned char byte) {
+    return byte == '\t' || byte == '\n' || byte == '\r' || (byte >= ' ' && byte <= '~');
+  };
+  const auto is_control = [](unsigned char byte) { return byte < '\t' || (byte > '\r' && byte < ' '); };
+  if (header.format == PlyFormat::Ascii) {
+    // One may be damage.
+    constexpr std::ptrdiff_t kOneIn = 20;
+    return std::count_if(bytes.begin(), bytes.end(), is_control) * kOneIn > std::ssize(bytes)
+               ? "the header says ascii, but what follows is binary: give its format line "
+                 "binary_little_endian or binary_big_endian"
+               : "";
+  }
+  // A few bytes may look like text by chance.
+  constexpr std::size_t kFewest = 16;
+  return bytes.size() >= kFewest && std::all_of(bytes.begin(), bytes.end(), is_text)
+             ? "the header says binary, but what follows is text: give its format line ascii"
+             : "";
 }
 
 }  // namespace
@@ -87,7 +113,7 @@ base::Result<void> PlyStream::interpret() {
   return base::success();
 }
 
-base::Result<void> PlyStream::check_size() const {
+base::Result<void> PlyStream::check_size() {
   // The last separator of a text file may be missing.
   const bool is_text = header_.format == PlyFormat::Ascii;
   std::uint64_t left = file_.size_bytes() - header_.size_bytes + (is_text ? 1 : 0);
@@ -95,6 +121,8 @@ base::Result<void> PlyStream::check_size() const {
     const std::uint64_t entry_bytes = minimum_entry_bytes(element, header_.format);
     if (entry_bytes > 0 && element.count > left / entry_bytes) {
       const std::uint64_t bytes = left - (is_text ? 1 : 0);
+      const std::string_view wrong = told_wrongly(file_, header_);
+      if (!wrong.empty()) return base::failure(base::ErrorCode::BadValue, std::string(wrong));
       return base::failure(base::ErrorCode::Truncated,
                            "the header promises " + std::to_string(element.count) + " entries of '" +
                                printable(element.name) + "' of at least " + counted(entry_bytes, "byte", "bytes") +
@@ -151,6 +179,9 @@ bool PlyStream::leave_out_hole(const PlyBodyFacts& facts) {
 /// What does not fit in a damaged file, or is left over, is only what came of the damage.
 base::Result<PlyBodyFacts> PlyStream::with_reason(base::Result<PlyBodyFacts> facts) {
   if (facts && facts.value().trailing_byte_count == 0) return facts;
+  if (const std::string_view wrong = told_wrongly(file_, header_); !facts && !wrong.empty()) {
+    return base::failure(base::ErrorCode::BadValue, std::string(wrong));
+  }
   if (!is_damaged_as_text(file_, header_)) return facts;
   return base::failure(
       base::ErrorCode::BadValue,

@@ -111,7 +111,7 @@ class PlyStream {
   PlyStream(BlockFile file, std::string name, ReadOptions options)
       : file_(std::move(file)), name_(std::move(name)), options_(std::move(options)), interpretation_(options_) {}
   base::Result<void> interpret();
-  base::Result<void> check_size() const;
+  base::Result<void> check_size();
   base::Result<PlyBodyFacts> with_reason(base::Result<PlyBodyFacts> facts);
   const PlyElement& vertices() const { return *header_.find("vertex"); }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -637,6 +638,78 @@ TEST(FieldKinds, OtherFilesAreCalledByTheirNames) {
     EXPECT_EQ(scene.error().code, base::ErrorCode::BadHeader);
     EXPECT_NE(scene.error().message.find(name), std::string::npos) << scene.error().message;
   }
+}
+
+TEST(FieldKinds, ASecondPropertyOfANameIsLeftOut) {
+  const LoadedScene scene = loaded(text_file("property float scalar_temperature\nproperty float scalar_temperature\n",
+                                             {"0 0 0 20 -1", "1 0 0 21 -1"}));
+  EXPECT_EQ(scene.mesh.temperature_celsius()[1], 21.0F);
+  EXPECT_EQ(note_count(scene, "skipped_vertex_properties"), 1U);
+}
+
+TEST(FieldKinds, TheOnlyListOfFacesHoldsTheirCorners) {
+  const auto read = [](const std::string& lists, const std::string& row) {
+    return test::read_bytes("ply\nformat ascii 1.0\nelement vertex 3\n" + std::string(kXyz) + "element face 1\n" +
+                            lists + "end_header\n0 0 0\n1 0 0\n0 1 0\n" + row + "\n");
+  };
+  for (const char* name : {"vertex_indicies", "vertexIndices", "indices", "vertices"}) {
+    const auto scene = read("property list uchar int " + std::string(name) + "\n", "3 0 1 2");
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(scene.value().mesh.triangle_count(), 1U);
+    EXPECT_EQ(note_count(scene.value(), "corner_list"), 1U) << name;
+    EXPECT_EQ(note_count(scene.value(), "skipped_face_properties"), 0U) << name;
+  }
+  const auto beside =
+      read("property list uchar float texcoord\nproperty list uchar int tex_ids\nproperty list uchar int corners\n",
+           "2 0.5 0.5 1 7 3 0 1 2");
+  ASSERT_TRUE(beside) << beside.error().message;
+  EXPECT_EQ(beside.value().mesh.triangle_count(), 1U);
+  const auto usual = read("property list uchar int others\nproperty list uchar int vertex_index\n", "0 3 0 1 2");
+  ASSERT_TRUE(usual) << usual.error().message;
+  EXPECT_EQ(note_count(usual.value(), "corner_list"), 0U);
+  EXPECT_FALSE(read("property list uchar int a\nproperty list uchar int b\n", "3 0 1 2 0"));
+  EXPECT_FALSE(read("property list uchar float texcoord\n", "0"));
+}
+
+TEST(FieldKinds, ScalarFieldsOfColoursAreColours) {
+  for (const char* names : {"R G B", "red green blue"}) {
+    std::istringstream words(names);
+    std::string properties, name;
+    while (words >> name) properties += "property float scalar_" + name + "\n";
+    const LoadedScene scene = loaded(text_file(properties, {"0 0 0 10 20 255", "1 0 0 1 2 3"}));
+    EXPECT_TRUE(scene.mesh.has_visible) << names;
+    EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{10, 20, 255})) << names;
+  }
+}
+
+/// What a person can do about it is in the message.
+TEST(FieldKinds, AWrongHeaderIsToldFromADamagedBody) {
+  const auto says = [](const std::string& bytes) {
+    const auto scene = test::read_bytes(bytes);
+    EXPECT_FALSE(scene);
+    return scene ? std::string() : scene.error().message;
+  };
+  const std::string head =
+      "element vertex 3\n" + std::string(kXyz) + "element face 1\n" + std::string(test::kFaces) + "end_header\n";
+  PlyBytes little;
+  for (const float value : {0.1F, 0.2F, 0.3F, 1.1F, 0.0F, 0.3F, 0.1F, 1.2F, 0.3F}) little.le(value);
+  little.le(std::uint8_t{3}).le(0).le(1).le(2);
+  const std::string text = "0.123 0.234 0.345\n1.123 0.234 0.345\n0.123 1.234 0.345\n3 0 1 2\n";
+  EXPECT_NE(says("ply\nformat ascii 1.0\n" + head + little.bytes()).find("what follows is binary"), std::string::npos);
+  EXPECT_NE(says("ply\nformat binary_little_endian 1.0\n" + head + text).find("what follows is text"),
+            std::string::npos);
+  EXPECT_NE(says("ply\nformat binary_little_endian 1.0\n" + head + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+                .find("what follows is text"),
+            std::string::npos)
+      << "shorter than promised";
+  EXPECT_NE(says("ply\nformat binary_big_endian 1.0\n" + head + little.bytes()).find("wrong byte order"),
+            std::string::npos);
+  EXPECT_NE(says("ply\nformat ascii 1.0\nelement points 1\n" + std::string(kXyz) + "end_header\n0 0 0\n")
+                .find("it has 'points'"),
+            std::string::npos);
+  std::string damaged = text;
+  damaged[20] = '\0';
+  EXPECT_EQ(says("ply\nformat ascii 1.0\n" + head + damaged).find("what follows is binary"), std::string::npos);
 }
 
 TEST(FieldKinds, WholeNumbersOfEveryWidthAreRead) {

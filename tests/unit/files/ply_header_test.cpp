@@ -59,8 +59,6 @@ TEST(PlyHeader, SaysWhatIsWrong) {
       {"ply\nformat ascii 1.0\nelement vertex 3x\n", base::ErrorCode::BadHeader, "'3x'"},
       {"ply\nformat ascii 1.0\nelement vertex 18446744073709551616\n", base::ErrorCode::BadHeader, "2^64"},
       {"ply\nformat ascii 1.0\nelement a 1\nelement a 1\n", base::ErrorCode::BadHeader, "second element 'a'"},
-      {"ply\nformat ascii 1.0\nelement a 1\nproperty int i\nproperty float i\n", base::ErrorCode::BadHeader,
-       "second property 'i'"},
       {"ply\nformat ascii 1.0\nelement a 1\nproperty half h\n", base::ErrorCode::BadHeader, "'half'"},
       {"ply\nformat ascii 1.0\nelement a 1\nproperty float\n", base::ErrorCode::BadHeader, "property line"},
       {"ply\nformat ascii 1.0\nelement a 1\nproperty list uchar int\n", base::ErrorCode::BadHeader, "property line"},
@@ -73,6 +71,19 @@ TEST(PlyHeader, SaysWhatIsWrong) {
     EXPECT_EQ(header.error().code, bad.code) << bad.text;
     EXPECT_NE(header.error().message.find(bad.says), std::string::npos) << header.error().message;
   }
+}
+
+TEST(PlyHeader, TellsPropertiesOfOneNameApart) {
+  const std::string head = "ply\nformat ascii 1.0\nelement a 1\n";
+  const auto header = parse_ply_header(head + "property int i\nproperty float i\nproperty int i\nend_header\n");
+  ASSERT_TRUE(header) << header.error().message;
+  const auto& properties = header.value().elements[0].properties;
+  EXPECT_EQ(properties[0].name, "i");
+  EXPECT_EQ(properties[1].name, "i (2)");
+  EXPECT_EQ(properties[2].name, "i (3)");
+  std::string many = head;
+  for (int i = 0; i < 200; ++i) many += "property int i\n";
+  EXPECT_FALSE(parse_ply_header(many + "end_header\n"));
 }
 
 TEST(PlyHeader, IsBoundedInSize) {
