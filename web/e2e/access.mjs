@@ -34,6 +34,21 @@ export function addAccessTests(browser) {
     assert.equal(await page.evaluate(() => globalThis.spectra.store.server.role), 'operator');
     assert.deepEqual(problems, []);
 
+    // In forced colours what is painted is black and white, whatever the page's own colours are.
+    const forced = await browser.newContext({
+      forcedColors: 'active',
+      colorScheme: 'dark',
+      viewport: { width: 600, height: 500 },
+    });
+    const { page: contrasting } = await openClient(forced, server.url, null);
+    const button = await contrasting.getByRole('button', { name: 'Log in' }).boundingBox();
+    const image = await screenshot(contrasting, 'login-forced-colours');
+    const lights = [];
+    for (let x = button.x + 4; x < button.x + button.width - 4; x += 1)
+      for (let y = button.y + 4; y < button.y + button.height - 4; y += 1) lights.push(Math.max(...image.at(x, y)));
+    assert.ok(Math.min(...lights) < 16 && Math.max(...lights) > 240, `from ${Math.min(...lights)} to ${Math.max(...lights)}`);
+    await forced.close();
+
     // A link with a code, on another device.
     const tablet = await browser.newContext({ viewport: { width: 820, height: 1180 } });
     const link = /within 15 minutes: (\S+)/.exec(server.output())[1];

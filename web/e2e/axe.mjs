@@ -6,7 +6,10 @@ import { openClient, settled, startServer, test } from './harness.mjs';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
-/** Nothing that axe-core finds on the page as it is now; rules of WCAG 2.2 AA and its good practice. */
+/**
+ * Nothing that axe-core finds on the page as it is now; rules of WCAG 2.2 AA and its good practice. Not in forced colours: axe takes
+ * -webkit-text-fill-color for the colour of a text, which Chromium does not force in what it tells of styles, only in what it paints.
+ */
 export async function assertAccessible(page, what) {
   // Evaluated by the debugger: the content policy of the page stands.
   await page.evaluate(AXE);

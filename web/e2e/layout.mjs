@@ -221,11 +221,36 @@ export function addLayoutTests(browser) {
         const element = document.activeElement;
         if (element === document.body || element.tagName === 'CANVAS') return null;
         const group = element.closest('[role="radiogroup"], [role="toolbar"]');
-        return { in: group?.getAttribute('aria-label') ?? group?.getAttribute('aria-labelledby') ?? null };
+        element.dataset.reached = '';
+        // The mark of focus is around the element, its label or what is drawn in it.
+        const isMarked = [element, element.closest('label'), ...element.querySelectorAll('rect, path, circle')].some((part) => {
+          if (part === null) return false;
+          const { outlineStyle, stroke, strokeWidth } = getComputedStyle(part);
+          const isStroked = element instanceof SVGElement && stroke !== 'none' && parseFloat(strokeWidth) >= 1;
+          return outlineStyle !== 'none' || isStroked;
+        });
+        const box = (element.closest('label') ?? element).getBoundingClientRect();
+        const isInView = box.top > -1 && box.left > -1 && box.bottom < innerHeight + 1 && box.right < innerWidth + 1;
+        const name = element.getAttribute('aria-label') ?? element.labels?.[0]?.textContent ?? element.textContent;
+        const fault = !isMarked ? 'no mark of focus' : !isInView ? 'out of view' : name.trim() === '' ? 'no name' : null;
+        return {
+          fault: fault === null ? null : `${fault}: ${element.outerHTML.slice(0, 120)}`,
+          in: group?.getAttribute('aria-label') ?? group?.getAttribute('aria-labelledby') ?? null,
+        };
       });
       if (stop === null) break;
+      assert.equal(stop.fault, null);
       stops.push(stop.in);
     }
+    // Whatever can be pressed or set has been reached, or is in a group that has.
+    const missed = await page.evaluate(() =>
+      [...document.querySelectorAll('main button, main a, main input, main summary, main [tabindex="0"]')]
+        .filter((element) => element.tagName !== 'CANVAS' && !element.disabled && element.checkVisibility())
+        .filter((element) => !('reached' in element.dataset))
+        .filter((element) => !element.closest('[role="radiogroup"], [role="toolbar"]')?.querySelector('[data-reached]'))
+        .map((element) => element.outerHTML.slice(0, 120)),
+    );
+    assert.deepEqual(missed, []);
     const groups = stops.filter((group) => group !== null);
     assert.equal(new Set(groups).size, groups.length, `a group has several tab stops: ${groups}`);
     assert.ok(stops.length <= 32, `${stops.length} tab stops`);
