@@ -256,7 +256,8 @@ void PlyBodyReader::judge_positions(std::span<base::Vec3d> positions, std::uint6
 
 base::Result<void> PlyBodyReader::convert_colours(const PlyRawVertices& raw, const PlyElement& element) {
   const ColourConversion& conversion = interpretation_.colours;
-  if (header_.format == PlyFormat::Ascii && interpretation_.schema.colour_coding == ColourCoding::Channels) {
+  if (header_.format == PlyFormat::Ascii && interpretation_.schema.colour_coding == ColourCoding::Channels &&
+      !interpretation_.schema.true_colour_type) {
     // In a text file a number may be larger than its type.
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const PlyProperty& property = element.properties[*interpretation_.schema.vertex[kRed + channel]];

@@ -186,7 +186,9 @@ class Notes {
       for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
         if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
       }
-      const std::string text = conversion_text(schema_.colour_coding, type, survey_.largest_colour);
+      std::string text =
+          conversion_text(schema_.colour_coding, schema_.true_colour_type.value_or(type), survey_.largest_colour);
+      if (schema_.true_colour_type) text = "The header says uchar, but the text has others: c" + text.substr(1);
       if (!text.empty()) add("converted_colours", vertices_.count, text);
     } else {
       about_textures();

@@ -92,6 +92,7 @@ base::Result<void> PlyStream::interpret() {
   PlySchema& schema = interpretation_.schema;
   BOOST_OUTCOME_TRY(schema, ply_schema(header_, options_));
   BOOST_OUTCOME_TRY(check_size());
+  schema.true_colour_type = true_colour_type(file_, header_, schema);
   if (needs_survey(header_, schema)) {
     BOOST_OUTCOME_TRY(interpretation_.survey, ply_survey(file_, header_, schema, options_));
     if (!interpretation_.survey.is_temperature_plausible) schema.vertex[kTemperature].reset();
@@ -105,6 +106,7 @@ base::Result<void> PlyStream::interpret() {
     for (auto index = first; index != first + 3; ++index) {
       if (!is_byte(*index)) type = properties[**index].type;
     }
+    type = schema.true_colour_type.value_or(type);
     BOOST_OUTCOME_TRY(interpretation_.colours,
                       colour_conversion(schema.colour_coding, type, interpretation_.survey.largest_colour));
     interpretation_.colours.is_bytes = schema.colour_coding == ColourCoding::Channels &&

@@ -178,7 +178,38 @@ base::Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, co
 
 }  // namespace
 
+std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {
+  if (header.format != PlyFormat::Ascii || !schema.has_vertex_colours() ||
+      schema.colour_coding != ColourCoding::Channels) {
+    return std::nullopt;
+  }
+  const PlyElement& vertices = *header.find("vertex");
+  for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
+    if (vertices.properties[*schema.vertex[slot]].type != PlyScalar::UInt8) return std::nullopt;
+  }
+  PlyCursor cursor(file, header);
+  for (const PlyElement* element = header.elements.data(); element != &vertices; ++element) {
+    cursor.begin_element(*element);
+    if (!cursor.skip_element(*element)) return std::nullopt;
+  }
+  cursor.begin_element(vertices);
+  PlyVertexReader reader(cursor, vertices, schema);
+  const auto block = reader.next();
+  if (!block) return std::nullopt;
+  std::optional<PlyScalar> type;
+  for (const auto& channel : block.value().colours) {
+    for (const double value : channel) {
+      if (!std::isfinite(value)) continue;
+      if (value != std::floor(value)) return PlyScalar::Float32;
+      constexpr double kHair = 8;
+      if (value > 255 + kHair) type = PlyScalar::UInt16;
+    }
+  }
+  return type;
+}
+
 bool needs_survey(const PlyHeader& header, const PlySchema& schema) {
+  if (schema.true_colour_type) return true;
   if (schema.has_face_colours() || schema.has_face_temperature() || schema.is_temperature_doubtful) return true;
   if (!schema.has_vertex_colours() || schema.colour_coding != ColourCoding::Channels) return false;
   const PlyElement& vertices = *header.find("vertex");

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "fusion/base/error.hpp"
@@ -31,6 +32,10 @@ struct PlySurvey {
   TemperatureFacts face_temperature;
   std::uint64_t clamped_colour_count = 0;  ///< Vertices.
 };
+
+/// The type that colours must have which are declared as uchar but hold other numbers in the first vertices of a text: a
+/// floating one, or one of 16 bits; nullopt: they are as declared, or nothing can be told. Moves the file.
+std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
 
 /// The file's values must be looked at before they are read.
 bool needs_survey(const PlyHeader& header, const PlySchema& schema);

@@ -682,6 +682,25 @@ TEST(FieldKinds, ScalarFieldsOfColoursAreColours) {
   }
 }
 
+/// A text is not bound to its declaration: shares of white were black without a word.
+TEST(FieldKinds, ColoursOfATextMayBeOtherThanItSays) {
+  const auto colours = [](const std::string& white, const std::string& half) {
+    return loaded(text_file(std::string(test::kRgb), {"0 0 0 " + white + " 0 0", "1 0 0 0 " + half + " 0"}));
+  };
+  for (const auto& [white, half] :
+       {std::pair("1.0", "0.5"), std::pair("255.0", "127.5"), std::pair("65535", "32896")}) {
+    const LoadedScene scene = colours(white, half);
+    EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{255, 0, 0})) << white;
+    EXPECT_EQ(scene.mesh.visible()[1], (base::Rgb8{0, 128, 0})) << white;
+    EXPECT_EQ(note_count(scene, "converted_colours"), 2U) << white;
+  }
+  const LoadedScene bytes = colours("255.0", "1");
+  EXPECT_EQ(bytes.mesh.visible()[1], (base::Rgb8{0, 1, 0}));
+  EXPECT_EQ(note_count(bytes, "converted_colours"), 0U);
+  EXPECT_FALSE(test::read_bytes(text_file(std::string(test::kRgb), {"0 0 0 -1 0 0"})));
+  EXPECT_FALSE(test::read_bytes(text_file(std::string(test::kRgb), {"0 0 0 70000 0 0"})));
+}
+
 /// What a person can do about it is in the message.
 TEST(FieldKinds, AWrongHeaderIsToldFromADamagedBody) {
   const auto says = [](const std::string& bytes) {
