@@ -33,6 +33,23 @@ export function addAxeTests(browser) {
     for (const scheme of ['dark', 'light']) {
       await page.getByRole('radio', { name: scheme, exact: true }).check({ force: true });
       await assertAccessible(page, scheme);
+      // axe does not look at drawings: numbers of the axis stand on the histogram.
+      const contrast = await page.evaluate(() => {
+        const lightOf = (selector) => {
+          const channels = getComputedStyle(document.querySelector(selector))
+            .fill.match(/[\d.]+/g)
+            .map(Number);
+          const [r, g, b] = channels.map((value) => (value <= 10 ? value / 3294.6 : ((value / 255 + 0.055) / 1.055) ** 2.4));
+          return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+        };
+        const [text, bright, plain] = ['.axis text.flag.mark', '.silhouette.bright', '.silhouette:not(.bright)'].map(lightOf);
+        const ratio = (a, b) => Math.max(a, b) / Math.min(a, b);
+        return { onBright: ratio(text, bright), onPlain: ratio(text, plain), brightOnPlain: ratio(bright, plain) };
+      });
+      assert.ok(
+        contrast.onBright > 3 && contrast.onPlain > 4.5 && contrast.brightOnPlain > 1.6,
+        `${scheme}: ${JSON.stringify(contrast)}`,
+      );
     }
     // A note: there is no past to compare with.
     await page.evaluate(() => globalThis.spectra.settings.setMethod('thermal_change'));
