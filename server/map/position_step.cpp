@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -34,20 +35,24 @@ constexpr double kStepOfCellSide = 0.4;
 /// One in so many vertices of a cell may fall together with another.
 constexpr std::size_t kVerticesToMerged = 5;
 
+/// Where one in so many of a cell does, balls that reach beyond it are looked at.
+constexpr std::size_t kVerticesToCrowd = 16;
+
 /// How far the needs of a cell reach beyond it, in parts of its longest side. Those of what is much closer together than the usual
 /// step reach to the next vertices; others to what the cell touches, and with one halving less to the next vertices.
 constexpr double kReach = 0.2;
 constexpr double kTouch = 0.05;
 
-/// Balls around every vertex of cells that are thin are looked at: of so many vertices, and in so many steps up to those of so much the
+/// Balls around every vertex are looked at: of so many vertices, and in so many steps up to those of so much the
 /// radius (squared; as many times the vertices, on a surface). What they may reach beyond the cell, in parts of its longest side; and the
 /// change of a side that is left to them.
 constexpr std::size_t kFewestOfBall = 50;
 constexpr std::size_t kRings = 14;
 constexpr float kLargestBall = 2.2F;
-constexpr double kBallReach = 0.8;
+constexpr double kBallReach = 1;
+constexpr double kSpareReach = 1.25;
 constexpr double kMostSideChange = 0.0985;
-constexpr int kRounds = 3;
+constexpr int kMostRounds = 8;
 
 /// What is thinner beside its breadth is flat.
 constexpr double kFlat = 0x1p-12;
@@ -184,19 +189,27 @@ void raise(std::uint8_t& value, std::uint8_t to) {
   }
 }
 
+/// How many of these distinct positions fall together with another at steps of so much; where it is more than `enough`, any such number.
+std::size_t merged_count(std::span<const base::Vec3f> positions, const std::array<double, 3>& steps_m,
+                         std::size_t enough, std::vector<std::array<double, 3>>& rounded) {
+  rounded.resize(positions.size());
+  std::size_t merged = 0;
+  for (std::size_t i = 0; i < positions.size() && merged <= enough; ++i) {
+    const auto p = coordinates(positions[i]);
+    for (std::size_t axis = 0; axis < 3; ++axis) rounded[i][axis] = std::floor(double{p[axis]} / steps_m[axis] + 0.5);
+    const auto end = rounded.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::find(rounded.begin(), end, rounded[i]) != end) ++merged;
+  }
+  return merged;
+}
+
 /// How often `step_m` is halved until all but `may_merge` of these distinct positions stay distinct.
 std::uint8_t halvings_apart(std::span<const base::Vec3f> positions, std::size_t may_merge, double step_m) {
-  std::vector<std::array<double, 3>> rounded(positions.size());
+  std::vector<std::array<double, 3>> rounded;
   for (int halvings = 0; halvings < kMostHalvings; ++halvings) {
     const double step = std::ldexp(step_m, -halvings);
-    std::size_t merged_count = 0;
-    for (std::size_t i = 0; i < positions.size() && merged_count <= may_merge; ++i) {
-      const auto p = coordinates(positions[i]);
-      for (std::size_t axis = 0; axis < 3; ++axis) rounded[i][axis] = std::floor(double{p[axis]} / step + 0.5);
-      const auto end = rounded.begin() + static_cast<std::ptrdiff_t>(i);
-      if (std::find(rounded.begin(), end, rounded[i]) != end) ++merged_count;
-    }
-    if (merged_count <= may_merge) return static_cast<std::uint8_t>(halvings);
+    if (merged_count(positions, {step, step, step}, may_merge, rounded) <= may_merge)
+      return static_cast<std::uint8_t>(halvings);
   }
   return kMostHalvings;
 }
@@ -244,6 +257,8 @@ struct Ends {
   float rounded_low(std::size_t axis) const { return least[3 + axis]; }
   float rounded_high(std::size_t axis) const { return -least[9 + axis]; }
 
+  bool operator==(const Ends&) const = default;
+
   void join(const Ends& other) {
     for (std::size_t i = 0; i < least.size(); ++i) least[i] = std::min(least[i], other.least[i]);
   }
@@ -255,6 +270,17 @@ struct Ends {
     }
     return false;
   }
+  /// Whether those of any part between `inner` and `outer`, which holds it, may be.
+  static bool may_be_off_between(const Ends& inner, const Ends& outer) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float side = inner.high(axis) - inner.low(axis), most_side = outer.high(axis) - outer.low(axis);
+      const float rounded_side = inner.rounded_high(axis) - inner.rounded_low(axis);
+      const float most_rounded_side = outer.rounded_high(axis) - outer.rounded_low(axis);
+      constexpr auto kMost = static_cast<float>(kMostSideChange);
+      if (most_rounded_side > (1 + kMost) * side || rounded_side < (1 - kMost) * most_side) return true;
+    }
+    return false;
+  }
 };
 
 }  // namespace
@@ -262,15 +288,22 @@ struct Ends {
 /// The vertices around a cell, seen from a corner of it.
 struct PositionSteps::Neighbourhood {
   std::array<float, 3> corner{};
+  static constexpr std::array<float, 3> kFarthest{Ends::kFar, Ends::kFar, Ends::kFar};
+  double reach = 0;                      ///< Beyond the cell, as far as they were looked for.
+  std::array<float, 3> coarsest_step{};  ///< Of any of them.
   std::vector<std::uint32_t> points;
   std::vector<std::uint32_t> changed;  ///< Those of `points` that were rounded anew in the last round.
   std::vector<std::array<float, 3>> place, rounded;
-  std::vector<float> xs, ys, zs;  ///< Of `place`.
-  std::vector<Ends> ends;         ///< Of each alone.
-  std::vector<float> distance;    ///< To a vertex of the cell, squared.
+  std::vector<float> xs, ys, zs;            ///< Of `place`.
+  std::vector<Ends> ends;                   ///< Of each alone.
+  std::vector<float> distance;              ///< To a vertex of the cell, squared.
+  std::vector<std::uint8_t> is_later_twin;  ///< Another one is rounded to the same place.
+  std::vector<std::uint32_t> twins;
   std::vector<std::uint32_t> near, ball;
   std::vector<float> near_distance;
   std::vector<std::uint32_t> ring;
+  std::array<std::uint32_t, kRings + 2> ring_begin{};
+  std::vector<std::pair<float, std::uint32_t>> in_order;  ///< Distance and number, nearest first.
 
   void resize(std::size_t count) {
     place.resize(count);
@@ -322,6 +355,49 @@ struct PositionSteps::Neighbourhood {
       const std::int32_t above = below + (static_cast<float>(below) < at_least ? 1 : 0);
       ring[n] = near_distance[n] <= radius ? 0u : static_cast<std::uint32_t>(above);
     }
+  }
+
+  /// Fills in `is_later_twin`.
+  void find_twins() {
+    is_later_twin.assign(points.size(), 0);
+    twins.resize(points.size());
+    std::iota(twins.begin(), twins.end(), 0u);
+    std::sort(twins.begin(), twins.end(), [&](std::uint32_t a, std::uint32_t b) { return rounded[a] < rounded[b]; });
+    for (std::size_t i = 1; i < twins.size(); ++i) is_later_twin[twins[i]] = rounded[twins[i]] == rounded[twins[i - 1]];
+  }
+  /// Whether a fifth of some ball of the first `near_count` of `near` may fall together.
+  bool may_be_merged(std::size_t near_count) const {
+    std::size_t twin_count = 0;
+    for (std::size_t n = 0; n < near_count; ++n) twin_count += is_later_twin[near[n]];
+    return twin_count * kVerticesToMerged > kFewestOfBall;
+  }
+
+  /// Whether no step could change a side of a ball (of a radius, squared; of the first `near_count` of `near`) by more than is left to
+  /// it, nor of a larger one: each end is off by half a step at most.
+  bool keeps_sides_around(float radius, std::size_t near_count) const {
+    std::array<float, 3> low = kFarthest, high = kFarthest;  // The upper ends negative.
+    for (std::size_t n = 0; n < near_count; ++n) {
+      if (distance[near[n]] > radius) continue;
+      const std::array<float, 3>& p = place[near[n]];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], p[axis]);
+        high[axis] = std::min(high[axis], -p[axis]);
+      }
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!((-high[axis] - low[axis]) * static_cast<float>(kMostSideChange) >= coarsest_step[axis])) return false;
+    }
+    return true;
+  }
+
+  /// Fills in `in_order` and `ring_begin` by ring; in no order within one.
+  void sort_by_ring(std::size_t near_count) {
+    ring_begin.fill(0);
+    for (std::size_t n = 0; n < near_count; ++n) ++ring_begin[ring[n] + 1];
+    std::partial_sum(ring_begin.begin(), ring_begin.end(), ring_begin.begin());
+    in_order.resize(near_count);
+    std::array<std::uint32_t, kRings + 2> next = ring_begin;
+    for (std::size_t n = 0; n < near_count; ++n) in_order[next[ring[n]]++] = {near_distance[n], near[n]};
   }
 
   /// Of the first `near_count` of `near` (at least `count`): a radius that has `count` of them, or more where several are equally far.
@@ -653,58 +729,78 @@ void PositionSteps::limit_to_one_tile() {
   }
 }
 
+template <class Visit>
+void PositionSteps::for_each_cell_around(const Cell& cell, double reach, Visit visit) {
+  std::array<double, 3> low{}, high{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis] = double{coordinates(cell.bounds.min)[axis]} - reach;
+    high[axis] = double{coordinates(cell.bounds.max)[axis]} + reach;
+  }
+  for_each_cell(low, high, visit);
+}
+
+bool PositionSteps::is_crowded(const Cell& cell) {
+  const auto step_m = static_cast<double>(largest_step_m_);
+  std::array<double, 3> steps_m{};
+  for (std::size_t axis = 0; axis < 3; ++axis) steps_m[axis] = std::ldexp(step_m, -cell.halvings[axis]);
+  std::vector<base::Vec3f> positions;
+  for (std::uint32_t i = cell.begin; i < cell.end; ++i) positions.push_back(points_[i].position);
+  const std::size_t most = positions.size() / kVerticesToCrowd;
+  std::vector<std::array<double, 3>> rounded;
+  return merged_count(positions, steps_m, most, rounded) > most;
+}
+
 void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
   constexpr std::size_t kChunk = 16;
-  const auto step_m = static_cast<double>(largest_step_m_);
   halvings_.resize(points_.size());
-  std::vector<std::uint32_t> thin;  // Cells with a side of few steps.
-  for (std::uint32_t c = 0; c < cells_.size(); ++c) {
-    const Cell& cell = cells_[c];
+  for (const Cell& cell : cells_) {
     std::fill(halvings_.begin() + cell.begin, halvings_.begin() + cell.end, cell.halvings);
-    const Shape shape(cell.bounds);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!shape.has_side(axis) || shape.side[axis] * kMostSideChange >= 4 * std::ldexp(step_m, -cell.halvings[axis]))
-        continue;
-      thin.push_back(c);
-      break;
-    }
   }
+  pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
+      cells_[c].is_crowded = is_crowded(cells_[c]);
+    }
+  });
   SidesRound round{.is_changed = std::vector<std::uint8_t>(points_.size(), 1),
                    .radius = std::vector<float>(points_.size()),
                    .wanted = halvings_};
-  for (int i = 0; i < kRounds; ++i) {
+  for (int i = 0; i < kMostRounds; ++i) {
     round.is_first = i == 0;
-    pool.for_each((thin.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
       Neighbourhood around;
-      for (std::size_t t = chunk * kChunk; t < std::min(thin.size(), (chunk + 1) * kChunk); ++t) {
-        keep_sides_in(cells_[thin[t]], around, round);
+      for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
+        keep_sides_in(cells_[c], around, round);
       }
     });
-    for (std::size_t p = 0; p < points_.size(); ++p) round.is_changed[p] = halvings_[p] == round.wanted[p] ? 0 : 1;
+    bool is_any_changed = false;
+    for (Cell& cell : cells_) {
+      cell.is_changed = false;
+      for (std::uint32_t p = cell.begin; p < cell.end; ++p) {
+        round.is_changed[p] = halvings_[p] == round.wanted[p] ? 0 : 1;
+        cell.is_changed = cell.is_changed || round.is_changed[p] != 0;
+      }
+      is_any_changed = is_any_changed || cell.is_changed;
+    }
     halvings_ = round.wanted;
+    if (!is_any_changed) break;
   }
 }
 
-void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round) {
+void PositionSteps::gather_around(const Cell& cell, double reach, Neighbourhood& around, const SidesRound& round) {
   const auto step_m = static_cast<double>(largest_step_m_);
-  const double reach = longest_side(cell.bounds) * kBallReach;
+  around.reach = reach;
   around.corner = coordinates(cell.bounds.min);
-  std::array<double, 3> from{}, to{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    from[axis] = double{around.corner[axis]} - reach;
-    to[axis] = double{coordinates(cell.bounds.max)[axis]} + reach;
-  }
   around.points.clear();
   around.changed.clear();
-  for_each_cell(from, to, [&](const Cell& other) {
+  for_each_cell_around(cell, reach, [&](const Cell& other) {
     for (std::uint32_t i = other.begin; i < other.end; ++i) {
       if (round.is_changed[i] != 0) around.changed.push_back(static_cast<std::uint32_t>(around.points.size()));
       around.points.push_back(i);
     }
   });
-  if (around.changed.empty()) return;
   const std::size_t count = around.points.size();
   around.resize(count);
+  around.coarsest_step = {};
   std::array<double, kMostHalvings + 1> steps_m{};
   for (std::size_t h = 0; h < steps_m.size(); ++h) steps_m[h] = std::ldexp(step_m, -static_cast<int>(h));
   for (std::size_t n = 0; n < count; ++n) {
@@ -712,6 +808,7 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
     const auto p = coordinates(points_[point].position);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double step = steps_m[halvings_[point][axis]];
+      around.coarsest_step[axis] = std::max(around.coarsest_step[axis], static_cast<float>(step));
       around.place[n][axis] = static_cast<float>(double{p[axis]} - double{around.corner[axis]});
       around.rounded[n][axis] =
           static_cast<float>(std::floor(double{p[axis]} / step + 0.5) * step - double{around.corner[axis]});
@@ -721,15 +818,31 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
     around.ys[n] = around.place[n][1];
     around.zs[n] = around.place[n][2];
   }
+  if (cell.is_crowded) around.find_twins();
+}
+
+void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round) {
+  double reach = longest_side(cell.bounds) * kBallReach;
+  if (!round.is_first) {
+    const auto largest = std::max_element(round.radius.begin() + cell.begin, round.radius.begin() + cell.end);
+    if (*largest < 0) return;
+    reach = std::sqrt(double{*largest} * double{kLargestBall});
+    bool is_any_changed = false;
+    for_each_cell_around(cell, reach, [&](const Cell& other) { is_any_changed = is_any_changed || other.is_changed; });
+    if (!is_any_changed) return;
+  }
+  gather_around(cell, reach, around, round);
+  constexpr float kSafe = -1;  // Instead of a radius: no further look is needed, as steps only get finer.
   constexpr float kEverywhere = std::numeric_limits<float>::infinity();
   float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
   for (std::uint32_t seed = cell.begin; seed < cell.end; ++seed) {
     std::array<float, 3> center = coordinates(points_[seed].position);
     for (std::size_t axis = 0; axis < 3; ++axis)
       center[axis] = static_cast<float>(double{center[axis]} - double{around.corner[axis]});
-    if (count < kFewestOfBall) break;
+    if (around.points.size() < kFewestOfBall) break;
     if (!round.is_first) {
       radius = round.radius[seed];
+      if (radius == kSafe) continue;
       // Where nothing has changed since it was looked at nothing else would come of it.
       const bool is_any_near = std::any_of(around.changed.begin(), around.changed.end(), [&](std::uint32_t n) {
         return around.distance_from(center, n) <= radius * kLargestBall;
@@ -741,25 +854,83 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
       // Among few, if it is about as large as the one before.
       std::size_t few_count = around.gather(radius * 1.5F);
       if (few_count < kFewestOfBall) few_count = around.gather(kEverywhere);
-      radius = round.radius[seed] = around.radius_of(kFewestOfBall, few_count);
+      radius = around.radius_of(kFewestOfBall, few_count);
+      const double wanted_reach = std::sqrt(double{radius} * double{kLargestBall});
+      if (wanted_reach > around.reach && around.points.size() < points_.size()) {
+        // It may be smaller then.
+        gather_around(cell, kSpareReach * wanted_reach, around, round);
+        around.measure_from(center);
+        radius = around.radius_of(kFewestOfBall, around.gather(radius));
+      }
+      round.radius[seed] = radius;
     }
     const std::size_t near_count = around.gather(radius * kLargestBall);
+    if (cell.is_crowded && around.may_be_merged(near_count)) keep_apart(around, near_count, round.wanted);
+    const bool is_safe = around.keeps_sides_around(radius, near_count);
+    if (is_safe && !cell.is_crowded) round.radius[seed] = kSafe;
+    if (is_safe) continue;
     // What each ring between a ball and the next larger one adds to it.
     const float ring_width = radius * (kLargestBall - 1) / kRings;
     around.find_rings(near_count, radius, ring_width);
     std::array<Ends, kRings + 1> rings;
     for (std::size_t n = 0; n < near_count; ++n) rings[around.ring[n]].join(around.ends[around.near[n]]);
-    Ends ball;
-    for (std::size_t ring = 0; ring <= kRings; ++ring) {
-      ball.join(rings[ring]);
-      if (!ball.are_off()) continue;
-      const float ball_radius = radius + static_cast<float>(ring) * ring_width;
+    Ends ball = rings[0];
+    around.in_order.clear();
+    Ends kept_ends;
+    const auto keep_ball = [&](const Ends& ends, float ball_radius) {
+      // Another vertex between the same ends asks for nothing else.
+      if (ends == kept_ends) return;
+      kept_ends = ends;
       std::size_t kept = 0;
       for (std::size_t n = 0; n < near_count; ++n) {
         around.ball[kept] = around.near[n];
         kept += around.near_distance[n] <= ball_radius ? 1u : 0u;
       }
       keep_sides_of(around, std::span(around.ball).first(kept), round.wanted);
+    };
+    if (ball.are_off()) keep_ball(ball, radius);
+    for (std::uint32_t ring = 1; ring <= kRings; ++ring) {
+      const Ends before = ball;
+      ball.join(rings[ring]);
+      if (!Ends::may_be_off_between(before, ball)) continue;
+      if (around.in_order.empty()) around.sort_by_ring(near_count);
+      const auto in_ring = std::span(around.in_order)
+                               .subspan(around.ring_begin[ring], around.ring_begin[ring + 1] - around.ring_begin[ring]);
+      std::sort(in_ring.begin(), in_ring.end());
+      // Each ball that ends within it.
+      Ends growing = before;
+      for (std::size_t i = 0; i < in_ring.size(); ++i) {
+        const auto [distance, n] = in_ring[i];
+        growing.join(around.ends[n]);
+        const bool is_ball = i + 1 == in_ring.size() || in_ring[i + 1].first > distance;
+        if (is_ball && growing.are_off()) keep_ball(growing, distance);
+      }
+    }
+  }
+}
+
+void PositionSteps::keep_apart(Neighbourhood& around, std::size_t near_count, std::vector<StepHalvings>& wanted) {
+  around.in_order.clear();
+  for (std::size_t i = 0; i < near_count; ++i)
+    around.in_order.emplace_back(around.distance[around.near[i]], around.near[i]);
+  std::sort(around.in_order.begin(), around.in_order.end());
+  std::map<std::array<float, 3>, std::uint32_t> first_at;
+  std::vector<std::uint32_t> merged;
+  for (std::size_t i = 0; i < near_count; ++i) {
+    const auto [distance, n] = around.in_order[i];
+    const auto [first, is_new] = first_at.try_emplace(around.rounded[n], n);
+    if (!is_new) {
+      merged.push_back(n);
+      merged.push_back(first->second);
+    }
+    const bool is_ball = i + 1 >= kFewestOfBall && (i + 1 == near_count || around.in_order[i + 1].first > distance);
+    if (!is_ball || (i + 1 - first_at.size()) * kVerticesToMerged <= i + 1) continue;
+    for (const std::uint32_t m : merged) {
+      const std::uint32_t point = around.points[m];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int finer_by_one = std::min(halvings_[point][axis] + 1, int{most_halvings_});
+        raise(wanted[point][axis], static_cast<std::uint8_t>(finer_by_one));
+      }
     }
   }
 }

@@ -45,6 +45,8 @@ class PositionSteps {
     std::uint32_t begin = 0, end = 0;  ///< In points_.
     StepHalvings own{}, halvings{};    ///< Needed here; here and in the neighbourhood. Of all its vertices.
     bool is_dense = false;             ///< Its vertices would fall together at the usual step.
+    bool is_changed = false;           ///< Some of its vertices are rounded otherwise since the last round.
+    bool is_crowded = false;           ///< Many of its vertices fall together at its own steps.
   };
   struct Point {
     base::Vec3f position;
@@ -74,7 +76,10 @@ class PositionSteps {
   void ask_neighbours(jobs::WorkerPool& pool);
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
   void keep_sides(jobs::WorkerPool& pool);
+  void gather_around(const Cell& cell, double reach, Neighbourhood& around, const SidesRound& round);
   void keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round);
+  /// At most a fifth of the vertices of each ball fall together with others.
+  void keep_apart(Neighbourhood& around, std::size_t near_count, std::vector<StepHalvings>& wanted);
   void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
                      std::vector<StepHalvings>& wanted);
   /// So that the ball ends at `least` to `most` beyond where it does.
@@ -86,6 +91,11 @@ class PositionSteps {
   /// Calls `visit(cell)` for the cells that reach into a box.
   template <class Visit>
   void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
+  /// Those that balls around the vertices of a cell may reach.
+  template <class Visit>
+  void for_each_cell_around(const Cell& cell, double reach, Visit visit);
+  /// Whether many of its vertices fall together.
+  bool is_crowded(const Cell& cell);
 
   float largest_step_m_ = 0;
   std::uint8_t most_halvings_ = 0;  ///< That any vertex may have.

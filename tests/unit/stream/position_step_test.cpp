@@ -204,8 +204,22 @@ TEST(PositionSteps, KeepTheThicknessOfRoughWallsAlongAnAxis) {
   const auto snapshot = scene_of(scene.mesh());
   const FormReport form = form_of(*snapshot, 2'000);
   ASSERT_GT(form.patch_count, 5'000u);
-  EXPECT_LE(form.flattened_patch_count * 1'000, form.patch_count) << described(form);
-  EXPECT_LT(form.worst_side_change, 0.2) << described(form);
+  EXPECT_TRUE(form.is_kept()) << described(form);
+}
+
+TEST(PositionSteps, KeepEveryPatchOfFlatTerrainWithALabelOnIt) {
+  // On a regular grid many vertices are about equally far: which of them a ball holds is decided by their heights.
+  Parts scene;
+  std::mt19937 random(3);
+  std::normal_distribution<double> roughness(0, 1.2);
+  scene.grid(100, 100, {-2'000, -2'000, 0}, {40, 0, 0}, {0, 40, 0},
+             [&](int i, int j) { return 3 * std::sin(i / 17.5) * std::cos(j / 12.5) + roughness(random); });
+  scene.grid(51, 21, {3, -1, 1.5}, {0.001F, 0, 0}, {0, 0.001F, 0},
+             [](int i, int) { return 0.0005 * std::sin(0.9 * i); });
+  const auto snapshot = scene_of(scene.mesh());
+  const FormReport form = form_of(*snapshot, 11'071);
+  ASSERT_GT(form.patch_count, 50'000u);
+  EXPECT_TRUE(form.is_kept()) << described(form);
 }
 
 TEST(PositionSteps, AreTheSameForATriangleSoup) {
