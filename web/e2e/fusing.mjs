@@ -95,6 +95,43 @@ export function addFusingTests(browser) {
     await server.stop();
   });
 
+  test('How much is highlighted is said where colours are made here, as the robot says it', async () => {
+    const server = await startServer(['--demo']);
+    const words = async (fusing) => {
+      const { page, problems } = await openClient(browser, server.url, { width: 900, height: 560 }, { fusing });
+      await settled(page, 180_000);
+      if (fusing === 'here') await isHere(page);
+      const said = {};
+      const note = page.locator('[data-highlight]');
+      const say = async (what, pattern) => {
+        await settled(page);
+        await note.filter({ hasText: pattern }).waitFor();
+        const share = await page.evaluate(() => globalThis.spectra.store.histogram.highlighted_share);
+        said[what] = { text: await note.innerText(), share };
+      };
+      await say('first', /% of the surface/);
+      await setMethod(page, 'colour_mapped_threshold');
+      await page.evaluate(() => globalThis.spectra.settings.setParameter('threshold', 33.3, true));
+      await say('threshold', /above 33\.3/);
+      await setMethod(page, 'thermal_visible_blend');
+      await settled(page);
+      await note.waitFor({ state: 'detached' });
+      await setMethod(page, 'colour_mapped_threshold');
+      await page.evaluate(() => globalThis.spectra.settings.setParameter('threshold', 99, true));
+      await say('nothing', /^Nothing is highlighted/);
+      assert.deepEqual(problems, []);
+      await page.close();
+      return said;
+    };
+    const [robot, here] = [await words('robot'), await words('here')];
+    for (const [what, { text, share }] of Object.entries(robot)) {
+      // Borders of tiles and coarse ones make a little difference.
+      assert.ok(Math.abs(here[what].share - share) <= 0.02 * share, `${what}: ${here[what].share} here, ${share} by the robot`);
+      assert.equal(here[what].text.replace(/^[\d.]+/, ''), text.replace(/^[\d.]+/, ''));
+    }
+    await server.stop();
+  });
+
   test('Switching where colours are made leaves no pixel of the old setting', async () => {
     const server = await startServer(['--demo']);
     const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });

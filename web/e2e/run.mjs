@@ -328,7 +328,7 @@ test('The background has exactly the colour that was chosen', async () => {
 });
 
 test('A click reads the temperature', async () => {
-  await drawn(page);
+  await settled(page);
   const place = await page.evaluate(async () => {
     const { viewport } = globalThis.spectra;
     for (let y = 300; y < 700; y += 20) {
@@ -336,10 +336,18 @@ test('A click reads the temperature', async () => {
     }
     return null;
   });
+  // Under the pointer the value stands beside what is read, and goes where the card says the same.
+  await page.mouse.move(place.x, place.y, { steps: 3 });
+  const label = page.locator('.hover');
+  await label.waitFor();
+  const box = await label.boundingBox();
+  const away = [box.x - place.x, place.x - box.x - box.width, box.y - place.y, place.y - box.y - box.height];
+  assert.ok(Math.max(...away) >= 8, `the label ${JSON.stringify(box)} lies on ${JSON.stringify(place)}`);
   await page.mouse.click(place.x, place.y);
   const card = page.locator('.card');
   await card.waitFor();
   assert.match(await card.innerText(), /°C|no temperature/);
+  await label.waitFor({ state: 'detached' });
   await page.keyboard.press('Escape');
   await card.waitFor({ state: 'detached' });
 });

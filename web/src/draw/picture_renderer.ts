@@ -22,6 +22,7 @@ import { depthRange } from './depth_range';
 import { Outline } from './outline';
 import { PictureBuffer } from './picture_buffer';
 import { nearestHit } from './picking';
+import { SurfaceShare, vertexAreas } from './surface_share';
 import type {
   Eye,
   GpuObjects,
@@ -55,6 +56,8 @@ interface Tile {
   /** Number of the settings that its colours were fused with here; 0: they came as they are. */
   fusedWith: number;
   arrays: Omit<TileArrays, 'rgba'>;
+  /** What each vertex stands for, once it was asked for. */
+  areas: Float32Array | null;
 }
 
 /** A picture that is being drawn. */
@@ -158,6 +161,9 @@ export class PictureRenderer {
         break;
       case 'probe':
         this.reply({ kind: 'probed', id: request.id, vertex: this.#nearestVertex(request.point) });
+        break;
+      case 'share':
+        this.reply({ kind: 'shared', id: request.id, share: this.#highlightedShare() });
         break;
       case 'copy':
         void this.#copy(request.id);
@@ -332,6 +338,29 @@ export class PictureRenderer {
     };
   }
 
+  #highlightedShare(): number | null {
+    const fuser = this.#fuser;
+    if (this.#fusing === 0 || fuser === null) return null;
+    const sum = new SurfaceShare();
+    for (const tile of this.#tiles.values()) {
+      if (!tile.isShown) continue;
+      if (tile.raw === null) return null;
+      tile.areas ??= vertexAreas(tile.arrays);
+      let marked = tile.colours.array;
+      if (!this.#isOutlined || tile.fusedWith !== this.#fusing) {
+        const scratch = new Uint8Array(4 * tile.areas.length);
+        try {
+          fuser.fuse(tile.raw, scratch, true);
+        } catch {
+          return null;
+        }
+        marked = scratch;
+      }
+      sum.add(tile.areas, marked);
+    }
+    return sum.share;
+  }
+
   #drawn(): Tile['arrays'][] {
     return [...this.#tiles.values()].filter(({ isShown }) => isShown).map(({ arrays }) => arrays);
   }
@@ -360,6 +389,7 @@ export class PictureRenderer {
       arrived: null,
       fusedWith: 0,
       arrays: { positions, indices, centre, radius, point_spacing },
+      areas: null,
     };
   }
 

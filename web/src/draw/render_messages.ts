@@ -64,6 +64,8 @@ export type RenderRequest =
   | { kind: 'sight'; id: number; wish: SightWish }
   /** The vertex of what is drawn, and has raw arrays, that is nearest to a point. */
   | { kind: 'probe'; id: number; point: Vec3 }
+  /** How much of what is drawn is highlighted, where it is fused here. */
+  | { kind: 'share'; id: number }
   | { kind: 'copy'; id: number };
 
 /** Objects held on the GPU, and what the last picture drew. */
@@ -90,6 +92,8 @@ export type RenderReply =
   /** Everything up to picture `number` has been drawn; the last one took so long. */
   | { kind: 'drawn'; number: number; gpu: GpuObjects; ms: number }
   | { kind: 'picked'; id: number; distance: number | null }
+  /** 0 to 1; null where not all is fused here. */
+  | { kind: 'shared'; id: number; share: number | null }
   | { kind: 'probed'; id: number; vertex: ProbedVertex | null }
   /** Fusing here has failed; what was fused so far stands. */
   | { kind: 'not_fused'; message: string }

@@ -24,8 +24,8 @@ export interface FusingEvents {
   resubscribe: () => void;
   /** Settings are on their way to the server, or it has not answered yet. */
   isBusy: () => boolean;
-  /** What highlights in the settings that are now in force here. */
-  onHighlighted: (intervals: [number, number][]) => void;
+  /** What a method highlights in the settings that are now in force here. */
+  onHighlighted: (method: string, intervals: [number, number][]) => void;
 }
 
 /** What fusing needs of the picture. */
@@ -212,7 +212,7 @@ export class Fusing {
       return null;
     }
     const plan = planner.plan();
-    this.events.onHighlighted(plan.highlighted);
+    this.events.onHighlighted(wanted.method, plan.highlighted);
     const range = { ...wanted.range, min: plan.range_minimum, max: plan.range_maximum };
     return { ...wanted, params: plan.params, params_in_force: plan.params_in_force, range };
   }

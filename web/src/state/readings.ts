@@ -164,7 +164,10 @@ export class Readings {
     if (!this.store.scene || !this.store.pictureStands) return;
     try {
       const answer = await this.session.request('scene.histogram', { bins: HISTOGRAM_BINS });
-      this.store.histogram = histogram(answer, 'scene.histogram');
+      const found = histogram(answer, 'scene.histogram');
+      const method = this.store.fusionInForce?.method;
+      if (found.highlighted_share !== undefined && method !== undefined) this.store.highlighting[method] = true;
+      this.store.histogram = found;
     } catch (error) {
       this.session.onProblem(error);
     }

@@ -24,6 +24,7 @@ import { flightTo } from '../view/flight';
 import { highlightContrast } from '../view/highlight_contrast';
 import { FLATTEST, MARK_REACH_PX, Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
+import { HighlightedShare } from './highlighted_share';
 import { Fusing, type FusingWish } from './fusing';
 import { Progress } from './progress';
 import { QualityWish } from './quality_wish';
@@ -54,6 +55,7 @@ export class Session {
   readonly #intake: FrameIntake;
   readonly #look: FirstLook;
   readonly #markers: Markers;
+  readonly #share: HighlightedShare;
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   /** Colours of all of the scene in its first picture, which does not wait for what is said of them. */
   #firstColours: Uint8Array | null = null;
@@ -93,16 +95,12 @@ export class Session {
         store.upAxis = up;
       },
     );
+    this.#share = new HighlightedShare(store, this.viewport);
     this.fusing = new Fusing(store, this.tiles, this.viewport, {
       request,
       resubscribe: () => void this.#subscription.channelsChanged(),
       isBusy: () => this.settings.busy,
-      onHighlighted: (highlighted) => {
-        if (store.histogram === null) return;
-        // Of the surface only the robot knows the share.
-        const { highlighted_share: _share, ...rest } = store.histogram;
-        store.histogram = { ...rest, highlighted };
-      },
+      onHighlighted: (method, highlighted) => this.#share.changed(method, highlighted),
     });
     this.readings = new Readings(store, this.viewport, {
       request,
@@ -217,6 +215,7 @@ export class Session {
     this.#catalogue.dispose();
     this.#intake.dispose();
     this.#markers.dispose();
+    this.#share.dispose();
     this.tiles.clear();
     this.viewport.dispose();
   }

@@ -83,6 +83,8 @@ export class Store {
   refusals = $state<Record<string, string>>({});
 
   histogram = $state.raw<Histogram | null>(null);
+  /** Methods that are known to highlight. */
+  readonly highlighting: Record<string, true> = {};
   extremes = $state.raw<Extremes | null>(null);
   /** The hottest and the coldest place of the scene, and of what is on the screen, as they stand on it. */
   marks = $state.raw<readonly Mark[]>([]);

@@ -177,6 +177,12 @@ export class Viewport {
     return reply.kind === 'probed' ? reply.vertex : null;
   }
 
+  /** How much of what is drawn is highlighted, 0 to 1; null where not all of it is fused here. */
+  async highlightedShare(): Promise<number | null> {
+    const reply = await this.#ask((id) => ({ kind: 'share', id }));
+    return reply.kind === 'shared' ? reply.share : null;
+  }
+
   get aspect(): number {
     return this.#size[0] / this.#size[1];
   }

@@ -1,0 +1,62 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { HighlightedShare } from './highlighted_share';
+import type { Store } from './store.svelte';
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+function setUp() {
+  const store = {
+    histogram: { edges: [0, 1], counts: [1], mean: 0, sigma: 0, highlighted: [] },
+    highlighting: {},
+    fusingPlace: 'here',
+  } as unknown as Store;
+  const picture = { isUpToDate: true, share: 0.25 as number | null, highlightedShare: () => Promise.resolve(picture.share) };
+  const share = new HighlightedShare(store, picture);
+  const wait = () => vi.advanceTimersByTimeAsync(200);
+  return { store, picture, share, wait };
+}
+
+describe('Highlighted share of what is fused here', () => {
+  it('is what the picture says once it is up to date, and that of before until then', async () => {
+    const { store, picture, share, wait } = setUp();
+    share.changed('hot', [[30, 40]]);
+    expect(store.histogram?.highlighted).toEqual([[30, 40]]);
+    await wait();
+    expect(store.histogram?.highlighted_share).toBe(0.25);
+    [picture.isUpToDate, picture.share] = [false, 0.5];
+    share.changed('hot', [[20, 40]]);
+    await wait();
+    expect(store.histogram).toMatchObject({ highlighted: [[20, 40]], highlighted_share: 0.25 });
+    picture.isUpToDate = true;
+    await wait();
+    expect(store.histogram?.highlighted_share).toBe(0.5);
+  });
+
+  it('is nothing where a method that highlights finds nothing, and none of a method that does not', async () => {
+    const { store, picture, share, wait } = setUp();
+    share.changed('hot', [[30, 40]]);
+    await wait();
+    picture.share = 0;
+    share.changed('hot', []);
+    await wait();
+    expect(store.histogram?.highlighted_share).toBe(0);
+    share.changed('all_alike', []);
+    expect(store.histogram).not.toHaveProperty('highlighted_share');
+    await wait();
+    expect(store.histogram).not.toHaveProperty('highlighted_share');
+  });
+
+  it('is not said where the picture cannot tell, nor when colours come from the robot again', async () => {
+    const { store, picture, share, wait } = setUp();
+    picture.share = null;
+    share.changed('hot', [[30, 40]]);
+    await wait();
+    expect(store.histogram).not.toHaveProperty('highlighted_share');
+    picture.share = 0.5;
+    share.changed('hot', [[31, 40]]);
+    (store as { fusingPlace: string }).fusingPlace = 'robot';
+    await wait();
+    expect(store.histogram).not.toHaveProperty('highlighted_share');
+  });
+});
