@@ -6,6 +6,7 @@ import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
 import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
 import { readPly } from "./ply.mjs";
 import { binary, run, serve } from "./spectra_server.mjs";
 
@@ -97,7 +98,8 @@ function generator(seed) {
 }
 
 const TOKENS = ["nan", "-1", "999999999999", "1e308", "-1e39", "inf", "1.#IND", "0,5", "\n", "\r", "\0", "end_header\n", "element face 4000000000\n",
-  "element vertex 99999999\n", "property list uint int64 vertex_indices\n", "property float temperature\n", "4294967295", " ", "\x1f\x8b"];
+  "element vertex 99999999\n", "property list uint int64 vertex_indices\n", "property float temperature\n", "4294967295", " ", "\x1f\x8b",
+  "comment up -y; units: mm\n", "6 0 1 2 14 13 12\n", "5 0 13 1 12 14\n", "property list uchar int corners\n", "property uchar red\n"];
 
 const VALUES = ["nan", "-nan(ind)", "inf", "-inf", "0", "-1", "1", "7", "143", "255", "65535", "1e39", "-1e39", "1e300", "-273.15", "-9999", "1.5D+01", "0.5", "float"];
 
@@ -145,11 +147,20 @@ test("300 damaged files: exit 0, 1 or 2 within 2 s of the processor and 1 GB", {
   const files = readdirSync(field).sort().map((name) => readFileSync(inField(name)));
   assert.ok(files.length >= 70);
   const damaged = path.join(folder, "damaged.ply");
-  const output = path.join(folder, "out.ply");
+  const outputs = ["out.ply", "out.glb", "out.drc"].map((name) => path.join(folder, name));
+  const uses = [
+    ["fuse", damaged, outputs[0], "--method", "histogram_bin"],
+    ["fuse", damaged, outputs[1], "--method", "thermal_only", "--scale", "1e16", "--up", "auto"],
+    ["fuse", damaged, outputs[2], "--method", "thermal_only", "--scale", "1e-16"],
+    ["fuse", damaged, outputs[2], "--method", "thermal_only", "--keep-order"],
+    ["fuse", damaged, outputs[0], "--method", "thermal_only", "--thermal", inField("42-thermal-other-order.ply")],
+    ["fuse", inField("42-visible.ply"), outputs[0], "--method", "thermal_only", "--thermal", damaged],
+  ];
   const counts = { 0: 0, 1: 0, 2: 0 };
   for (let i = 0; i < 300; ++i) {
-    writeFileSync(damaged, mutated(files[i % files.length], files, random));
-    for (const args of [["info", damaged, "--json"], ["fuse", damaged, output, "--method", "histogram_bin"]]) {
+    const bytes = mutated(files[i % files.length], files, random);
+    writeFileSync(damaged, i % 10 === 9 ? gzipSync(bytes) : bytes);
+    for (const args of [["info", damaged, "--json"], uses[i % uses.length]]) {
       const { status, signal, stderr } = spawnSync("bash", ["-c", 'ulimit -t 2 -v 1048576; exec "$@"', "limited", binary, ...args], { encoding: "utf8" });
       assert.ok(status === 0 || status === 1 || status === 2, `mutation ${i}: ${args[0]}: exit ${status}, signal ${signal}: ${stderr}`);
       if (status !== 0) assert.match(stderr.trim(), /^spectra: .+$/m, `mutation ${i}`);
