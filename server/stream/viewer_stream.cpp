@@ -9,7 +9,7 @@
 #include "server/stream/frame_cache.hpp"
 #include "server/stream/lattice.hpp"
 #include "server/stream/quality_frontier.hpp"
-#include "server/stream/raw_layers.hpp"
+#include "server/stream/raw_lane.hpp"
 #include "server/stream/screen_accuracy.hpp"
 #include "server/stream/sending_order.hpp"
 #include "server/stream/sending_window.hpp"
@@ -32,10 +32,6 @@ static_assert(RawDemand::kLayers[kTemperature] == Layer::Temperature && RawDeman
 // After every tile of anybody: raw layers fill what time is left.
 constexpr int kRawPriority = 100;
 
-// How much may wait, encoded, for the window of one viewer. Enough to bridge the making of the next tile, little
-// enough that a viewer who stopped reading costs nothing.
-constexpr std::size_t kPreparedBytes = 1u << 20;
-
 // Of jobs beyond a viewer's UrgentBudget: behind every level, in order of arrival.
 constexpr int kInTurnPriority = 50;
 
@@ -51,21 +47,37 @@ std::size_t frame_size(const Payload& payload) {
   return protocol::kTileFrameHeaderSize + payload->size();
 }
 
-// Of a slot that is Ready.
-TileFrameHeader header_of(const TileSlot& slot, FrameKind kind) {
+// What a tile says of itself, whatever is sent of it.
+TileFrameHeader header_of(const map::Tile& tile, FrameKind kind) {
   TileFrameHeader header;
   header.kind = kind;
-  header.child_mask = slot.tile->child_mask;
-  header.tile = slot.tile->id;
+  header.child_mask = tile.child_mask;
+  header.tile = tile.id;
+  header.geometric_error_m = tile.geometric_error_m;
+  header.colour_error_levels = tile.colour_error_levels;
+  header.temperature_error_celsius = tile.temperature_error_celsius;
+  header.lowest_celsius = tile.lowest_celsius;
+  header.highest_celsius = tile.highest_celsius;
+  return header;
+}
+
+// Of a slot that is Ready.
+TileFrameHeader prepared_header_of(const TileSlot& slot, FrameKind kind) {
+  TileFrameHeader header = header_of(*slot.tile, kind);
   header.revision = slot.held.wire_revision;
   header.vertex_count = static_cast<std::uint32_t>(slot.prepared.geometry->input_of_decoded.size());
   header.origin_m = slot.prepared.geometry->origin_m;
   header.position_step_m = slot.prepared.geometry->position_step_m;
-  header.geometric_error_m = slot.tile->geometric_error_m;
-  header.colour_error_levels = slot.tile->colour_error_levels;
-  header.temperature_error_celsius = slot.tile->temperature_error_celsius;
-  header.lowest_celsius = slot.tile->lowest_celsius;
-  header.highest_celsius = slot.tile->highest_celsius;
+  return header;
+}
+
+// Of a slot whose geometry the viewer has.
+TileFrameHeader held_header_of(const TileSlot& slot, FrameKind kind) {
+  TileFrameHeader header = header_of(*slot.tile, kind);
+  header.revision = slot.held.wire_revision;
+  header.vertex_count = slot.held.vertex_count;
+  header.origin_m = slot.held.origin_m;
+  header.position_step_m = slot.held.position_step_m;
   return header;
 }
 
@@ -86,7 +98,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       closed_ = true;
       tiles_.clear();
       order_.clear();
-      raw_order_.clear();
+      raw_.clear();
     }
     // Taking this lock waits for a wake that is being called right now; none follows.
     const std::lock_guard lock(wake_mutex_);
@@ -207,56 +219,22 @@ class Stream final : public ViewerStream, public CacheWaiter {
   std::optional<OutgoingFrame> next_frame(double now_s) override {
     const std::lock_guard lock(mutex_);
     wake_pending_ = false;
-    if (closed_ || !subscribed_) return std::nullopt;
+    if (!may_work()) return std::nullopt;
     if (tiles_.has_removals()) return next_removal(now_s);
     if (head() == nullptr) refine();
     while (TileSlot* slot = head()) {
       if (tiles_.has_removals()) return next_removal(now_s);
       if (slot->work == TileSlot::Work::Idle) preparation_.look_up(*slot, demand_);
       if (slot->work != TileSlot::Work::Ready) break;
-      if (slot->held.revision != slot->prepared.geometry->revision) {
-        if (!window_.admits(frame_size(slot->prepared.geometry->payload))) return std::nullopt;
-        const std::uint32_t name = slot->prepared.geometry->revision > slot->held.wire_revision
-                                       ? slot->prepared.geometry->revision
-                                       : cache_->unused_revision();
-        if (name <= slot->held.wire_revision) {
-          // Resumed under a revision that never was; what replaces it has to be newer.
-          tiles_.remove_from_viewer(*slot);
-          continue;
-        }
-        tiles_.give_geometry(*slot, name, demand_.geometry_epoch);
-        auto frame = given_out(header_of(*slot, FrameKind::Geometry), slot->prepared.geometry->payload, now_s);
-        if (!demand_.fused) note_geometry_alone(*slot);
-        return frame;
-      }
-      note_geometry(*slot);
-      std::optional<OutgoingFrame> frame;
-      if (!slot->has_colours(demand_)) {
-        const bool is_first_picture = slot->held.colour_epoch == 0 && !tiles_.tree().nodes()[slot->node].parent;
-        const std::size_t size_bytes = frame_size(slot->prepared.colours);
-        const auto urgency = slot->wish.is_target ? SendingWindow::Urgency::Detail : SendingWindow::Urgency::Answer;
-        if (!window_.admits(size_bytes, urgency) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
-          if (window_.admits(size_bytes)) window_.on_idle();  // It is we who wait, not the link.
-          return std::nullopt;
-        }
-        auto header = header_of(*slot, protocol::colour_frame_kind(demand_.colour_transform));
-        header.generation = generation_;
-        tiles_.give_colours(*slot, demand_.colour_epoch);
-        colour_cost_.learn(slot->prepared.colour_bits, header.vertex_count, slot->prepared.colours->size());
-        frame = given_out(header, slot->prepared.colours, now_s);
-        if (slot->wish.is_target && !is_refining_due()) tiles_.remove_outdated_beneath(*slot, demand_);
-      }
-      tiles_.put_down(*slot);
-      if (frame) {
-        post_jobs();
-        return frame;
-      }
+      const bool is_geometry_due = slot->held.revision != slot->prepared.geometry->revision;
+      const Attempt attempt = is_geometry_due ? next_geometry(*slot, now_s) : next_colours(*slot, now_s);
+      if (attempt.frame || attempt.is_held_up) return attempt.frame;
       if (head() == nullptr) refine();
     }
     // What is complete is said before raw layers follow.
     if (demand_.fused && is_complete()) return std::nullopt;
     if (head() == nullptr && !is_refining_due()) {
-      if (const auto due = raw_head()) return next_raw(*due, now_s);
+      if (const auto due = raw_.head(demand_)) return next_raw(*due, now_s);
     }
     window_.on_idle();
     post_jobs();
@@ -321,7 +299,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
         drop_superseded();
       }
       order_.rewind();
-      raw_head_ = 0;
+      raw_.rewind();
       if (TileSlot* slot = head(); slot != nullptr && slot->work == TileSlot::Work::Idle) {
         preparation_.look_up(*slot, demand_);
       }
@@ -344,7 +322,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
       ++complete.tile_count;
       complete.vertex_count += slot->held.vertex_count;
     }
-    is_followed = raw_head().has_value();
+    is_followed = raw_.head(demand_).has_value();
     return complete;
   }
 
@@ -359,7 +337,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   void adopt(std::shared_ptr<const map::SceneSnapshot> scene) {
     scene_ = std::move(scene);
     order_.clear();
-    raw_order_.clear();
+    raw_.clear();
     tiles_.adopt(*scene_);
     take_looks();
     is_complete_due_ = true;
@@ -440,8 +418,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     const bool is_slow = rate > 0 && !is_quick;
     demand_.preview_colour_bits = is_slow ? std::min(demand_.colour_bits, kPreviewColourBits) : demand_.colour_bits;
     order_.choose(tiles_, chosen, is_quick ? 0 : kPreviewShare * vertices);
-    raw_order_ = raw_order(order_.slots(), tiles_.tree(), camera_);
-    raw_head_ = 0;
+    raw_.choose(raw_order(order_.slots(), tiles_.tree(), camera_));
     remove_surplus();
     remove_outdated();
   }
@@ -468,7 +445,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
 
   bool is_complete() {
     return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && !tiles_.has_removals() && head() == nullptr &&
-           !is_refining_due() && (demand_.fused || !raw_head());
+           !is_refining_due() && (demand_.fused || !raw_.head(demand_));
   }
 
   bool has_news() {
@@ -476,8 +453,56 @@ class Stream final : public ViewerStream, public CacheWaiter {
     if (tiles_.has_removals() || is_complete() || (head() == nullptr && is_refining_due())) return true;
     const TileSlot* slot = head();
     if (slot != nullptr) return slot->work == TileSlot::Work::Ready;
-    const auto due = raw_head();
+    const auto due = raw_.head(demand_);
     return due && due->raw().work == TileSlot::Work::Ready;
+  }
+
+  // What a Ready slot gives: a frame, nothing yet because of the window, or nothing at all.
+  struct Attempt {
+    std::optional<OutgoingFrame> frame;
+    bool is_held_up = false;
+  };
+
+  Attempt next_geometry(TileSlot& slot, double now_s) {
+    if (!window_.admits(frame_size(slot.prepared.geometry->payload))) return {std::nullopt, true};
+    const std::uint32_t revision = slot.prepared.geometry->revision;
+    const std::uint32_t name = revision > slot.held.wire_revision ? revision : cache_->unused_revision();
+    if (name <= slot.held.wire_revision) {
+      // Resumed under a revision that never was; what replaces it has to be newer.
+      tiles_.remove_from_viewer(slot);
+      return {};
+    }
+    tiles_.give_geometry(slot, name, demand_.geometry_epoch);
+    auto frame = given_out(prepared_header_of(slot, FrameKind::Geometry), slot.prepared.geometry->payload, now_s);
+    if (!demand_.fused) {
+      // Nothing more of the tile follows in this lane.
+      note_geometry(slot);
+      tiles_.put_down(slot);
+    }
+    return {std::move(frame)};
+  }
+
+  Attempt next_colours(TileSlot& slot, double now_s) {
+    note_geometry(slot);
+    std::optional<OutgoingFrame> frame;
+    if (!slot.has_colours(demand_)) {
+      const bool is_first_picture = slot.held.colour_epoch == 0 && !tiles_.tree().nodes()[slot.node].parent;
+      const std::size_t size_bytes = frame_size(slot.prepared.colours);
+      const auto urgency = slot.wish.is_target ? SendingWindow::Urgency::Detail : SendingWindow::Urgency::Answer;
+      if (!window_.admits(size_bytes, urgency) && !(is_first_picture && window_.admits_first_picture(size_bytes))) {
+        if (window_.admits(size_bytes)) window_.on_idle();  // It is we who wait, not the link.
+        return {std::nullopt, true};
+      }
+      auto header = prepared_header_of(slot, protocol::colour_frame_kind(demand_.colour_transform));
+      header.generation = generation_;
+      tiles_.give_colours(slot, demand_.colour_epoch);
+      colour_cost_.learn(slot.prepared.colour_bits, header.vertex_count, slot.prepared.colours->size());
+      frame = given_out(header, slot.prepared.colours, now_s);
+      if (slot.wish.is_target && !is_refining_due()) tiles_.remove_outdated_beneath(slot, demand_);
+    }
+    tiles_.put_down(slot);
+    if (frame) post_jobs();
+    return {std::move(frame)};
   }
 
   // A tile's geometry has gone out and is the one in force.
@@ -486,12 +511,6 @@ class Stream final : public ViewerStream, public CacheWaiter {
     slot.held.position_step_m = slot.prepared.geometry->position_step_m;
     slot.held.vertex_count = static_cast<std::uint32_t>(slot.prepared.geometry->input_of_decoded.size());
     slot.held.origin_m = slot.prepared.geometry->origin_m;
-  }
-
-  // The same where nothing more of the tile follows in this lane.
-  void note_geometry_alone(TileSlot& slot) {
-    note_geometry(slot);
-    tiles_.put_down(slot);
   }
 
   void take_channels(const Subscription& subscription) {
@@ -509,123 +528,22 @@ class Stream final : public ViewerStream, public CacheWaiter {
     answer_first();
   }
 
-  // A raw layer that is to be sent.
-  struct RawDue {
-    std::shared_ptr<TileSlot> slot;
-    std::size_t layer;
-    TileSlot::Raw& raw() const { return slot->raw[layer]; }
-  };
-
-  // The first one; what was passed is looked at again after every change.
-  std::optional<RawDue> raw_head() { return next_raw_due(raw_head_); }
-
-  // The first one from place `at` on, which becomes its place. Two places a slot.
-  std::optional<RawDue> next_raw_due(std::size_t& at) const {
-    constexpr std::size_t kLayers = RawDemand::kLayers.size();
-    for (; at < kLayers * raw_order_.size(); ++at) {
-      const auto& slot = raw_order_[at / kLayers];
-      if (slot->lacks_raw(at % kLayers, demand_)) return RawDue{slot, at % kLayers};
-    }
-    return std::nullopt;
-  }
-
-  std::optional<OutgoingFrame> next_raw(const RawDue& due, double now_s) {
-    TileSlot::Raw& raw = due.raw();
-    if (raw.work == TileSlot::Work::Idle) {
-      if (auto payload = cache_->find_colours(raw_key(due))) make_raw_ready(due, std::move(payload));
-    }
-    if (raw.work != TileSlot::Work::Ready) {
+  std::optional<OutgoingFrame> next_raw(const RawLane::Due& due, double now_s) {
+    raw_.look_up(due, demand_);
+    if (due.raw().work != TileSlot::Work::Ready) {
       window_.on_idle();
       post_jobs();
       return std::nullopt;
     }
-    if (!window_.admits(frame_size(raw.payload), SendingWindow::Urgency::Detail)) return std::nullopt;
-    auto header = raw_header(*due.slot, due.layer);
-    raw.held_epoch = demand_.raw.epoch[due.layer];
-    raw.work = TileSlot::Work::Idle;
-    auto frame = given_out(header, std::exchange(raw.payload, nullptr), now_s);
-    if (!demand_.fused && !raw_head()) is_complete_due_ = true;
+    if (!window_.admits(frame_size(due.raw().payload), SendingWindow::Urgency::Detail)) return std::nullopt;
+    auto frame = given_out(held_header_of(*due.slot, raw_frame_kind(due.layer)), raw_.give(due, demand_), now_s);
+    if (!demand_.fused && !raw_.head(demand_)) is_complete_due_ = true;
     post_jobs();
     return frame;
   }
 
-  TileFrameHeader raw_header(const TileSlot& slot, std::size_t layer) const {
-    TileFrameHeader header;
-    header.kind =
-        layer == kTemperature ? FrameKind::Temperature : protocol::visible_frame_kind(demand_.colour_transform);
-    header.child_mask = slot.tile->child_mask;
-    header.tile = slot.tile->id;
-    header.revision = slot.held.wire_revision;
-    header.vertex_count = slot.held.vertex_count;
-    header.origin_m = slot.held.origin_m;
-    header.position_step_m = slot.held.position_step_m;
-    header.geometric_error_m = slot.tile->geometric_error_m;
-    header.colour_error_levels = slot.tile->colour_error_levels;
-    header.temperature_error_celsius = slot.tile->temperature_error_celsius;
-    header.lowest_celsius = slot.tile->lowest_celsius;
-    header.highest_celsius = slot.tile->highest_celsius;
-    return header;
-  }
-
-  ColourKey raw_key(const RawDue& due) const {
-    return demand_.raw_key(due.slot->held.revision, RawDemand::kLayers[due.layer]);
-  }
-
-  void make_raw_ready(const RawDue& due, Payload payload) {
-    due.raw().payload = std::move(payload);
-    due.raw().work = TileSlot::Work::Ready;
-  }
-
-  // How many raw layers jobs could begin with, at most `most`.
-  unsigned startable_raw_count(unsigned most) {
-    unsigned startable = 0;
-    std::size_t at = raw_head_;
-    std::size_t prepared_bytes = 0;
-    for (auto due = next_raw_due(at); due && startable < most && prepared_bytes < kPreparedBytes;
-         due = next_raw_due(++at)) {
-      if (due->raw().payload) prepared_bytes += due->raw().payload->size();
-      if (due->raw().work == TileSlot::Work::Idle) ++startable;
-    }
-    return startable;
-  }
-
-  // The next raw layer that nobody has or makes, for a job.
-  std::optional<RawEncoding> next_raw_encoding() {
-    if (closed_ || !subscribed_ || head() != nullptr) return std::nullopt;
-    std::size_t at = 0;
-    std::size_t prepared_bytes = 0;
-    for (auto due = next_raw_due(at); due && prepared_bytes < kPreparedBytes; due = next_raw_due(++at)) {
-      if (due->raw().payload) prepared_bytes += due->raw().payload->size();
-      if (due->raw().work != TileSlot::Work::Idle) continue;
-      auto claim = cache_->claim_colours(raw_key(*due), weak_waiter());
-      switch (claim.kind) {
-        case Claim<std::vector<std::byte>>::Kind::Ready:
-          prepared_bytes += claim.value->size();
-          make_raw_ready(*due, std::move(claim.value));
-          break;
-        case Claim<std::vector<std::byte>>::Kind::Busy:
-          due->raw().work = TileSlot::Work::Waiting;
-          break;
-        case Claim<std::vector<std::byte>>::Kind::Yours:
-          due->raw().work = TileSlot::Work::Busy;
-          return RawEncoding{due->slot, due->slot->tile, demand_, due->layer, due->slot->held.revision};
-      }
-    }
-    return std::nullopt;
-  }
-
-  void finish_raw(const RawEncoding& done) {
-    TileSlot::Raw& raw = done.slot->raw[done.layer];
-    raw.work = TileSlot::Work::Idle;
-    const bool is_current =
-        done.slot->held.revision == done.revision && demand_.raw.epoch[done.layer] == done.demand.raw.epoch[done.layer];
-    if (!done.made && is_current) {
-      ++failed_tile_count_;
-      raw.failed_epoch = done.demand.raw.epoch[done.layer];
-    }
-    if (done.made && is_current && done.slot->lacks_raw(done.layer, demand_)) {
-      make_raw_ready({done.slot, done.layer}, done.made);
-    }
+  FrameKind raw_frame_kind(std::size_t layer) const {
+    return layer == kTemperature ? FrameKind::Temperature : protocol::visible_frame_kind(demand_.colour_transform);
   }
 
   std::optional<OutgoingFrame> next_removal(double now_s) {
@@ -641,19 +559,21 @@ class Stream final : public ViewerStream, public CacheWaiter {
     return frame;
   }
 
+  bool may_work() const { return !closed_ && subscribed_; }
+
   bool is_needed(const TileSlot& slot) const {
-    return !closed_ && subscribed_ && !slot.is_gone && slot.wish.is_wanted && !tiles_.is_satisfied(slot, demand_);
+    return may_work() && !slot.is_gone && slot.wish.is_wanted && !tiles_.is_satisfied(slot, demand_);
   }
 
   bool may_start(std::size_t index) const {
     const TileSlot& slot = *order_.slots()[index];
     return slot.work == TileSlot::Work::Idle &&
-           (index == order_.head_index() || tiles_.prepared_bytes() < kPreparedBytes) &&
+           (index == order_.head_index() || tiles_.prepared_bytes() < RawLane::kPreparedBytes) &&
            !tiles_.is_satisfied(slot, demand_);
   }
 
   std::optional<Encoding> next_encoding() {
-    if (closed_ || !subscribed_ || head() == nullptr) return std::nullopt;
+    if (!may_work() || head() == nullptr) return std::nullopt;
     for (std::size_t index = order_.head_index(); index < order_.slots().size(); ++index) {
       const auto& slot = order_.slots()[index];
       if (!may_start(index) || !is_needed(*slot)) continue;
@@ -681,11 +601,11 @@ class Stream final : public ViewerStream, public CacheWaiter {
   // A job is a promise to do whatever is most urgent when its turn comes, so what was superseded while it waited
   // costs nothing, few are enough, and viewers take turns tile by tile.
   void post_jobs() {
-    if (closed_ || !subscribed_ || !demand_.plan) return;
+    if (!may_work() || !demand_.plan) return;
     const unsigned most = pool_.thread_count() + 1;
     unsigned startable = 0;
     int priority = kRawPriority;
-    if (head() == nullptr) startable = startable_raw_count(most);
+    if (head() == nullptr) startable = raw_.startable_count(most, demand_);
     for (std::size_t index = order_.head_index(); index < order_.slots().size() && startable < most; ++index) {
       if (!may_start(index)) continue;
       if (startable++ == 0) priority = order_.slots()[index]->tile->id.level;
@@ -715,12 +635,12 @@ class Stream final : public ViewerStream, public CacheWaiter {
       --waiting_job_count_;
       ++running_job_count_;
       encoding = next_encoding();
-      if (!encoding) raw = next_raw_encoding();
+      if (!encoding && may_work() && head() == nullptr) raw = raw_.next_encoding(demand_, weak_waiter());
     }
     if (raw) {
       encode(*raw, *cache_);
       const std::lock_guard lock(mutex_);
-      finish_raw(*raw);
+      if (raw_.finish(*raw, demand_)) ++failed_tile_count_;
     }
     while (encoding) {
       const auto begin = UrgentBudget::Clock::now();
@@ -754,8 +674,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   Demand demand_;
   ViewerTiles tiles_;
   SendingOrder order_;
-  std::vector<std::shared_ptr<TileSlot>> raw_order_;
-  std::size_t raw_head_ = 0;  // Everything before it is there; two places a slot.
+  RawLane raw_{*cache_};
   SlotPreparation preparation_{*cache_, tiles_};
   SendingWindow window_;
   UrgentBudget budget_;
