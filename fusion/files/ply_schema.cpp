@@ -21,13 +21,22 @@ std::optional<std::size_t> find_scalar(const PlyElement& element, std::string_vi
   return found;
 }
 
+/// For a message.
+std::string scalar_names(const PlyElement& element) {
+  std::string names;
+  for (const PlyProperty& property : element.properties) {
+    if (!property.is_list && names.size() < 120) names += (names.empty() ? "" : ", ") + printable(property.name);
+  }
+  return names.empty() ? "none" : names;
+}
+
 base::Result<void> find_positions(const PlyElement& element, PlySlots& slots) {
   constexpr std::array<std::string_view, 3> kAxes = {"x", "y", "z"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     slots[kX + axis] = find_scalar(element, kAxes[axis]);
     if (!slots[kX + axis]) {
-      return base::failure(base::ErrorCode::BadHeader,
-                           "element 'vertex' has no property '" + std::string(kAxes[axis]) + "'");
+      return base::failure(base::ErrorCode::BadHeader, "element 'vertex' has no property '" + std::string(kAxes[axis]) +
+                                                           "' (it has " + scalar_names(element) + ")");
     }
   }
   return base::success();
@@ -39,14 +48,17 @@ std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& sl
     std::array<std::string_view, 3> names;
     ColourCoding coding;
   };
-  constexpr std::array<Names, 8> kNames = {{{{"red", "green", "blue"}, ColourCoding::Channels},
-                                            {{"diffuse_red", "diffuse_green", "diffuse_blue"}, ColourCoding::Channels},
-                                            {{"r", "g", "b"}, ColourCoding::Channels},
-                                            {{"scalar_red", "scalar_green", "scalar_blue"}, ColourCoding::Channels},
-                                            {{"scalar_r", "scalar_g", "scalar_b"}, ColourCoding::Channels},
-                                            {{"rgb", "rgb", "rgb"}, ColourCoding::Packed},
-                                            {{"rgba", "rgba", "rgba"}, ColourCoding::Packed},
-                                            {{"f_dc_0", "f_dc_1", "f_dc_2"}, ColourCoding::Splat}}};
+  constexpr std::array<Names, 11> kNames = {{{{"red", "green", "blue"}, ColourCoding::Channels},
+                                             {{"diffuse_red", "diffuse_green", "diffuse_blue"}, ColourCoding::Channels},
+                                             {{"r", "g", "b"}, ColourCoding::Channels},
+                                             {{"scalar_red", "scalar_green", "scalar_blue"}, ColourCoding::Channels},
+                                             {{"scalar_r", "scalar_g", "scalar_b"}, ColourCoding::Channels},
+                                             {{"rgb", "rgb", "rgb"}, ColourCoding::Packed},
+                                             {{"rgba", "rgba", "rgba"}, ColourCoding::Packed},
+                                             {{"f_dc_0", "f_dc_1", "f_dc_2"}, ColourCoding::Splat},
+                                             {{"gray", "gray", "gray"}, ColourCoding::Channels},
+                                             {{"grey", "grey", "grey"}, ColourCoding::Channels},
+                                             {{"luminance", "luminance", "luminance"}, ColourCoding::Channels}}};
   for (const auto& [names, coding] : kNames) {
     const std::array<std::optional<std::size_t>, 3> indices = {
         find_scalar(element, names[0]), find_scalar(element, names[1]), find_scalar(element, names[2])};
@@ -91,13 +103,10 @@ base::Result<void> find_temperatures(const PlyElement& vertices, const PlyElemen
     schema.vertex[kTemperature] = find_scalar(vertices, wanted);
     if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_scalar(*faces, wanted);
     if (schema.has_vertex_temperature() || schema.has_face_temperature()) return base::success();
-    std::string names;
-    for (const PlyProperty& property : vertices.properties) {
-      if (!property.is_list && names.size() < 120) names += (names.empty() ? "" : ", ") + printable(property.name);
-    }
-    return base::failure(base::ErrorCode::Unsupported,
-                         "there is no scalar property '" + printable(wanted) + "' (the vertices have " + names + ")",
-                         "temperature_property");
+    return base::failure(
+        base::ErrorCode::Unsupported,
+        "there is no scalar property '" + printable(wanted) + "' (the vertices have " + scalar_names(vertices) + ")",
+        "temperature_property");
   }
   schema.vertex[kTemperature] = find_temperature(vertices);
   if (!schema.has_vertex_temperature() && faces != nullptr) schema.face[kTemperature] = find_temperature(*faces);

@@ -92,6 +92,13 @@ base::Result<void> PlyStream::interpret() {
   PlySchema& schema = interpretation_.schema;
   BOOST_OUTCOME_TRY(schema, ply_schema(header_, options_));
   BOOST_OUTCOME_TRY(check_size());
+  if (has_other_byte_order(file_, header_, schema)) {
+    return base::failure(
+        base::ErrorCode::BadValue,
+        std::string("the positions make sense only with their bytes the other way round: give the "
+                    "header's format line ") +
+            (header_.format == PlyFormat::BinaryBigEndian ? "binary_little_endian" : "binary_big_endian"));
+  }
   schema.true_colour_type = true_colour_type(file_, header_, schema);
   if (needs_survey(header_, schema)) {
     BOOST_OUTCOME_TRY(interpretation_.survey, ply_survey(file_, header_, schema, options_));

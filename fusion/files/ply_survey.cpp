@@ -178,6 +178,44 @@ base::Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, co
 
 }  // namespace
 
+bool has_other_byte_order(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {
+  const PlyElement& vertices = *header.find("vertex");
+  // Behind lists the vertices would not even be found.
+  if (header.format == PlyFormat::Ascii || &vertices != header.elements.data() || !has_no_list(vertices)) return false;
+  for (std::size_t slot = kX; slot <= kZ; ++slot) {
+    if (!is_floating(vertices.properties[*schema.vertex[slot]].type)) return false;
+  }
+  struct Sense {
+    std::size_t all = 0, sensible = 0;
+  };
+  const auto sense_of = [&](const PlyHeader& tried) {
+    constexpr double kLeast = 1e-9;
+    constexpr double kMost = 1e12;
+    Sense sense;
+    PlyCursor cursor(file, tried);
+    cursor.begin_element(vertices);
+    PlyVertexReader reader(cursor, vertices, schema);
+    const auto block = reader.next();
+    if (!block) return sense;
+    for (const base::Vec3d& p : block.value().positions) {
+      for (const double coordinate : {std::abs(p.x), std::abs(p.y), std::abs(p.z)}) {
+        if (coordinate == 0 || std::isnan(coordinate)) continue;
+        ++sense.all;
+        if (coordinate >= kLeast && coordinate <= kMost) ++sense.sensible;
+      }
+    }
+    return sense;
+  };
+  constexpr std::size_t kFewest = 12;
+  const Sense as_told = sense_of(header);
+  if (as_told.all < kFewest || as_told.sensible * 2 > as_told.all) return false;
+  PlyHeader other = header;
+  const bool is_big = header.format == PlyFormat::BinaryBigEndian;
+  other.format = is_big ? PlyFormat::BinaryLittleEndian : PlyFormat::BinaryBigEndian;
+  const Sense turned = sense_of(other);
+  return turned.sensible >= kFewest && turned.sensible * 20 > turned.all * 19;
+}
+
 std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {
   if (header.format != PlyFormat::Ascii || !schema.has_vertex_colours() ||
       schema.colour_coding != ColourCoding::Channels) {

@@ -37,6 +37,10 @@ struct PlySurvey {
 /// floating one, or one of 16 bits; nullopt: they are as declared, or nothing can be told. Moves the file.
 std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
 
+/// The positions of a binary file make sense only with their bytes the other way round, as far as its beginning tells. Moves
+/// the file.
+bool has_other_byte_order(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
+
 /// The file's values must be looked at before they are read.
 bool needs_survey(const PlyHeader& header, const PlySchema& schema);
 

@@ -682,6 +682,49 @@ TEST(FieldKinds, ScalarFieldsOfColoursAreColours) {
   }
 }
 
+TEST(FieldKinds, GreyIsAColour) {
+  for (const char* name : {"gray", "grey", "Luminance"}) {
+    const LoadedScene scene = loaded(text_file("property uchar " + std::string(name) + "\n", {"0 0 0 7", "1 0 0 200"}));
+    EXPECT_TRUE(scene.mesh.has_visible) << name;
+    EXPECT_EQ(scene.mesh.visible()[1], (base::Rgb8{200, 200, 200})) << name;
+  }
+  PlyBytes binary;
+  binary.text("ply\nformat binary_little_endian 1.0\nelement vertex 2\n" + std::string(kXyz) +
+              "property uchar gray\nend_header\n");
+  for (const std::uint8_t level : {std::uint8_t{9}, std::uint8_t{90}}) {
+    binary.le(1.0F).le(2.0F).le(3.0F * static_cast<float>(level)).le(level);
+  }
+  EXPECT_EQ(loaded(binary.bytes()).mesh.visible()[1], (base::Rgb8{90, 90, 90}));
+}
+
+TEST(FieldKinds, TheWrongByteOrderOfACloudIsSeen) {
+  const auto cloud = [](const std::string& format, const std::string& type, double size) {
+    PlyBytes bytes;
+    bytes.text("ply\nformat " + format + " 1.0\nelement vertex 200\nproperty " + type + " x\nproperty " + type +
+               " y\nproperty " + type + " z\nend_header\n");
+    for (int i = 0; i < 200; ++i) {
+      for (const double value : {size * std::sin(i), size * std::cos(i), 0.0}) {
+        if (type == "float") {
+          bytes.le(static_cast<float>(value));
+        } else {
+          bytes.le(value);
+        }
+      }
+    }
+    return test::read_bytes(bytes.bytes());
+  };
+  for (const char* type : {"float", "double"}) {
+    for (const double size : {1e-5, 3.0, 4.5e6}) {
+      EXPECT_TRUE(cloud("binary_little_endian", type, size)) << type << size;
+      const auto wrong = cloud("binary_big_endian", type, size);
+      ASSERT_FALSE(wrong) << type << size;
+      EXPECT_NE(wrong.error().message.find("format line binary_little_endian"), std::string::npos)
+          << wrong.error().message;
+    }
+    EXPECT_TRUE(cloud("binary_little_endian", type, 1e-30)) << "small, but no better the other way round: " << type;
+  }
+}
+
 /// A text is not bound to its declaration: shares of white were black without a word.
 TEST(FieldKinds, ColoursOfATextMayBeOtherThanItSays) {
   const auto colours = [](const std::string& white, const std::string& half) {
