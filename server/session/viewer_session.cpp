@@ -18,6 +18,7 @@
 #include "server/jobs/priority.hpp"
 #include "server/net/steady_seconds.hpp"
 #include "server/session/conversions.hpp"
+#include "server/session/refusals.hpp"
 #include "server/session/version.hpp"
 
 namespace spectra::session {
@@ -30,9 +31,6 @@ namespace {
 /// Answers that one viewer may have computing at once, and changes it may have waiting.
 constexpr std::size_t kMaxComputing = 16;
 constexpr std::size_t kMaxWaiting = 512;
-/// Of an answer as text, at most: anything but bins, and a bin with its edge and its count.
-constexpr std::size_t kSmallAnswerBytes = 4096;
-constexpr std::size_t kBinBytes = 48;
 
 /// What settings are prepared with.
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const map::SceneSnapshot>& scene) {
@@ -41,15 +39,6 @@ fusion::SceneTemperature temperature_of(const std::shared_ptr<const map::SceneSn
 
 double unix_seconds() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-/// The error side of an answer.
-auto refused(protocol::RpcError error) {
-  return BOOST_OUTCOME_V2_NAMESPACE::failure(std::move(error));
-}
-
-auto no_scene() {
-  return refusal(RpcErrorCode::NoScene, "there is no scene yet");
 }
 
 std::optional<double> if_positive(double value) {
@@ -149,10 +138,10 @@ std::span<const ViewerSession::Request> ViewerSession::requests() {
       {"scene.get", access::Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
       {"scene.subscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
       {"scene.unsubscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
-      {"scene.histogram", access::Right::Watch, Cost::Request, &Self::histogram},
-      {"scene.probe", access::Right::Watch, Cost::Request, &Self::probe},
-      {"fusion.facts", access::Right::Watch, Cost::Request, &Self::facts},
-      {"scene.extremes", access::Right::Watch, Cost::Request, &Self::extremes},
+      {"scene.histogram", access::Right::Watch, Cost::Request, &Self::asked<&histogram_question>},
+      {"scene.probe", access::Right::Watch, Cost::Request, &Self::asked<&probe_question>},
+      {"fusion.facts", access::Right::Watch, Cost::Request, &Self::asked<&facts_question>},
+      {"scene.extremes", access::Right::Watch, Cost::Request, &Self::asked<&extremes_question>},
       {"scene.baseline", access::Right::Watch, Cost::Request, &Self::baseline},
   };
   return kRequests;
@@ -293,7 +282,14 @@ void ViewerSession::fusion_set(const Id& id, const json& params) {
   start_preparation();
 }
 
-void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute) {
+template <AskedQuestion question>
+void ViewerSession::asked(const Id& id, const json& params) {
+  ask(id, question(params, {scene_, plan_ ? &*plan_ : nullptr, unix_seconds()}));
+}
+
+void ViewerSession::ask(const Id& id, protocol::Result<SceneQuestion> made) {
+  if (!made) return answer(id, refused(made.error()));
+  auto& [size_bytes, compute] = made.value();
   if (computing_count_ >= kMaxComputing) {
     return answer(id, refusal(RpcErrorCode::Busy, "too many answers are being computed", "",
                               std::to_string(kMaxComputing) + " at once"));
@@ -306,7 +302,8 @@ void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::
   computing_count_ += 1;
   computing_bytes_ += size_bytes;
   served_.pool.post(
-      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, size_bytes, compute = std::move(compute)] {
+      [weak_peer = weak_peer_, weak_self = weak_from_this(), id, size_bytes = size_bytes,
+       compute = std::move(compute)] {
         Answer computed = refusal(RpcErrorCode::InternalError, "the answer could not be computed");
         try {
           computed = compute();
@@ -324,63 +321,6 @@ void ViewerSession::answer_from_pool(const Id& id, std::size_t size_bytes, std::
         });
       },
       jobs::kAnswerPriority);
-}
-
-void ViewerSession::histogram(const Id& id, const json& params) {
-  const auto request = protocol::from_json<protocol::HistogramRequest>(params);
-  if (!request) return answer(id, refused(request.error()));
-  if (!scene_) return answer(id, no_scene());
-  const auto bins = request.value().bins;
-  answer_from_pool(
-      id, kSmallAnswerBytes + std::size_t{bins} * kBinBytes, [scene = scene_, plan = *plan_, bins]() -> Answer {
-        const auto& temperature = scene->temperature();
-        const auto counted = temperature.summary.has_temperature() ? temperature.histogram(bins) : fusion::Histogram{};
-        const bool highlights = fusion::find_method(plan.settings().method)->highlights;
-        const auto share = highlights ? std::optional(scene->highlighted_share(plan)) : std::nullopt;
-        return protocol::to_json(to_message(counted, temperature.summary, plan.highlighted(), share));
-      });
-}
-
-void ViewerSession::facts(const Id& id, const json& params) {
-  const auto request = protocol::from_json<protocol::FactsRequest>(params);
-  if (!request) return answer(id, refused(request.error()));
-  if (!scene_) return answer(id, no_scene());
-  // With what plans are prepared, which follows a live map in steps.
-  const std::size_t size_bytes =
-      kSmallAnswerBytes + (request.value().bins.value_or(0) + fusion::Hues::kSectors) * kBinBytes;
-  answer_from_pool(id, size_bytes,
-                   [temperature = scene_->reference_temperature(), request = request.value()]() -> Answer {
-                     protocol::FactsReply reply = facts_message(temperature->summary);
-                     if (request.bins && temperature->summary.has_temperature())
-                       reply.counts = temperature->histogram(*request.bins).counts;
-                     if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
-                     if (request.hues.value_or(false)) {
-                       const auto chroma = temperature->hues().chroma;
-                       reply.hues.emplace(chroma.begin(), chroma.end());
-                     }
-                     return protocol::to_json(reply);
-                   });
-}
-
-void ViewerSession::probe(const Id& id, const json& params) {
-  const auto request = protocol::from_json<protocol::ProbeRequest>(params);
-  if (!request) return answer(id, refused(request.error()));
-  if (!scene_) return answer(id, no_scene());
-  const auto& p = request.value().position;
-  const base::Vec3f position{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, plan = *plan_, position]() -> Answer {
-    const auto found = scene->probe(position);
-    if (!found) return refusal(RpcErrorCode::NoScene, "the scene has no vertex");
-    const float celsius = found->temperature_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
-    base::Rgb8 fused;
-    const float baseline = found->baseline_celsius.value_or(std::numeric_limits<float>::quiet_NaN());
-    std::uint8_t freshness = fusion::AgeSteps::kFresh;
-    if (const auto& age = plan.settings().age; age.mode == fusion::AgeMode::Fade && found->observed_at) {
-      freshness = fusion::AgeSteps(age.half_life_s).freshness(unix_seconds() - *found->observed_at);
-    }
-    plan.fuse({{&celsius, 1}, {&found->visible, 1}, {&baseline, 1}, {&freshness, 1}}, {&fused, 1});
-    return protocol::to_json(to_message(*found, fused));
-  });
 }
 
 void ViewerSession::baseline(const Id& id, const json& params) {
@@ -412,15 +352,6 @@ void ViewerSession::baseline(const Id& id, const json& params) {
         self->answer(id, refusal(code, why.reason, why.field, why.limits));
       }
     });
-  });
-}
-
-void ViewerSession::extremes(const Id& id, const json& params) {
-  const auto request = protocol::from_json<protocol::ExtremesRequest>(params);
-  if (!request) return answer(id, refused(request.error()));
-  if (!scene_) return answer(id, no_scene());
-  answer_from_pool(id, kSmallAnswerBytes, [scene = scene_, request = request.value()]() -> Answer {
-    return protocol::to_json(extremes_message(*scene, request));
   });
 }
 

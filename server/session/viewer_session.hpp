@@ -17,6 +17,7 @@
 #include "server/net/net_options.hpp"
 #include "server/net/viewer_link.hpp"
 #include "server/session/plan_preparation.hpp"
+#include "server/session/scene_questions.hpp"
 #include "server/session/served_scene.hpp"
 #include "server/session/status_board.hpp"
 
@@ -71,14 +72,13 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   Answer set_camera(const nlohmann::json& params);
   Answer acknowledge(const nlohmann::json& params);
   void fusion_set(const Id& id, const nlohmann::json& params);
-  void histogram(const Id& id, const nlohmann::json& params);
-  void facts(const Id& id, const nlohmann::json& params);
-  void probe(const Id& id, const nlohmann::json& params);
-  void extremes(const Id& id, const nlohmann::json& params);
   void baseline(const Id& id, const nlohmann::json& params);
 
+  /// The handler that has what a question asks for computed.
+  template <AskedQuestion question>
+  void asked(const Id& id, const nlohmann::json& params);
   /// Computes an answer on the pool and sends it when it is there; refuses when too many are under way.
-  void answer_from_pool(const Id& id, std::size_t size_bytes, std::function<Answer()> compute);
+  void ask(const Id& id, protocol::Result<SceneQuestion> question);
 
   void take_scene(const std::shared_ptr<const map::SceneSnapshot>& scene);
   /// Prepares the waiting changes, or the settings for a scene that has come, on the pool; one at a time.
