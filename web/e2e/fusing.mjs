@@ -107,7 +107,13 @@ export function addFusingTests(browser) {
         await settled(page);
         await note.filter({ hasText: pattern }).waitFor();
         const share = await page.evaluate(() => globalThis.spectra.store.histogram.highlighted_share);
-        said[what] = { text: await note.innerText(), share };
+        // Whether it stands out by its colours, which decides about an outline, is judged a moment later.
+        await page.waitForTimeout(400);
+        const { contrast, isOutlined } = await page.evaluate(() => {
+          const { highlightContrast, isOutlined } = globalThis.spectra.store;
+          return { contrast: highlightContrast === null ? null : highlightContrast.in_grey, isOutlined };
+        });
+        said[what] = { text: await note.innerText(), share, contrast, isOutlined };
       };
       await say('first', /% of the surface/);
       await setMethod(page, 'colour_mapped_threshold');
@@ -124,9 +130,15 @@ export function addFusingTests(browser) {
       return said;
     };
     const [robot, here] = [await words('robot'), await words('here')];
-    for (const [what, { text, share }] of Object.entries(robot)) {
+    for (const [what, { text, share, contrast, isOutlined }] of Object.entries(robot)) {
       // Borders of tiles and coarse ones make a little difference.
       assert.ok(Math.abs(here[what].share - share) <= 0.02 * share, `${what}: ${here[what].share} here, ${share} by the robot`);
+      assert.equal(
+        here[what].isOutlined,
+        isOutlined,
+        `${what}: outlined by a contrast of ${here[what].contrast} here, ${contrast} by the robot`,
+      );
+      assert.equal(here[what].contrast === null, contrast === null, what);
       assert.equal(here[what].text.replace(/^[\d.]+/, ''), text.replace(/^[\d.]+/, ''));
     }
     await server.stop();

@@ -22,7 +22,7 @@ import { depthRange } from './depth_range';
 import { Outline } from './outline';
 import { PictureBuffer } from './picture_buffer';
 import { nearestHit } from './picking';
-import { SurfaceShare, vertexAreas } from './surface_share';
+import { type Highlighting, SurfaceShare, vertexAreas } from './surface_share';
 import type {
   Eye,
   GpuObjects,
@@ -162,8 +162,8 @@ export class PictureRenderer {
       case 'probe':
         this.reply({ kind: 'probed', id: request.id, vertex: this.#nearestVertex(request.point) });
         break;
-      case 'share':
-        this.reply({ kind: 'shared', id: request.id, share: this.#highlightedShare() });
+      case 'highlighting':
+        this.reply({ kind: 'highlighting', id: request.id, found: this.#highlighting() });
         break;
       case 'copy':
         void this.#copy(request.id);
@@ -338,12 +338,12 @@ export class PictureRenderer {
     };
   }
 
-  #highlightedShare(): number | null {
+  #highlighting(): Highlighting | null {
     const fuser = this.#fuser;
     if (this.#fusing === 0 || fuser === null) return null;
-    const sum = new SurfaceShare();
-    for (const tile of this.#tiles.values()) {
-      if (!tile.isShown) continue;
+    const tiles = [...this.#tiles.values()].filter(({ isShown }) => isShown);
+    const sum = new SurfaceShare(tiles.reduce((count, { arrays }) => count + arrays.positions.length / 3, 0));
+    for (const tile of tiles) {
       if (tile.raw === null) return null;
       tile.areas ??= vertexAreas(tile.arrays);
       let marked = tile.colours.array;
@@ -358,7 +358,7 @@ export class PictureRenderer {
       }
       sum.add(tile.areas, marked);
     }
-    return sum.share;
+    return sum.found;
   }
 
   #drawn(): Tile['arrays'][] {

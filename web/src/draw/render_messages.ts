@@ -5,6 +5,7 @@ import type { FusionChange } from '../protocol/messages';
 import type { SceneFacts } from '../fusion/fusion_module';
 import type { SightWish } from './clear_sight';
 import type { Ray } from './picking';
+import type { Highlighting } from './surface_share';
 
 /** What the sensors saw of a tile, a value per vertex: what it is fused from here. */
 export interface RawArrays {
@@ -64,8 +65,8 @@ export type RenderRequest =
   | { kind: 'sight'; id: number; wish: SightWish }
   /** The vertex of what is drawn, and has raw arrays, that is nearest to a point. */
   | { kind: 'probe'; id: number; point: Vec3 }
-  /** How much of what is drawn is highlighted, where it is fused here. */
-  | { kind: 'share'; id: number }
+  /** What of what is drawn is highlighted, where it is fused here. */
+  | { kind: 'highlighting'; id: number }
   | { kind: 'copy'; id: number };
 
 /** Objects held on the GPU, and what the last picture drew. */
@@ -92,8 +93,8 @@ export type RenderReply =
   /** Everything up to picture `number` has been drawn; the last one took so long. */
   | { kind: 'drawn'; number: number; gpu: GpuObjects; ms: number }
   | { kind: 'picked'; id: number; distance: number | null }
-  /** 0 to 1; null where not all is fused here. */
-  | { kind: 'shared'; id: number; share: number | null }
+  /** Null where not all is fused here. */
+  | { kind: 'highlighting'; id: number; found: Highlighting | null }
   | { kind: 'probed'; id: number; vertex: ProbedVertex | null }
   /** Fusing here has failed; what was fused so far stands. */
   | { kind: 'not_fused'; message: string }

@@ -9,20 +9,30 @@ describe('Share of a surface', () => {
 
   it('counts by what vertices stand for', () => {
     expect([...areas].map((area) => area.toFixed(4))).toEqual(['0.6667', '0.6667', '0.6667', '2.0000', '2.0000', '2.0000']);
-    const share = new SurfaceShare();
+    const share = new SurfaceShare(12);
     share.add(areas, rgba([0, 1, 2]));
-    expect(share.share).toBeCloseTo(0.25);
+    expect(share.found?.share).toBeCloseTo(0.25);
     share.add(areas, rgba([0, 1, 2, 3, 4, 5]));
-    expect(share.share).toBeCloseTo(0.625);
+    expect(share.found?.share).toBeCloseTo(0.625);
   });
 
   it('counts points where there are no triangles', () => {
-    const share = new SurfaceShare();
+    const share = new SurfaceShare(12);
     share.add(vertexAreas({ positions, indices: null }), rgba([5]));
-    expect(share.share).toBeCloseTo(1 / 6);
+    expect(share.found?.share).toBeCloseTo(1 / 6);
+  });
+
+  it('comes with colours of every part, at most some ten thousand', () => {
+    const share = new SurfaceShare(80_000);
+    const half = new Float32Array(40_000).fill(1);
+    share.add(half, new Uint8Array(160_000).fill(0));
+    share.add(half, new Uint8Array(160_000).fill(255));
+    const { colours } = share.found!;
+    expect(colours.length).toBeLessThanOrEqual(4 * 32768);
+    expect(colours.filter((value) => value === 0).length / colours.length).toBeCloseTo(0.5, 2);
   });
 
   it('is none of nothing', () => {
-    expect(new SurfaceShare().share).toBeNull();
+    expect(new SurfaceShare(0).found).toBeNull();
   });
 });

@@ -21,20 +21,46 @@ export function vertexAreas({ positions, indices }: Pick<TileArrays, 'positions'
   return areas;
 }
 
-/** Adds up what is highlighted of a surface: of colours whose alpha is 0 there, as the library marks them. */
+/** Of what is drawn, how much is highlighted, and some of its colours. */
+export interface Highlighting {
+  /** Of the surface, 0 to 1. */
+  share: number;
+  /** Red, green, blue, and alpha, which is 0 where a vertex is highlighted; as many of each tile as its vertices count. */
+  colours: Uint8Array<ArrayBuffer>;
+}
+
+/** So many vertices show what colours there are. */
+const MOST_COLOURS = 32768;
+
+/** Adds up what is highlighted of a surface: of colours whose alpha is 0 there, as the library marks them. `count`: vertices in all. */
 export class SurfaceShare {
+  readonly #step: number;
+  readonly #colours: Uint8Array<ArrayBuffer>;
+  #taken = 0;
+  #passed = 0;
   #all = 0;
   #marked = 0;
+
+  constructor(count: number) {
+    this.#step = Math.max(1, Math.ceil(count / MOST_COLOURS));
+    this.#colours = new Uint8Array(4 * Math.ceil(count / this.#step));
+  }
 
   add(areas: Float32Array, rgba: ArrayLike<number>): void {
     for (let i = 0; i < areas.length; i += 1) {
       this.#all += areas[i]!;
       if (rgba[4 * i + 3] === 0) this.#marked += areas[i]!;
+      if (this.#passed % this.#step === 0) {
+        for (let j = 0; j < 4; j += 1) this.#colours[this.#taken + j] = rgba[4 * i + j]!;
+        this.#taken += 4;
+      }
+      this.#passed += 1;
     }
   }
 
-  /** 0 to 1; null where there is no surface. */
-  get share(): number | null {
-    return this.#all > 0 && Number.isFinite(this.#all) ? Math.min(1, this.#marked / this.#all) : null;
+  /** Null where there is no surface. */
+  get found(): Highlighting | null {
+    if (!(this.#all > 0) || !Number.isFinite(this.#all)) return null;
+    return { share: Math.min(1, this.#marked / this.#all), colours: this.#colours.subarray(0, this.#taken) };
   }
 }

@@ -11,10 +11,13 @@ function setUp() {
     highlighting: {},
     fusingPlace: 'here',
   } as unknown as Store;
-  const picture = { isUpToDate: true, share: 0.25 as number | null, highlightedShare: () => Promise.resolve(picture.share) };
-  const share = new HighlightedShare(store, picture);
+  const judged: Uint8Array[] = [];
+  const highlighting = () =>
+    Promise.resolve(picture.share === null ? null : { share: picture.share, colours: Uint8Array.of(1, 2, 3, 0) });
+  const picture = { isUpToDate: true, share: 0.25 as number | null, highlighting };
+  const share = new HighlightedShare(store, picture, (rgba) => judged.push(rgba));
   const wait = () => vi.advanceTimersByTimeAsync(200);
-  return { store, picture, share, wait };
+  return { store, picture, share, wait, judged };
 }
 
 describe('Highlighted share of what is fused here', () => {
@@ -34,7 +37,7 @@ describe('Highlighted share of what is fused here', () => {
   });
 
   it('is nothing where a method that highlights finds nothing, and none of a method that does not', async () => {
-    const { store, picture, share, wait } = setUp();
+    const { store, picture, share, wait, judged } = setUp();
     share.changed('hot', [[30, 40]]);
     await wait();
     picture.share = 0;
@@ -45,6 +48,7 @@ describe('Highlighted share of what is fused here', () => {
     expect(store.histogram).not.toHaveProperty('highlighted_share');
     await wait();
     expect(store.histogram).not.toHaveProperty('highlighted_share');
+    expect(judged).toHaveLength(3);
   });
 
   it('is not said where the picture cannot tell, nor when colours come from the robot again', async () => {

@@ -1,11 +1,12 @@
+import type { Highlighting } from '../draw/surface_share';
 import type { Store } from './store.svelte';
 
 /** What is needed of the picture. */
 export interface SharePicture {
   /** All changes are in the picture. */
   readonly isUpToDate: boolean;
-  /** How much of the surface is highlighted as it is drawn; null where that cannot be said. */
-  highlightedShare(): Promise<number | null>;
+  /** What of the surface is highlighted as it is drawn; null where that cannot be said. */
+  highlighting(): Promise<Highlighting | null>;
 }
 
 /** The picture follows within so long. */
@@ -22,6 +23,8 @@ export class HighlightedShare {
   constructor(
     private readonly store: Store,
     private readonly picture: SharePicture,
+    /** Colours of what is shown now, as a tile's, by which it is judged whether highlights stand out. */
+    private readonly onColours: (rgba: Uint8Array) => void,
   ) {}
 
   /** Other temperatures are highlighted now, or are about to be. `method` is what highlights them. */
@@ -31,14 +34,11 @@ export class HighlightedShare {
     clearTimeout(this.#timer);
     if (store.histogram === null) return;
     if (highlighted.length > 0) store.highlighting[method] = true;
-    const { highlighted_share: before, ...rest } = store.histogram;
-    if (store.highlighting[method] === undefined) {
-      store.histogram = { ...rest, highlighted };
-      return;
-    }
     // Until the picture says it, that of before stands, as it does while the robot is asked.
-    store.histogram = { ...rest, highlighted, ...(before === undefined ? {} : { highlighted_share: before }) };
-    this.#look();
+    const { highlighted_share: before, ...rest } = store.histogram;
+    const isKept = store.highlighting[method] !== undefined && before !== undefined;
+    store.histogram = { ...rest, highlighted, ...(isKept ? { highlighted_share: before } : {}) };
+    this.#look(method);
   }
 
   dispose(): void {
@@ -46,17 +46,19 @@ export class HighlightedShare {
     clearTimeout(this.#timer);
   }
 
-  #look(): void {
+  #look(method: string): void {
     const number = this.#number;
-    this.#timer = setTimeout(() => void this.#read(number), LOOK_MS);
+    this.#timer = setTimeout(() => void this.#read(method, number), LOOK_MS);
   }
 
-  async #read(number: number): Promise<void> {
+  async #read(method: string, number: number): Promise<void> {
     const { store } = this;
-    if (!this.picture.isUpToDate) return this.#look();
-    const share = store.fusingPlace === 'here' ? await this.picture.highlightedShare() : null;
+    if (!this.picture.isUpToDate) return this.#look(method);
+    const found = store.fusingPlace === 'here' ? await this.picture.highlighting() : null;
     if (number !== this.#number || store.fusingPlace !== 'here' || store.histogram === null) return;
     const { highlighted_share: _before, ...rest } = store.histogram;
-    store.histogram = share === null ? rest : { ...rest, highlighted_share: share };
+    const isSaid = found !== null && store.highlighting[method] !== undefined;
+    store.histogram = isSaid ? { ...rest, highlighted_share: found.share } : rest;
+    if (found !== null) this.onColours(found.colours);
   }
 }

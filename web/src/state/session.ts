@@ -95,7 +95,7 @@ export class Session {
         store.upAxis = up;
       },
     );
-    this.#share = new HighlightedShare(store, this.viewport);
+    this.#share = new HighlightedShare(store, this.viewport, (rgba) => this.#judge(rgba));
     this.fusing = new Fusing(store, this.tiles, this.viewport, {
       request,
       resubscribe: () => void this.#subscription.channelsChanged(),

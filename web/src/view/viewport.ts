@@ -6,6 +6,7 @@ import type { Steering } from '../view/steering';
 import { UP, type UpAxis, type View } from './first_view';
 import type { SightWish } from '../draw/clear_sight';
 import type { GpuObjects, ProbedVertex, RenderCommand, RenderReply, RenderRequest } from '../draw/render_messages';
+import type { Highlighting } from '../draw/surface_share';
 import { type RenderPort, startRenderingHere, startRenderWorker } from '../draw/render_port';
 import { MotionPace, type Notch } from './motion_pace';
 import type { Drawable } from '../tiles/tile_set';
@@ -177,10 +178,10 @@ export class Viewport {
     return reply.kind === 'probed' ? reply.vertex : null;
   }
 
-  /** How much of what is drawn is highlighted, 0 to 1; null where not all of it is fused here. */
-  async highlightedShare(): Promise<number | null> {
-    const reply = await this.#ask((id) => ({ kind: 'share', id }));
-    return reply.kind === 'shared' ? reply.share : null;
+  /** What of what is drawn is highlighted; null where not all of it is fused here. */
+  async highlighting(): Promise<Highlighting | null> {
+    const reply = await this.#ask((id) => ({ kind: 'highlighting', id }));
+    return reply.kind === 'highlighting' ? reply.found : null;
   }
 
   get aspect(): number {
