@@ -14,7 +14,7 @@ struct Kind {
 
 using namespace std::string_view_literals;
 
-constexpr std::array<Kind, 23> kKinds = {{
+constexpr std::array<Kind, 27> kKinds = {{
     {"PK\x03\x04"sv, "a ZIP archive: unpack it first"sv},
     {"\x1f\x8b"sv, "gzip data: unpack it first"sv},
     {"BZh"sv, "bzip2 data: unpack it first"sv},
@@ -39,6 +39,10 @@ constexpr std::array<Kind, 23> kKinds = {{
     {"v "sv, "an OBJ file: convert it to PLY"sv},
     {"{"sv, "JSON: convert it to PLY"sv},
     {"<"sv, "XML or HTML: convert it to PLY"sv},
+    {"\xff\xd8\xff"sv, "a JPEG picture: the scene is wanted, a mesh or cloud as PLY"sv},
+    {"\x89PNG"sv, "a PNG picture: the scene is wanted, a mesh or cloud as PLY"sv},
+    {"II*\0"sv, "a TIFF picture: the scene is wanted, a mesh or cloud as PLY"sv},
+    {"MM\0*"sv, "a TIFF picture: the scene is wanted, a mesh or cloud as PLY"sv},
     {"version https://git-lfs"sv, "a Git LFS pointer: fetch the file itself (git lfs pull)"sv},
 }};
 

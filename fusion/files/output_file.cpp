@@ -46,6 +46,18 @@ int sync_descriptor(int descriptor) {
   return result;
 }
 
+/// Where links lead to, whether or not anything is there yet.
+std::filesystem::path end_of_links(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(path, error); ++i) {
+    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / next;
+  }
+  return path;
+}
+
 }  // namespace
 
 base::Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
@@ -61,7 +73,7 @@ base::Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
     return file;
   }
   std::error_code ignored;
-  const std::filesystem::path resolved = std::filesystem::weakly_canonical(plain, ignored);
+  const std::filesystem::path resolved = std::filesystem::weakly_canonical(end_of_links(plain), ignored);
   file.target_ = resolved.empty() ? plain : resolved;
 
   // The process and a count make the name our own; O_EXCL makes sure of it.

@@ -336,9 +336,17 @@ class Notes {
     const char* const kId = "implausible_temperatures";
     if (named == TemperatureUnit::Fahrenheit) {
       add(kId, facts.finite_count, range + "are in Fahrenheit by the name " + call + ": --temperature-unit fahrenheit");
-    } else if (named == TemperatureUnit::Centikelvin || most(facts.centikelvin_like_count)) {
+    } else if (const char* const unit =
+                   named_unit(named, most(facts.kelvin_like_count), most(facts.centikelvin_like_count));
+               unit != nullptr) {
+      const double factor = named == TemperatureUnit::Kelvin ? 1 : 0.01;
+      const auto celsius = [factor](float value) { return short_number(factor * static_cast<double>(value) - 273.15); };
+      add(kId, facts.finite_count,
+          range + "are in " + unit + " by the name " + call + " (which would make them " + celsius(facts.lowest) +
+              " to " + celsius(facts.highest) + " degC): --temperature-unit " + unit + " where the name is right");
+    } else if (most(facts.centikelvin_like_count)) {
       add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin" + no_data);
-    } else if (named == TemperatureUnit::Kelvin || most(facts.kelvin_like_count)) {
+    } else if (most(facts.kelvin_like_count)) {
       add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin" + no_data);
     } else if (most(facts.tenth_kelvin_like_count)) {
       add(kId, facts.finite_count,
@@ -370,7 +378,35 @@ class Notes {
       add(kId, facts.too_cold_count,
           range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
               " stands for no data, --no-data " + value);
+    } else if (zero_stands_alone(facts)) {
+      add(kId, facts.zero_count,
+          range + counted(facts.zero_count, "is", "are") + " exactly 0 and no other is nearer to it than " +
+              short_number(static_cast<double>(facts.nearest_zero)) + ": if 0 stands for no data, --no-data 0");
+    } else if (facts.lowest >= 0 && facts.highest <= 1 && facts.highest > facts.lowest) {
+      add(kId, facts.finite_count,
+          range +
+              "look like shares of a range: --temperature-scale A --temperature-offset B (degC = A value + B), or "
+              "--temperature-property NAME");
     }
+  }
+
+  /// The unit of kelvin that a name tells where the values do not look like it; nullptr for none.
+  static const char* named_unit(std::optional<TemperatureUnit> named, bool is_kelvin_like, bool is_centikelvin_like) {
+    if (is_kelvin_like || is_centikelvin_like) return nullptr;
+    if (named == TemperatureUnit::Kelvin) return "kelvin";
+    return named == TemperatureUnit::Centikelvin ? "centikelvin" : nullptr;
+  }
+
+  /// Many are exactly 0, and all others keep away from it as measured ones do not.
+  static bool zero_stands_alone(const TemperatureFacts& facts) {
+    constexpr std::uint64_t kFewest = 12;
+    constexpr std::uint64_t kOneIn = 1000;
+    constexpr float kFewestCelsius = 5;
+    if (facts.zero_count < kFewest || kOneIn * facts.zero_count < facts.finite_count) return false;
+    if (facts.zero_count == facts.finite_count || facts.nearest_zero < kFewestCelsius) return false;
+    const float lowest = facts.lowest < 0 ? facts.lowest : facts.nearest_zero;
+    const float highest = facts.highest > 0 ? facts.highest : -facts.nearest_zero;
+    return 4 * facts.nearest_zero >= highest - lowest;
   }
 
   /// What was said of the file and has changed nothing.

@@ -41,6 +41,29 @@ bool is_damaged_as_text(BlockFile& file, const PlyHeader& header) {
   return count >= kFewest;
 }
 
+/// A binary body that is text in UTF-8, as numbers never are by chance: a program has read it as text and written it again.
+bool is_recoded_as_utf8(BlockFile& file, const PlyHeader& header) {
+  if (header.format == PlyFormat::Ascii) return false;
+  constexpr std::size_t kLookedAt = 65'536;
+  constexpr std::size_t kFewest = 16;
+  file.seek(header.size_bytes);
+  auto bytes = file.ready(kLookedAt);
+  if (bytes.size() > kLookedAt) bytes = bytes.first(kLookedAt);
+  std::size_t count = 0;
+  int following = 0;
+  for (const unsigned char byte : bytes) {
+    if (following > 0) {
+      if ((byte & 0xC0U) != 0x80U) return false;
+      --following;
+    } else if (byte >= 0x80U) {
+      if (byte < 0xC2U || byte > 0xF4U) return false;
+      following = byte >= 0xF0U ? 3 : byte >= 0xE0U ? 2 : 1;
+      ++count;
+    }
+  }
+  return count >= kFewest;
+}
+
 /// What the body is when it is not what the header says; empty when nothing is known.
 std::string_view told_wrongly(BlockFile& file, const PlyHeader& header) {
   constexpr std::size_t kLookedAt = 4096;
@@ -190,6 +213,12 @@ base::Result<PlyBodyFacts> PlyStream::with_reason(base::Result<PlyBodyFacts> fac
   if (facts && facts.value().trailing_byte_count == 0) return facts;
   if (const std::string_view wrong = told_wrongly(file_, header_); !facts && !wrong.empty()) {
     return base::failure(base::ErrorCode::BadValue, std::string(wrong));
+  }
+  if (is_recoded_as_utf8(file_, header_)) {
+    return base::failure(
+        base::ErrorCode::BadValue,
+        "the file was damaged by a program that took it for text and wrote it again in UTF-8; transfer "
+        "it again as binary");
   }
   if (!is_damaged_as_text(file_, header_)) return facts;
   return base::failure(

@@ -130,13 +130,19 @@ double file_rounding(const Box& box) {
   return farthest * 0x1p-23;
 }
 
-/// -infinity where there is none.
-float largest_finite(std::span<const float> values) {
-  float largest = -std::numeric_limits<float>::infinity();
+/// Infinite where one is over the range of the sensor; -infinity where there is none.
+float hottest_of(std::span<const float> values) {
+  float hottest = -std::numeric_limits<float>::infinity();
   for (const float value : values) {
-    if (std::isfinite(value)) largest = std::max(largest, value);
+    if (!std::isnan(value)) hottest = std::max(hottest, value);
   }
-  return largest;
+  return hottest;
+}
+
+std::string celsius_text(float celsius) {
+  if (celsius == -std::numeric_limits<float>::infinity()) return "none";
+  if (std::isinf(celsius)) return "one over the range of the sensor";
+  return number_text(std::round(static_cast<double>(celsius) * 10) / 10) + " degC";
 }
 
 double squared_distance(const base::Vec3f& a, const base::Vec3f& b) {
@@ -413,15 +419,14 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
                              thermal.mesh.name + " within " + base::distance_text(reach) + " (half of them within " +
                              base::distance_text(median_m) + ", the farthest at " + base::distance_text(farthest_m) +
                              ")"});
-  const float hottest = largest_finite(thermal.mesh.temperature_celsius());
-  const float kept = largest_finite(mesh.temperature_celsius());
+  const float hottest = hottest_of(thermal.mesh.temperature_celsius());
+  const float kept = hottest_of(mesh.temperature_celsius());
   constexpr float kNoticed = 1;
   if (hottest - kept > kNoticed) {
     scene.notes.push_back({"thermal_extremes_lost", 1,
-                           "The hottest reading of " + thermal.mesh.name + ", " +
-                               number_text(static_cast<double>(hottest)) +
-                               " degC, has no vertex of the scene at it: the scene's hottest has " +
-                               number_text(static_cast<double>(kept)) + " degC; give the finer file as the scene",
+                           "The hottest reading of " + thermal.mesh.name + ", " + celsius_text(hottest) +
+                               ", has no vertex of the scene at it: the scene's hottest has " + celsius_text(kept) +
+                               "; give the finer file as the scene",
                            true});
   }
   if (joined_count < count) {

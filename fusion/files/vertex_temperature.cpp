@@ -17,6 +17,7 @@ constexpr float kAbsoluteZeroCelsius = -273.15F;
 void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   float lowest = facts.lowest;
   float highest = facts.highest;
+  float nearest_zero = facts.nearest_zero;
   std::uint32_t zero = 0;
   std::uint32_t full = 0;
   std::uint32_t kelvin = 0;
@@ -27,6 +28,8 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   for (const float c : celsius) {
     lowest = c < lowest ? c : lowest;
     highest = c > highest ? c : highest;
+    const float magnitude = c == 0.0F ? kBeyond : std::abs(c);
+    nearest_zero = magnitude < nearest_zero ? magnitude : nearest_zero;
     zero += static_cast<std::uint32_t>(c == 0.0F);
     full += static_cast<std::uint32_t>(c == 65'535.0F);
     kelvin += static_cast<std::uint32_t>(c >= 200.0F) & static_cast<std::uint32_t>(c < 400.0F);
@@ -38,6 +41,7 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   facts.finite_count += celsius.size();
   facts.lowest = lowest;
   facts.highest = highest;
+  facts.nearest_zero = nearest_zero;
   facts.zero_count += zero;
   facts.full_count += full;
   facts.kelvin_like_count += kelvin;

@@ -23,7 +23,8 @@ struct TemperatureFacts {
   std::uint64_t finite_count = 0;
   float lowest = std::numeric_limits<float>::infinity();
   float highest = -std::numeric_limits<float>::infinity();
-  std::uint64_t zero_count = 0;  ///< Exactly 0, which often stands for nothing.
+  std::uint64_t zero_count = 0;                                 ///< Exactly 0, which often stands for nothing.
+  float nearest_zero = std::numeric_limits<float>::infinity();  ///< The smallest magnitude of the others.
   std::uint64_t full_count = 0;  ///< Exactly 65535, all bits of a sensor's count, which often stands for nothing.
   std::uint64_t kelvin_like_count = 0;        ///< 200 to 400.
   std::uint64_t tenth_kelvin_like_count = 0;  ///< 2000 to 4000.

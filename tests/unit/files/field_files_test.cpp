@@ -20,6 +20,7 @@ namespace spectra::files {
 namespace {
 
 using test::note_count;
+using test::note_text;
 
 std::filesystem::path field_path(const std::string& name) {
   return std::filesystem::path(SPECTRA_FIELD_DATA) / name;
@@ -38,13 +39,6 @@ std::string field_error(const std::string& name) {
   const auto scene = read_ply(field_path(name));
   if (scene) ADD_FAILURE() << name << " was read";
   return scene ? std::string() : scene.error().message;
-}
-
-std::string note_text(const LoadedScene& scene, const std::string& id) {
-  for (const Note& note : scene.notes) {
-    if (note.id == id) return note.message;
-  }
-  return {};
 }
 
 void expect_in(const std::string& part, const std::string& text) {

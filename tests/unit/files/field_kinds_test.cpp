@@ -25,6 +25,7 @@ using test::kRgb;
 using test::kXyz;
 using test::loaded;
 using test::note_count;
+using test::note_text;
 using test::PlyBytes;
 
 /// A text file of vertices with more properties than x, y, z.
@@ -34,13 +35,6 @@ std::string text_file(const std::string& properties, const std::vector<std::stri
                      std::string(kXyz) + properties + faces + "end_header\n";
   for (const std::string& line : lines) text += line + "\n";
   return text + face_lines;
-}
-
-std::string note_text(const LoadedScene& scene, const std::string& id) {
-  for (const Note& note : scene.notes) {
-    if (note.id == id) return note.message;
-  }
-  return {};
 }
 
 TEST(FieldKinds, NanHasManySpellings) {
@@ -464,6 +458,47 @@ TEST(FieldKinds, WhatIsNotTakenForATemperatureIsSaidWithTheTrueReason) {
   EXPECT_EQ(said("property float time\n", "20"), "");
 }
 
+TEST(FieldKinds, ANameThatTheValuesContradictIsNotCalledTheirLook) {
+  const auto note = [](const std::string& name, double first) {
+    return note_text(loaded(text_file("property float " + name + "\n", lines_of(first, 0.1, 40))),
+                     "implausible_temperatures");
+  };
+  const std::string contradicted = note("temperature_K", 20);
+  EXPECT_EQ(contradicted.find("look like"), std::string::npos) << contradicted;
+  EXPECT_NE(contradicted.find("by the name 'temperature_K' (which would make them -253.15"), std::string::npos)
+      << contradicted;
+  EXPECT_NE(note("temperature_ck", 20).find("-272.95"), std::string::npos) << note("temperature_ck", 20);
+  EXPECT_NE(note("temperature_K", 290).find("look like kelvin"), std::string::npos);
+}
+
+TEST(FieldKinds, ZeroThatStandsAloneIsAskedAbout) {
+  const auto note = [](double first, double step, int zero_count) {
+    std::vector<std::string> lines = lines_of(first, step, 40);
+    for (int i = 0; i < zero_count; ++i) lines[static_cast<std::size_t>(i)] = std::to_string(i) + " 0 0 0";
+    return note_text(loaded(text_file("property float temperature\n", lines)), "implausible_temperatures");
+  };
+  EXPECT_NE(note(18, 0.3, 13)
+                .find("13 are exactly 0 and no other is nearer to it than 18: if 0 stands for no data, "
+                      "--no-data 0"),
+            std::string::npos)
+      << note(18, 0.3, 13);
+  EXPECT_EQ(note(18, 0.3, 11), "");
+  EXPECT_EQ(note(-20, 4, 13), "");  // Others are near 0 as well.
+  EXPECT_EQ(note(-3, 0.5, 13), "");
+  EXPECT_EQ(note(5, 10, 13), "");  // They reach so far that 0 may be one of them.
+}
+
+TEST(FieldKinds, SharesOfARangeAreNoTemperatures) {
+  const LoadedScene shares = loaded(text_file("property float temperature\n", lines_of(0, 0.025, 40)));
+  EXPECT_NE(note_text(shares, "implausible_temperatures").find("shares of a range"), std::string::npos);
+  EXPECT_EQ(
+      note_count(loaded(text_file("property float temperature\n", lines_of(0.5, 0.1, 40))), "implausible_temperatures"),
+      0U);
+  EXPECT_EQ(
+      note_count(loaded(text_file("property float temperature\n", lines_of(0, 0, 40))), "implausible_temperatures"),
+      0U);
+}
+
 TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
   struct Case {
     std::string property;
@@ -611,6 +646,30 @@ TEST(FieldKinds, ATransferAsTextIsRecognised) {
   EXPECT_NE(scene.error().message.find("took it for text"), std::string::npos) << scene.error().message;
 }
 
+TEST(FieldKinds, ABinaryFileThatBecameUtf8IsRecognised) {
+  PlyBytes good;
+  good.text("ply\nformat binary_little_endian 1.0\nelement vertex 400\n" + std::string(kXyz) +
+            "element face 40\nproperty list uchar int vertex_indices\nend_header\n");
+  for (int i = 0; i < 400; ++i) good.le(static_cast<float>(i) / 3).le(static_cast<float>(i) / 7).le(0.5F);
+  for (int i = 0; i < 40; ++i) good.le(std::uint8_t{3}).le(i).le(i + 1).le(i + 2);
+  ASSERT_TRUE(test::read_bytes(good.bytes()));
+  std::string recoded;
+  std::string replaced;
+  for (const char c : good.bytes()) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_ascii = byte < 0x80;
+    recoded += is_ascii
+                   ? std::string(1, c)
+                   : std::string{static_cast<char>(0xC0U | (byte >> 6U)), static_cast<char>(0x80U | (byte & 0x3FU))};
+    replaced += is_ascii ? std::string(1, c) : std::string("\xEF\xBF\xBD");
+  }
+  for (const std::string& damaged : {recoded, replaced}) {
+    const auto scene = test::read_bytes(damaged);
+    ASSERT_FALSE(scene);
+    EXPECT_NE(scene.error().message.find("in UTF-8"), std::string::npos) << scene.error().message;
+  }
+}
+
 TEST(FieldKinds, OtherFilesAreCalledByTheirNames) {
   const std::vector<std::pair<std::string, std::string>> files = {
       {std::string("PK\x03\x04", 4) + "rest", "ZIP"},
@@ -631,6 +690,10 @@ TEST(FieldKinds, OtherFilesAreCalledByTheirNames) {
       {"OFF\n3 1 0\n", "OFF"},
       {std::string("\xff\xfep\0l\0y\0\n\0", 10), "UTF-16"},
       {"version https://git-lfs.github.com/spec/v1\n", "Git LFS"},
+      {"\xff\xd8\xff\xe0", "JPEG"},
+      {"\x89PNG\r\n", "PNG"},
+      {std::string("II*\0\x08\0\0\0", 8), "TIFF"},
+      {std::string("MM\0*\0\0\0\x08", 8), "TIFF"},
       {"scene.ply" + std::string(248, '\0') + "ustar" + std::string(250, '\0'), "tar"}};
   for (const auto& [bytes, name] : files) {
     const auto scene = test::read_bytes(bytes);

@@ -43,6 +43,12 @@ inline std::uint64_t note_count(const files::LoadedScene& scene, std::string_vie
   return note == scene.notes.end() ? 0 : note->count;
 }
 
+inline std::string note_text(const files::LoadedScene& scene, std::string_view id) {
+  const auto note = std::find_if(scene.notes.begin(), scene.notes.end(),
+                                 [id](const files::Note& candidate) { return candidate.id == id; });
+  return note == scene.notes.end() ? std::string() : note->message;
+}
+
 inline constexpr std::string_view kXyz = "property float x\nproperty float y\nproperty float z\n";
 inline constexpr std::string_view kRgb = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
 inline constexpr std::string_view kFaces = "property list uchar int vertex_indices\n";

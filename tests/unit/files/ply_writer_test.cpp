@@ -153,6 +153,16 @@ TEST(PlyWriter, WritesThroughASymbolicLink) {
   EXPECT_EQ(test::file_bytes(path), written(sample_mesh()));
 }
 
+TEST(PlyWriter, WritesWhatALinkLeadsTo) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_symlink("middle.ply", folder.path() / "link.ply");
+  std::filesystem::create_symlink(folder.path() / "new.ply", folder.path() / "middle.ply");
+  ASSERT_TRUE(write_ply(folder.path() / "link.ply", sample_mesh(), kColours));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link.ply"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "middle.ply"));
+  EXPECT_EQ(test::file_bytes(folder.path() / "new.ply"), written(sample_mesh()));
+}
+
 TEST(PlyWriter, WritesToAPipe) {
   const test::TemporaryFolder folder;
   const auto path = folder.path() / "pipe";

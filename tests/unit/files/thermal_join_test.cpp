@@ -19,6 +19,7 @@ namespace spectra::files {
 namespace {
 
 using test::note_count;
+using test::note_text;
 
 std::string visible_file(const std::string& positions, int count) {
   return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) + "\n" + std::string(test::kXyz) +
@@ -130,6 +131,12 @@ TEST(ThermalJoin, TellsThatAHotReadingFoundNoVertex) {
   const auto scene = joined(visible_file(visible, 100), thermal_file(thermal, 361));
   ASSERT_TRUE(scene);
   EXPECT_EQ(note_count(scene.value(), "thermal_extremes_lost"), 1U);
+  EXPECT_NE(note_text(scene.value(), "thermal_extremes_lost").find("500 degC"), std::string::npos);
+  thermal.replace(thermal.find(" 0 500\n"), 7, " 0 inf\n");
+  const auto saturated = joined(visible_file(visible, 100), thermal_file(thermal, 361));
+  ASSERT_TRUE(saturated);
+  EXPECT_NE(note_text(saturated.value(), "thermal_extremes_lost").find("one over the range of the sensor"),
+            std::string::npos);
   const auto kept = joined(visible_file(visible, 100), thermal_file(visible_with(visible, " 20"), 100));
   ASSERT_TRUE(kept);
   EXPECT_EQ(note_count(kept.value(), "thermal_extremes_lost"), 0U);
