@@ -99,6 +99,10 @@ int run_fuse(const FuseOptions& options) {
   const auto facts = fused(options, settings.value(), *format);
   if (!facts) return fail(facts.error());
   print_notes(facts.value().notes);
+  if (*format != exports::SceneFileFormat::Draco && options.keeping != protocol::codec::DracoKeeping::Shape) {
+    print_notes({{"unused_options", 1,
+                  "--keep-order and --lossless are for .drc files and have no effect on " + options.output.string()}});
+  }
   const auto& temperature = facts.value().temperature;
   const bool has_any =
       temperature.has_temperature() || temperature.over_range_count + temperature.under_range_count > 0;

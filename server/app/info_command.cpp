@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "fusion/mesh/topology.hpp"
 #include "server/app/command_output.hpp"
@@ -16,6 +17,15 @@
 
 namespace spectra::app {
 namespace {
+
+/// Whether the metres of its size are known to be some.
+std::string_view about_unit(const files::LoadedScene& loaded) {
+  if (loaded.mesh.is_metric) return "";
+  const bool is_another_told = std::any_of(loaded.notes.begin(), loaded.notes.end(),
+                                           [](const files::Note& note) { return note.id == "unit_told"; });
+  return is_another_told ? " if one unit were a metre; the file names another (see the note)"
+                         : " (the file names no unit, metres are assumed; --scale gives another)";
+}
 
 protocol::Bounds bounds_of(std::span<const base::Vec3f> positions) {
   protocol::Bounds bounds;
@@ -85,8 +95,7 @@ void print_info(const files::LoadedScene& loaded, const fusion::TemperatureSumma
   fmt::print("bounds       {} {} {} to {} {} {} m from the origin\n", bounds.min[0], bounds.min[1], bounds.min[2],
              bounds.max[0], bounds.max[1], bounds.max[2]);
   const auto size = size_of(core_bounds_of(loaded));
-  fmt::print("size         {:.6g} x {:.6g} x {:.6g} m{}\n", size[0], size[1], size[2],
-             mesh.is_metric ? "" : " (the file names no unit, metres are assumed; --scale gives another)");
+  fmt::print("size         {:.6g} x {:.6g} x {:.6g} m{}\n", size[0], size[1], size[2], about_unit(loaded));
   fmt::print("up           {}\n", to_string(mesh.up));
   fmt::print("colours      {}\n", mesh.has_visible ? "yes" : "none (shown as mid grey)");
   if (temperature.has_temperature()) {

@@ -117,6 +117,15 @@ test("fuse keeps order and number of the vertices, their positions, temperatures
   for (const column of ["red", "green", "blue"]) assert.deepEqual(visible[column], before[column], column);
 });
 
+test("fuse says that an option for Draco files has no effect on others", () => {
+  for (const [ending, option, isSaid] of [["glb", "--lossless", true], ["ply", "--keep-order", true], ["ply", "--quiet", false]]) {
+    const args = ["fuse", demo, inFolder(`option.${ending}`), "--method", "thermal_only", option];
+    const { status, stderr } = spawnSync(binary, args, { encoding: "utf8" });
+    assert.equal(status, 0, stderr);
+    assert.equal(/no effect on .*option\./.test(stderr), isSaid, stderr);
+  }
+});
+
 test("the exports of the server are the command line's", async () => {
   const server = await serve([demo]);
   try {

@@ -27,6 +27,18 @@ async function served(args, look) {
   }
 }
 
+test("the size says that the file names no unit only where it names none", () => {
+  const written = (comment) => {
+    const file = path.join(folder, "unit.ply");
+    const header = ["ply", "format ascii 1.0", ...comment, "element vertex 3", "property float x", "property float y", "property float z"];
+    writeFileSync(file, [...header, "end_header", "0 0 0", "1000 0 0", "0 1000 1", ""].join("\n"));
+    return run("info", file);
+  };
+  assert.match(written([]), /^size .*names no unit/m);
+  assert.match(written(["comment units: mm"]), /^size .*names another \(see the note\)$/m);
+  assert.match(written(["comment units: metres"]), /^size .* m$/m);
+});
+
 test("strays are counted, and the box of the rest is told", async () => {
   for (const name of ["10-stray-point.ply", "10b-stray-point-mesh.ply", "10c-stray-points-in-cloud.ply"]) {
     const facts = info(inField(name));
