@@ -423,10 +423,17 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
   const float kept = hottest_of(mesh.temperature_celsius());
   constexpr float kNoticed = 1;
   if (hottest - kept > kNoticed) {
+    const auto celsius = thermal.mesh.temperature_celsius();
+    const auto vertex = static_cast<std::size_t>(std::find(celsius.begin(), celsius.end(), hottest) - celsius.begin());
+    const mesh::NearestSurface surface(mesh.positions(), mesh.triangles());
+    const std::string advice = surface.find(join.thermal_positions()[vertex], reach)
+                                   ? "; give the finer file as the scene"
+                                   : "; the scene has nothing within " + base::distance_text(reach) + " of it: open " +
+                                         thermal.mesh.name + " alone to see it";
     scene.notes.push_back({"thermal_extremes_lost", 1,
                            "The hottest reading of " + thermal.mesh.name + ", " + celsius_text(hottest) +
                                ", has no vertex of the scene at it: the scene's hottest has " + celsius_text(kept) +
-                               "; give the finer file as the scene",
+                               advice,
                            true});
   }
   if (joined_count < count) {

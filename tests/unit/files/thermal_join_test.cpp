@@ -137,6 +137,13 @@ TEST(ThermalJoin, TellsThatAHotReadingFoundNoVertex) {
   ASSERT_TRUE(saturated);
   EXPECT_NE(note_text(saturated.value(), "thermal_extremes_lost").find("one over the range of the sensor"),
             std::string::npos);
+  EXPECT_NE(note_text(saturated.value(), "thermal_extremes_lost").find("give the finer file"), std::string::npos);
+  const auto outside =
+      joined(visible_file(visible, 100), thermal_file(visible_with(visible, " 20") + "20 4 0 500\n", 101));
+  ASSERT_TRUE(outside);
+  EXPECT_EQ(note_text(outside.value(), "thermal_extremes_lost").find("give the finer file"), std::string::npos);
+  EXPECT_NE(note_text(outside.value(), "thermal_extremes_lost").find("the scene has nothing within"),
+            std::string::npos);
   const auto kept = joined(visible_file(visible, 100), thermal_file(visible_with(visible, " 20"), 100));
   ASSERT_TRUE(kept);
   EXPECT_EQ(note_count(kept.value(), "thermal_extremes_lost"), 0U);
