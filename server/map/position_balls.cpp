@@ -339,7 +339,7 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
       if (few_count < kFewestOfBall) few_count = around.gather(kEverywhere);
       radius = around.radius_of(kFewestOfBall, few_count);
       const double wanted_reach = std::sqrt(double{radius} * double{kLargestBall});
-      if (wanted_reach > around.reach && around.points.size() < points_.size()) {
+      if (wanted_reach > around.reach && std::isfinite(wanted_reach) && around.points.size() < points_.size()) {
         // It may be smaller then.
         gather_around(cell, kSpareReach * wanted_reach, around, round);
         around.measure_from(center);
