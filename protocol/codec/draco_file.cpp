@@ -226,14 +226,19 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
     options.SetAttributeOptions(temperature_attribute,
                                 quantisation_options({&lattice.origin, 1}, lattice.largest, lattice.step));
   }
-  mesh.SetNumFaces(input.triangles.size());
+  const bool is_point_cloud = input.triangles.empty();
+  if (!is_point_cloud && keeping != DracoKeeping::Shape) {
+    const std::uint64_t fewest = (input.positions_m.size() + 2) / 3;
+    file.added_triangle_count = std::max<std::uint64_t>(fewest, input.triangles.size()) - input.triangles.size();
+  }
+  mesh.SetNumFaces(input.triangles.size() +
+                   file.added_triangle_count);  // Those beyond the scene's are all of vertex 0.
   for (std::uint32_t i = 0; i < input.triangles.size(); ++i) {
     const TileTriangle& t = input.triangles[i];
     mesh.SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
   }
   add_metadata(mesh, input, file, temperature_attribute);
 
-  const bool is_point_cloud = input.triangles.empty();
   draco::ExpertEncoder encoder =
       is_point_cloud ? draco::ExpertEncoder(static_cast<const draco::PointCloud&>(mesh)) : draco::ExpertEncoder(mesh);
   encoder.Reset(options);

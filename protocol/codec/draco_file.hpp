@@ -33,6 +33,7 @@ struct DracoFile {
   float temperature_step_celsius = 0;         ///< 0: exact, or none.
   std::uint64_t left_out_vertex_count = 0;    ///< Of no triangle.
   std::uint64_t left_out_triangle_count = 0;  ///< That name a vertex twice.
+  std::uint64_t added_triangle_count = 0;     ///< Of one vertex each, after the others; see draco_file().
   std::uint64_t split_vertex_count = 0;       ///< Vertices more than went in: non-manifold ones, one for every fan.
   std::uint64_t over_range_count = 0;         ///< Temperatures of infinity, written as the values below.
   std::uint64_t under_range_count = 0;
@@ -49,7 +50,8 @@ inline constexpr float kDracoTemperatureStepCelsius = 1.0F / 64;
 /// Attributes: POSITION (float, metres), COLOR (3 bytes, sRGB), GENERIC (float, degC) with the metadata name
 /// "temperature", unit "degC", step, missing, over_range and under_range; metadata of the whole: origin_m and
 /// position_step_m. Decoded values are within half a step of those that went in. `speed` 0 (smallest) .. 10 (fastest).
-/// InternalError for arrays that do not belong together.
+/// A decoder takes no more than three vertices for every triangle of a mesh whose order is kept: where there are too few,
+/// triangles that name the first vertex three times follow. InternalError for arrays that do not belong together.
 Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed);
 
 }  // namespace spectra::protocol::codec

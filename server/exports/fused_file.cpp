@@ -26,6 +26,12 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
 /// What a Draco file has lost, for people.
 std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const SceneFileOptions& options) {
   std::vector<files::Note> losses;
+  const auto add = [&losses](const char* id, std::uint64_t count, std::string message) {
+    if (count > 0) losses.push_back({id, count, std::move(message)});
+  };
+  add("added_triangles", file.added_triangle_count,
+      counted(file.added_triangle_count, "triangle", "triangles") +
+          " of one vertex added after the others: programs open no mesh of more vertices than three for each triangle");
   if (options.keeping == protocol::codec::DracoKeeping::Everything) return losses;
   const float coarsest_m = std::max(options.position_step_m, options.largest_position_step_m);
   std::string rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m),
@@ -34,9 +40,6 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
     rounded += fmt::format(" and temperatures to {:g} degC", file.temperature_step_celsius);
   }
   losses.push_back({"rounded_values", 0, "In the file " + rounded + "; --lossless keeps every value as it is"});
-  const auto add = [&losses](const char* id, std::uint64_t count, std::string message) {
-    if (count > 0) losses.push_back({id, count, std::move(message)});
-  };
   add("over_range_written", file.over_range_count,
       fmt::format("In the file {} over range {} {:g} degC", counted(file.over_range_count, "vertex", "vertices"),
                   file.over_range_count == 1 ? "has" : "have", file.over_range_celsius));

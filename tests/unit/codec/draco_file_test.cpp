@@ -225,6 +225,26 @@ TEST(DracoFile, ThatKeepsEverythingHasEveryBit) {
   }
 }
 
+TEST(DracoFile, OfManyVerticesAndFewTrianglesIsOpenedWithTrianglesOfOneVertexAdded) {
+  Scene scene = numbered({}, {{2, 1, 0}, {3, 4, 1}});
+  for (int i = 0; i < 20; ++i) {
+    scene.positions.push_back({static_cast<float>(i), static_cast<float>(i % 3), 1});
+    scene.colours.push_back({static_cast<std::uint8_t>(i), 0, 77});
+    scene.temperatures.push_back(20);
+  }
+  for (const DracoKeeping keeping : {DracoKeeping::Order, DracoKeeping::Everything}) {
+    const auto file = draco_file(scene.input(0.01F), keeping, 7);
+    ASSERT_TRUE(file.has_value()) << file.error().message;
+    EXPECT_EQ(file.value().added_triangle_count, 5U);
+    const Decoded seen = decoded(file.value().bytes);
+    ASSERT_EQ(seen.positions.size(), 20U);
+    ASSERT_EQ(seen.triangles.size(), 7U);
+    EXPECT_EQ(seen.triangles[1], scene.triangles[1]);
+    for (std::size_t t = 2; t < 7; ++t) EXPECT_EQ(seen.triangles[t], (TileTriangle{0, 0, 0}));
+  }
+  EXPECT_EQ(draco_file(scene.input(0.01F), DracoKeeping::Shape, 7).value().added_triangle_count, 0U);
+}
+
 TEST(DracoFile, TellsTrianglesThatNameAVertexTwice) {
   Scene scene = numbered({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 1, 1}});
   const auto file = draco_file(scene.input(0.01F), DracoKeeping::Shape, 7);
