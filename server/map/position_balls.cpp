@@ -399,6 +399,7 @@ void PositionSteps::keep_apart(Neighbourhood& around, std::size_t near_count, st
   std::sort(around.in_order.begin(), around.in_order.end());
   std::map<std::array<float, 3>, std::uint32_t> first_at;
   std::vector<std::uint32_t> merged;
+  std::size_t merged_in_crowd = 0;  // Of `merged`, those in the largest ball of which too many fall together.
   for (std::size_t i = 0; i < near_count; ++i) {
     const auto [distance, n] = around.in_order[i];
     const auto [first, is_new] = first_at.try_emplace(around.rounded[n], n);
@@ -407,13 +408,13 @@ void PositionSteps::keep_apart(Neighbourhood& around, std::size_t near_count, st
       merged.push_back(first->second);
     }
     const bool is_ball = i + 1 >= kFewestOfBall && (i + 1 == near_count || around.in_order[i + 1].first > distance);
-    if (!is_ball || (i + 1 - first_at.size()) * kVerticesToMerged <= i + 1) continue;
-    for (const std::uint32_t m : merged) {
-      const std::uint32_t point = around.points[m];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const int finer_by_one = std::min(halvings_[point][axis] + 1, int{most_halvings_});
-        raise(wanted[point][axis], static_cast<std::uint8_t>(finer_by_one));
-      }
+    if (is_ball && (i + 1 - first_at.size()) * kVerticesToMerged > i + 1) merged_in_crowd = merged.size();
+  }
+  for (const std::uint32_t n : std::span(merged).first(merged_in_crowd)) {
+    const std::uint32_t point = around.points[n];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int finer_by_one = std::min(halvings_[point][axis] + 1, int{most_halvings_});
+      raise(wanted[point][axis], static_cast<std::uint8_t>(finer_by_one));
     }
   }
 }
