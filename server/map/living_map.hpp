@@ -24,9 +24,9 @@
 
 namespace spectra::map {
 
-/// Of a map that is expected to grow. Half of what others have: a block that comes in makes whole leaves anew, and coarse
+/// Of a map that is expected to grow. A quarter of what others have: a block that comes in makes whole leaves anew, and coarse
 /// tiles above them.
-inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 2;
+inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 4;
 
 /// How far a replaced block hands its baseline on, in position steps of the map: about two edges of its first block.
 inline constexpr double kHandedOnSteps = 8;

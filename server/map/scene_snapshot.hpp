@@ -78,9 +78,8 @@ struct Extreme {
   float temperature_celsius = 0;
 };
 
-/// About how many vertices a leaf has unless said otherwise: small ones are what little changes and cameras from nearby need, large ones
-/// weigh less in all.
-inline constexpr std::uint32_t kLeafVertexCount = 16'000;
+/// About how many vertices a leaf has unless said otherwise.
+inline constexpr std::uint32_t kLeafVertexCount = 32'000;
 
 /// What a snapshot tells of its making.
 inline constexpr std::string_view kTilingPhase = "tiling";
