@@ -28,6 +28,10 @@ constexpr double kSpareReach = 1.25;
 constexpr double kMostSideChange = 0.0985;
 constexpr int kMostRounds = 8;
 
+/// Of more vertices around a cell it is not looked at: one of strays, far larger than its own vertices are from each other, that has
+/// half the scene in its reach. Some 500 are usual.
+constexpr std::size_t kMostAround = 1 << 14;
+
 /// Where the ends of the box of some vertices are, as they are and as they are rounded; those at the upper end negative, so that
 /// every number is a least one.
 struct Ends {
@@ -276,11 +280,16 @@ void PositionSteps::gather_around(const Cell& cell, double reach, Neighbourhood&
   around.points.clear();
   around.changed.clear();
   for_each_cell_around(cell, reach, [&](const Cell& other) {
+    if (around.points.size() > kMostAround) return;
     for (std::uint32_t i = other.begin; i < other.end; ++i) {
       if (round.is_changed[i] != 0) around.changed.push_back(static_cast<std::uint32_t>(around.points.size()));
       around.points.push_back(i);
     }
   });
+  if (around.points.size() > kMostAround) {
+    around.points.clear();
+    around.changed.clear();
+  }
   const std::size_t count = around.points.size();
   around.resize(count);
   around.coarsest_step = {};
@@ -315,14 +324,18 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
     if (!is_any_changed) return;
   }
   gather_around(cell, reach, around, round);
-  constexpr float kSafe = -1;  // Instead of a radius: no further look is needed, as steps only get finer.
+  constexpr float kSafe =
+      -1;  // Instead of a radius: no further look is needed, as steps only get finer, or none is taken.
   constexpr float kEverywhere = std::numeric_limits<float>::infinity();
   float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
   for (std::uint32_t seed = cell.begin; seed < cell.end; ++seed) {
     std::array<float, 3> center = coordinates(points_[seed].position);
     for (std::size_t axis = 0; axis < 3; ++axis)
       center[axis] = static_cast<float>(double{center[axis]} - double{around.corner[axis]});
-    if (around.points.size() < kFewestOfBall) break;
+    if (around.points.size() < kFewestOfBall) {
+      round.radius[seed] = kSafe;
+      continue;
+    }
     if (!round.is_first) {
       radius = round.radius[seed];
       if (radius == kSafe) continue;
@@ -342,6 +355,10 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
       if (wanted_reach > around.reach && std::isfinite(wanted_reach) && around.points.size() < points_.size()) {
         // It may be smaller then.
         gather_around(cell, kSpareReach * wanted_reach, around, round);
+        if (around.points.size() < kFewestOfBall) {
+          round.radius[seed] = kSafe;
+          continue;
+        }
         around.measure_from(center);
         radius = around.radius_of(kFewestOfBall, around.gather(radius));
       }
