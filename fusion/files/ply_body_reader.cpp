@@ -174,6 +174,11 @@ base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& 
   if (schema.has_vertex_temperature()) {
     convert_temperatures(raw);
     block.temperature_celsius = temperatures_;
+    if (schema.has_confidence()) {
+      convert_confidence(raw);
+      block.sigma_kelvin = sigmas_;
+      block.looked_at = looked_at_;
+    }
   } else if (schema.has_face_temperature()) {
     block.temperature_celsius = std::span(interpretation_.survey.face_temperature_celsius)
                                     .subspan(static_cast<std::size_t>(raw.first_vertex), count);
@@ -292,6 +297,19 @@ void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
                        is_left_out ? ignored : facts_.temperature);
   }
   facts_.temperature.no_data_seen |= ignored.no_data_seen;
+}
+
+/// What has no temperature has no deviation.
+void PlyBodyReader::convert_confidence(const PlyRawVertices& raw) {
+  sigmas_.resize(raw.sigmas.size());
+  looked_at_.assign(raw.sigmas.size(), std::numeric_limits<double>::quiet_NaN());
+  const double factor = std::abs(interpretation_.temperature.kelvin_per_unit());
+  for (std::size_t i = 0; i < raw.sigmas.size(); ++i) {
+    const auto kelvin = static_cast<float>(raw.sigmas[i] * factor);
+    const bool is_known = std::isfinite(temperatures_[i]) && std::isfinite(kelvin) && kelvin >= 0;
+    sigmas_[i] = is_known ? kelvin : std::numeric_limits<float>::quiet_NaN();
+    if (is_known && !raw.seen.empty() && std::isfinite(raw.seen[i])) looked_at_[i] = raw.seen[i];
+  }
 }
 
 }  // namespace spectra::files

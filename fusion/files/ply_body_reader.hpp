@@ -31,6 +31,7 @@ class PlyBodyReader {
   base::Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
   void conclude_positions(const PlyFaceReader& faces);
   void convert_temperatures(const PlyRawVertices& raw);
+  void convert_confidence(const PlyRawVertices& raw);
   base::Result<std::span<const base::Vec3f>> polygon_positions();
 
   BlockFile& file_;
@@ -44,7 +45,8 @@ class PlyBodyReader {
   VertexBits is_left_out_;               ///< Empty until the first one.
   std::vector<std::uint32_t> left_out_;  ///< Of the block.
   std::vector<base::Rgb8> colours_;
-  std::vector<float> temperatures_;
+  std::vector<float> temperatures_, sigmas_;
+  std::vector<double> looked_at_;
   std::array<bool, 3> has_more_digits_{};  ///< Of a text: coordinates that are no floats were seen.
   bool handler_has_failed_ = false;
 };

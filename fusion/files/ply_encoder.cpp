@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 namespace spectra::files {
@@ -79,7 +80,12 @@ base::Result<void> PlyEncoder::vertices(std::span<const base::Vec3f> positions, 
 
 base::Result<void> PlyEncoder::left_out_vertex(const base::Vec3d& position, base::Rgb8 colour,
                                                float temperature_celsius) {
-  return vertex(position, colour, temperature_celsius);
+  BOOST_OUTCOME_TRY(vertex(position, colour, temperature_celsius));
+  if (layout_.has_confidence) {
+    put(std::numeric_limits<float>::quiet_NaN());
+    put(std::numeric_limits<double>::quiet_NaN());
+  }
+  return base::success();
 }
 
 inline base::Result<void> PlyEncoder::vertex(const base::Vec3d& position, base::Rgb8 colour,

@@ -106,6 +106,7 @@ base::Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, 
   layout.origin = facts.origin;
   layout.double_positions = stream.has_double_positions(facts);
   layout.has_temperature = stream.has_temperature();
+  layout.has_confidence = stream.has_confidence();
   layout.comment = comment_of(told_coordinates(stream.header().comments, options));
   PlyEncoder encoder(layout, std::move(sink));
 
@@ -125,9 +126,13 @@ base::Result<void> fuse_and_write(PlyStream& stream, const PlyBodyFacts& facts, 
     return for_each_part(
         block,
         [&](std::size_t begin, std::size_t part_count) {
+          PlyConfidence confidence;
+          if (layout.has_confidence) {
+            confidence = {block.sigma_kelvin.subspan(begin, part_count), block.looked_at.subspan(begin, part_count)};
+          }
           return encoder.vertices(block_mesh.positions().subspan(begin, part_count),
                                   std::span(fused).subspan(begin, part_count),
-                                  block_mesh.temperature_celsius().subspan(begin, part_count));
+                                  block_mesh.temperature_celsius().subspan(begin, part_count), confidence);
         },
         [&](std::uint32_t hole) {
           return encoder.left_out_vertex(block.positions[hole], block_mesh.visible()[hole],

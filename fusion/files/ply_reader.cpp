@@ -131,6 +131,12 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
       const auto temperatures = block.temperature_celsius.subspan(begin, end - begin);
       std::copy(temperatures.begin(), temperatures.end(), mesh.temperature_celsius().begin() + out);
     }
+    if (!block.sigma_kelvin.empty()) {
+      const auto first = static_cast<std::ptrdiff_t>(begin), last = static_cast<std::ptrdiff_t>(end);
+      auto& [sigmas, times] = mesh.confidence;
+      sigmas.insert(sigmas.end(), block.sigma_kelvin.begin() + first, block.sigma_kelvin.begin() + last);
+      times.insert(times.end(), block.looked_at.begin() + first, block.looked_at.begin() + last);
+    }
     kept_count += end - begin;
   };
   std::vector<std::uint32_t> mesh_index;  // By the file's index, when that is not the same.
@@ -158,12 +164,15 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
   BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
   if (stream.leave_out_hole(facts)) {
     kept_count = 0;
+    mesh.confidence = {};
     mesh.left_out.clear();
     mesh.triangles().clear();
     mesh_index.clear();
     BOOST_OUTCOME_TRY(facts, stream.read(handlers));
   }
   if (kept_count < mesh.vertex_count()) mesh.resize_vertices(kept_count);
+  const auto& sigmas = mesh.confidence.sigma_kelvin;
+  if (std::all_of(sigmas.begin(), sigmas.end(), [](float kelvin) { return std::isnan(kelvin); })) mesh.confidence = {};
   exact_positions.resize(is_exact ? kept_count : 0);
 
   mesh.origin = facts.origin;
@@ -199,6 +208,7 @@ base::Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& pat
                            "The file's own temperatures replaced by those of the thermal file"});
   }
   scene.mesh.has_temperature = true;
+  scene.mesh.confidence = {};
   base::report(options.progress, base::kJoiningPhase, 0);
   BOOST_OUTCOME_TRYV(join_thermal(thermal, join_distance_m, scene, options.progress));
   const auto missing_count = static_cast<std::uint64_t>(

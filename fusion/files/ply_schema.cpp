@@ -117,6 +117,16 @@ base::Result<void> find_temperatures(const PlyElement& vertices, const PlyElemen
   return base::success();
 }
 
+/// How sure the temperatures of the vertices are, as Spectra writes it, and when they were looked at.
+void find_confidence(const PlyElement& vertices, PlySlots& slots) {
+  if (!slots[kTemperature]) return;
+  const auto sigma = find_scalar(vertices, "temperature_sigma");
+  if (!sigma || sigma == slots[kTemperature] || !is_floating(vertices.properties[*sigma].type)) return;
+  slots[kSigma] = sigma;
+  const auto seen = find_scalar(vertices, "seen");
+  if (seen && seen != slots[kTemperature]) slots[kSeen] = seen;
+}
+
 /// Whether a list may hold vertices, whatever its name: whole numbers, and none of a texture.
 bool may_hold_corners(const PlyProperty& property) {
   const std::string name = lower_case(property.name);
@@ -189,6 +199,7 @@ base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& o
   if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face);
   schema.colour_coding = coding.value_or(ColourCoding::Channels);
   BOOST_OUTCOME_TRY(find_temperatures(*vertices, faces, options, schema));
+  find_confidence(*vertices, schema.vertex);
   return schema;
 }
 

@@ -13,7 +13,7 @@
 namespace spectra::files {
 
 /// What a property means to us.
-enum PlySlot : std::size_t { kX, kY, kZ, kRed, kGreen, kBlue, kTemperature, kSlotCount };
+enum PlySlot : std::size_t { kX, kY, kZ, kRed, kGreen, kBlue, kTemperature, kSigma, kSeen, kSlotCount };
 
 /// Slot -> index of the element's property.
 using PlySlots = std::array<std::optional<std::size_t>, kSlotCount>;
@@ -41,6 +41,7 @@ struct PlySchema {
   bool has_vertex_colours() const { return vertex[kRed].has_value(); }
   bool has_face_colours() const { return face[kRed].has_value(); }
   bool has_vertex_temperature() const { return vertex[kTemperature].has_value(); }
+  bool has_confidence() const { return vertex[kSigma].has_value(); }
   bool has_face_temperature() const { return face[kTemperature].has_value(); }
 };
 

@@ -29,6 +29,10 @@ struct PlyVertexBlock {
   std::span<const base::Vec3d> positions;      ///< Metres; finite, within 1e30, but for those left out.
   std::span<const base::Rgb8> visible;         ///< Empty when the file has no colours.
   std::span<const float> temperature_celsius;  ///< Empty when the file has none; NaN = missing, +-inf = out of range.
+  /// How sure the temperatures are, kelvin (NaN = not known), and when they were looked at, on the file's clock; empty when the file does
+  /// not say it.
+  std::span<const float> sigma_kelvin;
+  std::span<const double> looked_at;
   /// Those without a position, by their index in the block, rising: to be left out of the scene. No triangle has them.
   std::span<const std::uint32_t> left_out;
 };
@@ -90,6 +94,7 @@ class PlyStream {
   std::uint64_t triangle_count_limit() const;
   bool has_visible() const;
   bool has_temperature() const;
+  bool has_confidence() const { return interpretation_.schema.has_confidence(); }
   /// Some coordinate has a type that a float cannot hold; or, as a reading has shown, is text with more digits than that.
   bool has_double_positions() const;
   bool has_double_positions(const PlyBodyFacts& facts) const {

@@ -1,6 +1,7 @@
 #include "fusion/files/ply_vertex_reader.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "fusion/files/ply_values.hpp"
 
@@ -43,6 +44,11 @@ PlyVertexReader::PlyVertexReader(PlyCursor& cursor, const PlyElement& element, c
     temperatures_.resize(kBlockVertices);
     add(kTemperature, temperatures_.data(), 1);
   }
+  for (const auto& [slot, values] : {std::pair(kSigma, &sigmas_), std::pair(kSeen, &seen_)}) {
+    if (!schema.vertex[slot]) continue;
+    values->resize(kBlockVertices);
+    add(slot, values->data(), 1);
+  }
 }
 
 base::Result<PlyRawVertices> PlyVertexReader::next() {
@@ -63,6 +69,8 @@ base::Result<PlyRawVertices> PlyVertexReader::next() {
     if (!colours_[channel].empty()) block.colours[channel] = std::span(colours_[channel]).first(count);
   }
   if (!temperatures_.empty()) block.temperatures = std::span(temperatures_).first(count);
+  if (!sigmas_.empty()) block.sigmas = std::span(sigmas_).first(count);
+  if (!seen_.empty()) block.seen = std::span(seen_).first(count);
   return block;
 }
 

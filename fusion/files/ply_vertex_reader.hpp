@@ -17,6 +17,7 @@ struct PlyRawVertices {
   std::span<base::Vec3d> positions;
   std::array<std::span<double>, 3> colours;  ///< Empty when the vertices have none. Packed ones: the first alone.
   std::span<double> temperatures;            ///< Empty when the vertices have none.
+  std::span<double> sigmas, seen;            ///< The same.
 };
 
 /// Reads the element 'vertex' in blocks. The cursor stands at its beginning.
@@ -48,7 +49,7 @@ class PlyVertexReader {
   std::vector<Column> columns_;
   std::vector<base::Vec3d> positions_;
   std::array<std::vector<double>, 3> colours_;
-  std::vector<double> temperatures_;
+  std::vector<double> temperatures_, sigmas_, seen_;
 };
 
 }  // namespace spectra::files

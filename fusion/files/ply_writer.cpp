@@ -39,6 +39,7 @@ base::Result<void> encode(const mesh::MultispectralMesh& mesh, std::span<const b
   layout.origin = mesh.origin;
   layout.double_positions = mesh.double_positions;
   layout.has_temperature = mesh.has_temperature;
+  layout.has_confidence = mesh.has_temperature && !mesh.confidence.empty();
   layout.comment = comment.empty() ? comment_of(mesh.told) : comment;
   PlyEncoder encoder(layout, std::move(sink));
   if (colours.size() != mesh.vertex_count()) {
@@ -50,8 +51,13 @@ base::Result<void> encode(const mesh::MultispectralMesh& mesh, std::span<const b
   for (std::size_t i = 0; i <= mesh.left_out.size(); ++i) {
     const std::size_t end = i < mesh.left_out.size() ? mesh.left_out[i].input_index - i : mesh.vertex_count();
     const std::size_t count = end - begin;
+    PlyConfidence confidence;
+    if (layout.has_confidence) {
+      confidence = {std::span(mesh.confidence.sigma_kelvin).subspan(begin, count),
+                    std::span(mesh.confidence.looked_at).subspan(begin, count)};
+    }
     BOOST_OUTCOME_TRY(encoder.vertices(mesh.positions().subspan(begin, count), colours.subspan(begin, count),
-                                       mesh.temperature_celsius().subspan(begin, count)));
+                                       mesh.temperature_celsius().subspan(begin, count), confidence));
     begin = end;
     if (i == mesh.left_out.size()) break;
     const mesh::LeftOutVertex& hole = mesh.left_out[i];
@@ -79,7 +85,8 @@ base::Result<void> write_ply(const std::filesystem::path& path, const mesh::Mult
                              const base::Progress& progress) {
   base::report(progress, base::kWritingPhase, 0);
   BOOST_OUTCOME_TRY(OutputFile file, OutputFile::create(path));
-  const std::size_t vertex_bytes = (mesh.double_positions ? 24U : 12U) + 3U + (mesh.has_temperature ? 4U : 0U);
+  const std::size_t vertex_bytes = (mesh.double_positions ? 24U : 12U) + 3U + (mesh.has_temperature ? 4U : 0U) +
+                                   (mesh.confidence.empty() ? 0U : 12U);
   const std::size_t whole_bytes =
       (mesh.vertex_count() + mesh.left_out.size()) * vertex_bytes + mesh.triangle_count() * 13 + 1;
   std::size_t written_bytes = 0;

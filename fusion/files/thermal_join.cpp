@@ -480,6 +480,7 @@ base::Result<void> join_thermal(const LoadedScene& thermal, double join_distance
     if (is_in_order(mesh, positions_in(mesh, thermal.mesh), tolerance)) {
       const std::span<const float> celsius = thermal.mesh.temperature_celsius();
       std::copy(celsius.begin(), celsius.end(), mesh.temperature_celsius().begin());
+      mesh.confidence = thermal.mesh.confidence;
       scene.notes.push_back({"thermal_joined_in_order", mesh.vertex_count(),
                              "Temperatures of " + thermal.mesh.name + " taken in order: its " +
                                  std::to_string(mesh.vertex_count()) + " vertices are where those of " + mesh.name +

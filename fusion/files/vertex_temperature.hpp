@@ -42,6 +42,8 @@ class TemperatureConversion {
   /// `values` and `celsius` have the same length. The facts of all calls add up.
   void convert(std::span<const double> values, std::span<float> celsius, TemperatureFacts& facts) const;
 
+  double kelvin_per_unit() const { return scale_.factor; }
+
  private:
   float converted(double value, TemperatureFacts& facts) const;
   /// The bit of no_data_seen; 0 when the value is data.

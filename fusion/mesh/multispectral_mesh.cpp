@@ -40,6 +40,10 @@ void MultispectralMesh::resize_vertices(std::size_t count) {
   std::fill(colours.begin() + old_count, colours.end(), kNoColour);
   auto& temperatures = storage_->temperatures();
   std::fill(temperatures.begin() + old_count, temperatures.end(), std::numeric_limits<float>::quiet_NaN());
+  if (!confidence.empty()) {
+    confidence.sigma_kelvin.resize(count, std::numeric_limits<float>::quiet_NaN());
+    confidence.looked_at.resize(count, std::numeric_limits<double>::quiet_NaN());
+  }
 }
 
 std::span<const base::Vec3f> MultispectralMesh::positions() const {

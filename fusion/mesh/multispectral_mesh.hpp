@@ -21,6 +21,14 @@ struct LeftOutVertex {
   float temperature_celsius = 0;
 };
 
+/// How sure the temperatures of a mesh are, and when the thermal camera last looked; one a vertex, or none where nobody says so.
+struct TemperatureConfidence {
+  std::vector<float> sigma_kelvin;  ///< Standard deviation; NaN = not known.
+  std::vector<double> looked_at;    ///< Seconds of the source's clock; NaN = not known. As long as sigma_kelvin.
+
+  bool empty() const { return sigma_kelvin.empty(); }
+};
+
 /// What somebody has said of a scene's coordinates: its file, or who had it read.
 struct ToldCoordinates {
   std::optional<base::UpAxis> up;
@@ -59,6 +67,8 @@ class MultispectralMesh {
 
   const std::vector<base::Triangle>& triangles() const { return triangles_; }
   std::vector<base::Triangle>& triangles() { return triangles_; }
+
+  TemperatureConfidence confidence;
 
   /// What positions are relative to, in the coordinates of the input (metres, double: a map in UTM keeps its millimetres).
   base::Vec3d origin;

@@ -49,6 +49,9 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.nullable("observed_at", message.observed_at);
   fields.nullable("baseline", message.baseline);
   fields.nullable("baseline_at", message.baseline_at);
+  fields.optional("temperature_sigma", message.temperature_sigma);
+  fields.require("temperature_sigma", message.temperature_sigma.value_or(0) >= 0, "a number not below 0");
+  fields.optional("temperature_at", message.temperature_at);
 }
 
 static void describe(auto& fields, Is<BaselineRequest> auto& message) {

@@ -47,6 +47,10 @@ struct ProbeReply {
   std::optional<double> observed_at;  ///< When it was seen, Unix seconds; null = not known.
   std::optional<double> baseline;     ///< degC; null = there is none, or it is beyond the sensor's range.
   std::optional<double> baseline_at;  ///< The time it is of, Unix seconds; null = not known.
+  std::optional<double>
+      temperature_sigma;  ///< Standard deviation of the temperature, kelvin; absent where nobody says how sure it is.
+  std::optional<double>
+      temperature_at;  ///< When the thermal camera last looked there, Unix seconds; absent where it is not known.
 };
 
 enum class BaselineAction { Mark, Get };

@@ -39,12 +39,14 @@ std::optional<std::string> UnitSender::send_changes(mapping::Mapper& mapper, con
   last_ = now;
   const std::vector<mapping::PublishedUnit> units = mapper.changed_units(publisher_, eye_, pool);
   if (units.empty()) return std::nullopt;
+  const double begin_unix_s = mapping::unix_begin_s(mapper.begin_s(), mapper.newest_s(), sources::unix_now_s());
   net::BlocksToSend blocks;
   blocks.count = units.size();
   blocks.read = [&](std::size_t index, std::uint64_t max_block_bytes) -> std::optional<net::OutgoingBlock> {
     const mapping::PublishedUnit& unit = units[index];
     if (unit.mesh.triangles.empty()) return net::OutgoingBlock{net::target_text(unit.id, {}), ""};
-    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query({}, eye_)), mapping::block_ply(unit.mesh)};
+    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query({}, eye_)),
+                             mapping::block_ply(unit.mesh, begin_unix_s)};
     if (block.ply.size() <= max_block_bytes) return block;
     ++refused_count_;
     warn(unit.id + " is larger than the server takes; map with larger voxels");

@@ -189,6 +189,27 @@ void take_times(Tile& tile, const std::vector<Child>& children, const PlaceOf& p
   tile.seen_at = VertexTimes::of(newest);
 }
 
+/// How sure the temperatures are of the vertices that are kept: as the same vertex of a child.
+template <class PlaceOf>
+void take_confidence(Tile& tile, const std::vector<Child>& children, const Thinning& thinning,
+                     const PlaceOf& place_of) {
+  const auto is_empty = [](const Child& child) { return child.node.tile->sigma_kelvin.empty(); };
+  if (std::all_of(children.begin(), children.end(), is_empty)) return;
+  tile.sigma_kelvin.assign(tile.positions.size(), std::numeric_limits<float>::quiet_NaN());
+  for (const Child& child : children) {
+    const Tile& below = *child.node.tile;
+    if (below.sigma_kelvin.empty()) continue;
+    for (std::size_t v = 0; v < child.merged_of.size(); ++v) {
+      const std::uint32_t k = place_of(child, v);
+      if (k == kNone || std::isnan(tile.temperature_celsius[k])) continue;
+      float& sigma = tile.sigma_kelvin[k];
+      // A vertex that stays knows best; where it knows nothing, whoever of its region does.
+      const bool is_kept_itself = thinning.kept[k] == child.merged_of[v];
+      if (!std::isnan(below.sigma_kelvin[v]) && (is_kept_itself || std::isnan(sigma))) sigma = below.sigma_kelvin[v];
+    }
+  }
+}
+
 /// The same of what has changed.
 template <class PlaceOf>
 void take_baseline(Tile& tile, const std::vector<Child>& children, const CoarseOptions& options,
@@ -366,6 +387,7 @@ void make_coarse_tile(MapNode& node, bool is_top, const BorderIndex& borders, co
   };
   if (!children.empty()) take_times(*tile, children, place_of);
   take_baseline(*tile, children, options, place_of);
+  take_confidence(*tile, children, thinning, place_of);
   tile->owned_count = static_cast<std::uint32_t>(tile->positions.size());
   node.samples = measure(*tile, children, mesh, fine, thinning, options);
   node.weight = std::move(thinning.weight);

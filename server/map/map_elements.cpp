@@ -121,6 +121,19 @@ void copy_vertices(std::span<const PieceVertex> vertices, Tile& tile) {
   }
 }
 
+void copy_confidence(std::span<const PieceVertex> vertices, Tile& tile) {
+  const auto is_known = [](const PieceVertex& v) { return !std::isnan(v.piece->sigma_of_vertex(v.index)); };
+  if (std::none_of(vertices.begin(), vertices.end(), is_known)) return;
+  std::vector<double> times;
+  times.reserve(vertices.size());
+  tile.sigma_kelvin.reserve(vertices.size());
+  for (const auto& [piece, index] : vertices) {
+    tile.sigma_kelvin.push_back(piece->sigma_of_vertex(index));
+    times.push_back(piece->look_of_vertex(index));
+  }
+  tile.looked_at = VertexTimes::of(times);
+}
+
 bool is_same(double a, double b) {
   return a == b || (std::isnan(a) && std::isnan(b));
 }
@@ -253,6 +266,7 @@ std::shared_ptr<Tile> leaf_tile(const protocol::TileId& id, std::vector<Element>
   }
   copy_vertices(vertices, *tile);
   copy_memory(vertices, labels, *tile);
+  copy_confidence(vertices, *tile);
   tile->bounds = bounds_of(std::span<const base::Vec3f>(tile->positions));
   // The vertices that are drawn: all but the lone ones of a scene with triangles.
   const std::size_t lone_begin = content.triangle_count == 0 ? tile->owned_count : referenced_count;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -32,6 +33,10 @@ struct Piece {
   std::span<const float> baseline_celsius;
   std::span<const double> baseline_at;
   const VertexTimes* baseline_times = nullptr;
+  /// How sure the temperatures are, and when they were looked at, in one of the other two; empty: not known.
+  std::span<const float> sigma_kelvin;
+  std::span<const double> looked_at;
+  const VertexTimes* looked_times = nullptr;
 
   std::uint32_t source_of_vertex(std::uint32_t v) const { return source_vertex.empty() ? v : source_vertex[v]; }
   std::uint32_t source_of_triangle(std::uint32_t t) const { return source_triangle.empty() ? t : source_triangle[t]; }
@@ -42,6 +47,13 @@ struct Piece {
   double baseline_time_of_vertex(std::uint32_t v, double own) const {
     if (baseline_celsius.empty()) return own;
     return baseline_times ? baseline_times->at(v) : baseline_at[v];
+  }
+  float sigma_of_vertex(std::uint32_t v) const {
+    return sigma_kelvin.empty() ? std::numeric_limits<float>::quiet_NaN() : sigma_kelvin[v];
+  }
+  double look_of_vertex(std::uint32_t v) const {
+    if (sigma_kelvin.empty()) return kUnknownTime;
+    return looked_times ? looked_times->at(v) : looked_at[v];
   }
   BlockNumber block_of_triangle(std::uint32_t t) const { return block_of_vertex(triangles[t][0]); }
 };

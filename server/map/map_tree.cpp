@@ -98,7 +98,10 @@ class TreeChange {
             .block = block.number,
             .baseline_celsius = block.baseline.celsius,
             .baseline_at = block.baseline.at,
-            .baseline_times = nullptr};
+            .baseline_times = nullptr,
+            .sigma_kelvin = block.mesh->confidence.sigma_kelvin,
+            .looked_at = block.mesh->confidence.looked_at,
+            .looked_times = nullptr};
   }
 
   Piece piece_of(const Tile& tile) const {
@@ -114,7 +117,10 @@ class TreeChange {
             .block = tile.block,
             .baseline_celsius = is_kept ? std::span<const float>(tile.baseline_celsius) : std::span<const float>(),
             .baseline_at = {},
-            .baseline_times = &tile.baseline_at};
+            .baseline_times = &tile.baseline_at,
+            .sigma_kelvin = tile.sigma_kelvin,
+            .looked_at = {},
+            .looked_times = &tile.looked_at};
   }
 
   bool is_removed(BlockNumber block) const { return removed_.contains(block); }

@@ -1,6 +1,8 @@
 #include "server/map/map_version.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace spectra::map {
 
@@ -35,6 +37,7 @@ mesh::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const Map
   const std::span<base::Vec3f> positions = mesh.positions();
   const std::span<base::Rgb8> visible = mesh.visible();
   const std::span<float> temperature = mesh.temperature_celsius();
+  auto& [sigmas, times] = mesh.confidence;
   for (const auto& node : leaves) {
     const bool has_any = std::any_of(node->blocks.begin(), node->blocks.end(),
                                      [&](BlockNumber number) { return blocks.contains(number); });
@@ -47,6 +50,13 @@ mesh::MultispectralMesh mesh_of_blocks(std::span<const std::shared_ptr<const Map
       positions[place] = leaf.positions[v];
       visible[place] = leaf.visible[v];
       temperature[place] = leaf.temperature_celsius[v];
+      if (leaf.sigma_kelvin.empty() || std::isnan(leaf.sigma_kelvin[v])) continue;
+      if (sigmas.empty()) {
+        sigmas.resize(mesh.vertex_count(), std::numeric_limits<float>::quiet_NaN());
+        times.resize(mesh.vertex_count(), kUnknownTime);
+      }
+      sigmas[place] = leaf.sigma_kelvin[v];
+      times[place] = leaf.looked_at.at(v);
     }
     for (std::size_t t = 0; t < leaf.triangles.size(); ++t) {
       // All corners of a triangle are of its block.

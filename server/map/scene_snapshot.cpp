@@ -72,6 +72,9 @@ class FactSource {
   std::optional<fusion::Hues> hues_;
 };
 
+/// A clock that shows less counts from something else than 1970.
+constexpr double kEarliestUnixTime = 1e8;
+
 double triangle_area(base::Vec3f a, base::Vec3f b, base::Vec3f c) {
   const auto edge = [a](base::Vec3f to) {
     return std::array{double{to.x} - double{a.x}, double{to.y} - double{a.y}, double{to.z} - double{a.z}};
@@ -233,6 +236,7 @@ class TiledSnapshot final : public SceneSnapshot {
     const double seen_at = best_tile->seen_at.at(best_vertex);
     if (!std::isnan(seen_at)) result.observed_at = seen_at;
     take_baseline(*best_tile, best_vertex, result);
+    take_confidence(*best_tile, best_vertex, result);
     return result;
   }
 
@@ -272,6 +276,13 @@ class TiledSnapshot final : public SceneSnapshot {
     const bool is_kept = baseline.data() != tile.temperature_celsius.data();
     const double at = is_kept ? tile.baseline_at.at(v) : version_.own_baseline_at.at(block_of(tile, v));
     if (!std::isnan(at)) probe.baseline_at = at;
+  }
+
+  static void take_confidence(const Tile& tile, std::size_t v, Probe& probe) {
+    if (tile.sigma_kelvin.empty() || std::isnan(tile.sigma_kelvin[v])) return;
+    probe.sigma_kelvin = tile.sigma_kelvin[v];
+    const double at = tile.looked_at.at(v);
+    if (at > kEarliestUnixTime) probe.looked_at = at;
   }
 
   static std::optional<Extreme> extreme(const Place& place) {

@@ -55,6 +55,10 @@ struct Tile {
   std::vector<float> baseline_celsius;
   VertexTimes baseline_at;  ///< Of a leaf: the times they are of.
   std::uint32_t baseline_mark = 0;
+  /// How sure each temperature is, kelvin (NaN: not known), and when the thermal camera last looked there, on the source's clock; empty:
+  /// not known of any.
+  std::vector<float> sigma_kelvin;
+  VertexTimes looked_at;
   std::vector<base::Triangle> triangles;       ///< Indices into this tile; empty for a point cloud.
   std::vector<std::uint32_t> source_triangle;  ///< Index in its block, per triangle (leaves).
 };
@@ -70,6 +74,8 @@ struct Probe {
   /// What the temperature is compared with, and the time that is of: later than that it was another, or has not been looked at.
   std::optional<float> baseline_celsius;
   std::optional<double> baseline_at;
+  std::optional<float> sigma_kelvin;  ///< Standard deviation of the temperature.
+  std::optional<double> looked_at;    ///< When the thermal camera last looked there, Unix seconds.
 };
 
 /// Where it is hottest or coldest.

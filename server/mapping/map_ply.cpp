@@ -17,18 +17,14 @@ files::PlyLayout layout_of(const UnitMesh& mesh) {
   layout.triangle_count = mesh.triangles.size();
   layout.has_temperature =
       std::any_of(mesh.celsius.begin(), mesh.celsius.end(), [](float t) { return !std::isnan(t); });
+  layout.has_confidence = layout.has_temperature;
   return layout;
 }
 
-}  // namespace
-
-base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
-                                 const base::Progress& progress) {
-  files::PlyLayout layout = layout_of(mesh);
-  layout.has_confidence = layout.has_temperature;
-  layout.comment = "positions in metres";
-  BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
-  files::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
+/// Hands on the vertices in parts, with their times on another clock.
+template <class Report>
+base::Result<void> encode_vertices(const UnitMesh& mesh, double begin_s, files::PlyEncoder& encoder,
+                                   const Report& report) {
   constexpr std::size_t kStep = 65'536;
   const std::size_t vertices = mesh.positions.size();
   std::vector<double> seen;
@@ -39,22 +35,40 @@ base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMe
     for (const float s : part(mesh.seen_s)) seen.push_back(begin_s + static_cast<double>(s));
     BOOST_OUTCOME_TRYV(encoder.vertices(part(mesh.positions), part(mesh.colours), part(mesh.celsius),
                                         {part(mesh.sigma_kelvin), seen}));
-    base::report(progress, base::kWritingPhase, 0.6 * static_cast<double>(first) / static_cast<double>(vertices));
+    report(static_cast<double>(first) / static_cast<double>(vertices));
   }
+  return base::success();
+}
+
+}  // namespace
+
+base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
+                                 const base::Progress& progress) {
+  files::PlyLayout layout = layout_of(mesh);
+  layout.comment = "positions in metres";
+  BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
+  files::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
+  BOOST_OUTCOME_TRYV(encode_vertices(mesh, begin_s, encoder,
+                                     [&](double share) { base::report(progress, base::kWritingPhase, 0.6 * share); }));
   BOOST_OUTCOME_TRYV(encoder.triangles(mesh.triangles));
   BOOST_OUTCOME_TRYV(encoder.finish());
   return out.commit();
 }
 
-std::string block_ply(const UnitMesh& mesh) {
+std::string block_ply(const UnitMesh& mesh, double begin_unix_s) {
   std::string text;
   files::PlyEncoder encoder(layout_of(mesh), [&text](std::span<const std::byte> bytes) -> base::Result<void> {
     text.append(std::bit_cast<const char*>(bytes.data()), bytes.size());
     return base::success();
   });
-  const bool is_whole = encoder.vertices(mesh.positions, mesh.colours, mesh.celsius) &&
+  const bool is_whole = encode_vertices(mesh, begin_unix_s, encoder, [](double) {}) &&
                         encoder.triangles(mesh.triangles) && encoder.finish();
   return is_whole ? text : std::string();
+}
+
+double unix_begin_s(double begin_s, double newest_s, double now_unix_s) {
+  constexpr double kEarliest = 1e8;  // A clock that shows less does not count from 1970.
+  return begin_s > kEarliest ? begin_s : now_unix_s - (newest_s - begin_s);
 }
 
 }  // namespace spectra::mapping

@@ -15,7 +15,11 @@ namespace spectra::mapping {
 base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
                                  const base::Progress& progress = {});
 
-/// The same without temperature_sigma and seen, in memory: what a server takes as a block.
-std::string block_ply(const UnitMesh& mesh);
+/// The same in memory: what a server takes as a block. `begin_unix_s`: when the map's first moment was, Unix seconds.
+std::string block_ply(const UnitMesh& mesh, double begin_unix_s);
+
+/// When a map's first moment was on the clock of this machine, Unix seconds: `begin_s` where the source counts so, else what makes
+/// `newest_s` of the source now.
+double unix_begin_s(double begin_s, double newest_s, double now_unix_s);
 
 }  // namespace spectra::mapping

@@ -51,6 +51,7 @@ base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
 
 void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   if (!begin_s_) begin_s_ = frame.time_s;
+  newest_s_ = frame.time_s;
   if (!frame.depth.empty() && !fuse_surface(frame, trajectory, faults)) return;
   if (!frame.thermal.empty() && heat_) fuse_heat(frame, trajectory, faults);
 }

@@ -57,6 +57,8 @@ class Mapper {
   const MapperFigures& figures() const { return figures_; }
   /// The time of the first frame, which seen_s counts from.
   double begin_s() const { return begin_s_.value_or(0); }
+  /// The time of the last frame.
+  double newest_s() const { return newest_s_; }
 
  private:
   MeshRules mesh_rules() const;
@@ -72,6 +74,7 @@ class Mapper {
   VoxelMap map_;
   std::optional<HeatFusion> heat_;
   std::optional<double> begin_s_;
+  double newest_s_ = 0;
   std::vector<double> spreads_kelvin_;  ///< Of the thermal pictures about what was known.
   std::size_t jumps_seen_ = 0;
   bool is_doubtful_ = false;  ///< Poses have jumped, and none has been found to fit since.

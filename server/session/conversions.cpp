@@ -348,6 +348,8 @@ protocol::ProbeReply to_message(const map::Probe& probe, base::Rgb8 fused) {
     message.baseline = double{*probe.baseline_celsius};
   }
   message.baseline_at = probe.baseline_at;
+  if (probe.sigma_kelvin) message.temperature_sigma = double{*probe.sigma_kelvin};
+  message.temperature_at = probe.looked_at;
   return message;
 }
 

@@ -52,10 +52,13 @@ FrameStream demo_drive_stream() {
   return stream;
 }
 
+double unix_now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& frames, const Eigen::Vector3d& eye) {
-  const double now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   std::vector<std::pair<std::string, std::string>> query{
-      {"observed_at", fmt::format("{:.3f}", now)},
+      {"observed_at", fmt::format("{:.3f}", unix_now_s())},
       {"sensor", fmt::format("{:.3f},{:.3f},{:.3f}", eye.x(), eye.y(), eye.z())},
       {"scale", "1"}};
   if (!frames.up.empty()) query.emplace_back("up", frames.up);
@@ -67,7 +70,7 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
   mapping::UnitPublisher publisher;
   const auto begin = Clock::now();
   auto last = begin;
-  Eigen::Vector3d eye = Eigen::Vector3d::Zero();
+  FeedMoment moment;
   for (std::size_t i = 0; i < frames.frame_count; ++i) {
     const auto due = begin + std::chrono::duration<double>(frames.stamp_s(i) - frames.stamp_s(0));
     do {
@@ -76,11 +79,12 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
     } while (frames.is_paced && Clock::now() < due);
     mapper.fuse(frames.load(i, faults), *frames.trajectory, faults);
     const mapping::PoseAnswer pose = frames.trajectory->at(frames.stamp_s(i));
-    if (pose.state == mapping::PoseState::Known) eye = pose.pose.translation();
+    if (pose.state == mapping::PoseState::Known) moment.eye = pose.pose.translation();
     run.progress(static_cast<double>(i + 1) / static_cast<double>(frames.frame_count));
     if (Clock::now() - last < kPublishEvery && i + 1 < frames.frame_count) continue;
     last = Clock::now();
-    if (!run.hand_over(mapper.changed_units(publisher, eye, pool), eye)) return;
+    moment.begin_unix_s = mapping::unix_begin_s(mapper.begin_s(), mapper.newest_s(), unix_now_s());
+    if (!run.hand_over(mapper.changed_units(publisher, moment.eye, pool), moment)) return;
   }
 }
 
@@ -111,8 +115,8 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   FeedRun run;
   run.voxel_m = voxel_m_;
   run.is_over = [this] { return state_->is_over.load(); };
-  run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const Eigen::Vector3d& eye) {
-    return hand_over(std::move(units), eye);
+  run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
+    return hand_over(std::move(units), moment);
   };
   run_feed(frames_, run, mapper, pool, faults);
   for (const mapping::FrameFault& fault : faults.all()) {
@@ -122,7 +126,7 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
                mapper.figures().thermal_frames, mapper.map().block_count());
 }
 
-bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::Vector3d& eye) {
+bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
   for (mapping::PublishedUnit& unit : units) {
     // A map that is behind is waited for: what is told then is newer.
     while (state_->under_way >= kUnderWay) {
@@ -139,13 +143,13 @@ bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::
       map_.remove(unit.id, done, MapKeeper::WhenFull::Take);
       continue;
     }
-    auto block = incoming_block(unit.id, unit_query(frames_, eye));
+    auto block = incoming_block(unit.id, unit_query(frames_, moment.eye));
     if (!block) {
       --state_->under_way;
       spdlog::error("{}: {}", unit.id, block.error().message);
       return false;
     }
-    block.value().ply = std::make_shared<const std::string>(mapping::block_ply(unit.mesh));
+    block.value().ply = std::make_shared<const std::string>(mapping::block_ply(unit.mesh, moment.begin_unix_s));
     map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
   }
   return !state_->is_over;

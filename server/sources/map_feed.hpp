@@ -31,16 +31,25 @@ FrameStream stream_of(mapping::FrameFolder folder);
 /// A drive through the demo office at the pace of a robot, with small pictures.
 FrameStream demo_drive_stream();
 
+/// What is known when units are handed over.
+struct FeedMoment {
+  Eigen::Vector3d eye = Eigen::Vector3d::Zero();  ///< Where the depth camera is.
+  double begin_unix_s = 0;                        ///< When the map's first moment was.
+};
+
 /// Maps frames and hands over, twice a second of real time and at the end, the units that have changed; what `hand_over` returns false for
 /// ends it. Ends early when `is_over`.
 struct FeedRun {
   double voxel_m = 0.01;
   std::function<bool()> is_over = [] { return false; };
-  std::function<bool(std::vector<mapping::PublishedUnit>, const Eigen::Vector3d& eye)> hand_over;
+  std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment& moment)> hand_over;
   std::function<void(double share)> progress = [](double) {};
 };
 void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
               mapping::FaultLog& faults);
+
+/// Unix seconds.
+double unix_now_s();
 
 /// What a block that is a unit is asked to be read with, and when it was seen: now.
 std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& frames, const Eigen::Vector3d& eye);
@@ -58,7 +67,7 @@ class MapFeed {
 
  private:
   void work(const std::function<bool()>& may_begin);
-  bool hand_over(std::vector<mapping::PublishedUnit> units, const Eigen::Vector3d& eye);
+  bool hand_over(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment);
 
   const FrameStream frames_;
   const double voxel_m_;

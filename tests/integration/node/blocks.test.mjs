@@ -104,6 +104,41 @@ test("blocks are listed in pages and given back as they came", async () => {
   await server.stop();
 });
 
+test("how sure a temperature is reaches whoever asks, and every file", async () => {
+  const store = path.join(scratch, "sure.spectra");
+  const begin = () => serve(["--live", "--store", store]);
+  let server = await begin();
+  await put(server, "sure", patch(0, 0, { side: 11, sigma: 0.25, seen: 1700000123.5 }), "?observed_at=1700000200");
+  await put(server, "plain", patch(1, 0, { side: 11 }));
+  const check = async () => {
+    const { origin } = await sceneOf(server);
+    const client = await SpectraClient.connect(server.url);
+    const probe = (x, y) => client.request("scene.probe", { position: [x - origin[0], y - origin[1], -origin[2]] });
+    const sure = await probe(3, 4);
+    assert.deepEqual([sure.temperature_sigma, sure.temperature_at, sure.observed_at], [0.25, 1700000123.5, 1700000200]);
+    const plain = await probe(15, 4);
+    assert.deepEqual([plain.temperature_sigma, plain.temperature_at], [undefined, undefined]);
+    await client.close();
+    for (const [at, sigmas] of [
+      ["blocks/sure", [0.25]],
+      ["blocks/plain", null],
+      ["scene.ply", [0.25, NaN]],
+    ]) {
+      const file = path.join(scratch, "got.ply");
+      writeFileSync(file, Buffer.from(await (await fetch(`${server.url}/api/v1/${at}`)).arrayBuffer()));
+      const ply = readPly(file);
+      assert.deepEqual(ply.sigma && [...new Set(ply.sigma)].sort(), sigmas, at);
+      if (ply.sigma) assert.ok(ply.seen.some((time) => time === 1700000123.5), at);
+    }
+  };
+  await check();
+  server.process.kill("SIGKILL");
+  await once(server.process, "exit");
+  server = await begin();
+  await check();
+  await server.stop();
+});
+
 test("what cannot be taken is refused with a reason, and the map stays as it was", async () => {
   const server = await serve(["--live"]);
   await put(server, "good", patch(0, 0, { side: 11 }));

@@ -48,6 +48,8 @@ export function readPly(path) {
     green: column("green", Uint8Array),
     blue: column("blue", Uint8Array),
     temperature: column("temperature", Float32Array),
+    sigma: column("temperature_sigma", Float32Array),
+    seen: column("seen", Float64Array),
     triangles,
   };
 }

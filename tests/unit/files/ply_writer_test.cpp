@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <limits>
 #include <sstream>
@@ -62,6 +63,32 @@ TEST(PlyWriter, WritesWhatItSays) {
   }
   expected.le(std::uint8_t{3}).le(0U).le(1U).le(2U);
   EXPECT_EQ(written(mesh), expected.bytes());
+}
+
+TEST(PlyWriter, KeepsHowSureTemperaturesAre) {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  mesh::MultispectralMesh mesh = sample_mesh();
+  EXPECT_TRUE(test::loaded(written(mesh)).mesh.confidence.empty());
+  // A vertex without temperature is not sure of any.
+  mesh.confidence = {{0.25F, 0.5F, -1}, {1'700'000'000.25, 3, 4}};
+  mesh.left_out = {{1, {kNone, 0, 0}, {7, 7, 7}, 20}};
+  const LoadedScene scene = test::loaded(written(mesh));
+  ASSERT_EQ(scene.mesh.vertex_count(), 3U);
+  ASSERT_EQ(scene.mesh.left_out.size(), 1U);
+  EXPECT_EQ(scene.mesh.confidence.sigma_kelvin[0], 0.25F);
+  EXPECT_EQ(scene.mesh.confidence.looked_at[0], 1'700'000'000.25);
+  for (const std::size_t v : {1U, 2U}) {
+    EXPECT_TRUE(std::isnan(scene.mesh.confidence.sigma_kelvin[v]));
+    EXPECT_TRUE(std::isnan(scene.mesh.confidence.looked_at[v]));
+  }
+  for (const Note& note : scene.notes) EXPECT_NE(note.id, "skipped_vertex_properties") << note.message;
+
+  ReadOptions options;
+  options.temperature_unit = TemperatureUnit::Fahrenheit;
+  EXPECT_NEAR(test::loaded(written(mesh), options).mesh.confidence.sigma_kelvin[0], 0.25 * 5 / 9, 1e-6);
+
+  mesh.confidence = {{kNone, kNone, kNone}, {1, 2, 3}};
+  EXPECT_TRUE(test::loaded(written(mesh)).mesh.confidence.empty()) << "costs nothing where nobody knows anything";
 }
 
 TEST(PlyWriter, RoundTripsAndLeavesOutWhatIsNotThere) {

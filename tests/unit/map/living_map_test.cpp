@@ -83,6 +83,48 @@ TEST_F(LivingMapTest, SharesTilesThatAreTheSameWithTheVersionBefore) {
   EXPECT_LT(same, after->tiles().size());
 }
 
+TEST_F(LivingMapTest, KeepsHowSureTemperaturesAreWhereThatIsKnown) {
+  const auto sure = [](std::uint32_t seed, float x, float sigma, double at) {
+    mesh::MultispectralMesh mesh = terrain(seed, x);
+    mesh.confidence.sigma_kelvin.assign(mesh.vertex_count(), sigma);
+    mesh.confidence.looked_at.assign(mesh.vertex_count(), at);
+    return mesh;
+  };
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const float x = 39.0F * static_cast<float>(i);
+    const std::string id = "b" + std::to_string(i);
+    blocks.push_back(i < 6 ? put(id, sure(i, x, 0.25F, 1.7e9 + i)) : put(id, terrain(i, x)));
+  }
+  const base::Vec3f there = terrain(2, 78).positions()[700], unknown = terrain(9, 351).positions()[700];
+  apply(std::move(blocks));
+  auto scene = completed();
+  const auto probe = scene->probe(there);
+  EXPECT_EQ(probe->sigma_kelvin, 0.25F);
+  EXPECT_EQ(probe->looked_at, 1.7e9 + 2);
+  EXPECT_EQ(scene->probe(unknown)->sigma_kelvin, std::nullopt);
+  std::size_t sure_coarse = 0;
+  for (const auto& tile : scene->tiles()) {
+    const bool has_any = std::ranges::any_of(tile->sigma_kelvin, [](float s) { return s == 0.25F; });
+    EXPECT_EQ(has_any, !tile->sigma_kelvin.empty()) << "costs something only where it is known";
+    EXPECT_EQ(has_any, tile->bounds.min.x < 6 * 39 - 0.1F);
+    if (has_any && tile->child_mask != 0) ++sure_coarse;
+  }
+  EXPECT_GT(sure_coarse, 0U);
+  const mesh::MultispectralMesh whole = scene->whole_mesh();
+  ASSERT_EQ(whole.confidence.sigma_kelvin.size(), whole.vertex_count());
+  EXPECT_EQ(std::ranges::count(whole.confidence.sigma_kelvin, 0.25F), 6 * 40 * 40);
+  EXPECT_EQ(scene->block_mesh("b3")->confidence.looked_at[5], 1.7e9 + 3);
+  EXPECT_TRUE(scene->block_mesh("b7")->confidence.empty());
+
+  // A block that comes in the place of another brings its own; a clock that does not count from 1970 tells no time.
+  apply(put("b2", sure(2, 78, 0.5F, 17)));
+  scene = apply(put("b3", terrain(3, 117)));
+  EXPECT_EQ(scene->probe(there)->sigma_kelvin, 0.5F);
+  EXPECT_EQ(scene->probe(there)->looked_at, std::nullopt);
+  EXPECT_EQ(scene->probe(terrain(3, 117).positions()[700])->sigma_kelvin, std::nullopt);
+}
+
 TEST_F(LivingMapTest, CoarseTilesFollowAfterTheLeaves) {
   LivingMap other(kOptions);
   std::vector<BlockPut> only;

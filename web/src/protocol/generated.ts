@@ -765,6 +765,14 @@ export interface ProbeReply {
    * The time that is of, Unix seconds; null = not known.
    */
   baseline_at?: number | null;
+  /**
+   * Standard deviation of the temperature, kelvin, apart from the camera's absolute error; absent where nobody says how sure it is.
+   */
+  temperature_sigma?: number;
+  /**
+   * When the thermal camera last looked there, Unix seconds; absent where it is not known.
+   */
+  temperature_at?: number;
 }
 /**
  * Params of scene.probe.

@@ -48,6 +48,8 @@ const optionalFields = new Set([
   'baseline',
   'baseline_at',
   'observed_at',
+  'temperature_sigma',
+  'temperature_at',
 ]);
 /** What a viewer sends, or only a sender of blocks is sent. */
 const notForViewers = ['camera.set', 'stream.ack', 'ingest.'];

@@ -218,6 +218,8 @@ export const probe: Decoder<Probe> = object({
   observed_at: optional(nullable(number)),
   baseline: optional(nullable(number)),
   baseline_at: optional(nullable(number)),
+  temperature_sigma: optional(number),
+  temperature_at: optional(number),
 });
 
 export const baseline: Decoder<Baseline> = object({ marked_at: nullable(number), revision: count });

@@ -35,6 +35,11 @@ describe('What a probe says', () => {
     expect(plain(probeWords(old, NOW))).toBe('38.1 °C');
   });
 
+  it('is as old as the last look with the thermal camera, and as sure', () => {
+    const sure = { ...PROBE, baseline: null, temperature_sigma: 0.3, temperature_at: NOW - 12 };
+    expect(plain(probeWords(sure, NOW))).toBe('38.1 ± 0.3 °C, 12 s ago');
+  });
+
   it('is no change of what was seen for the first time', () => {
     expect(plain(probeWords({ ...PROBE, baseline: 38.12, baseline_at: NOW - 250 }, NOW))).toBe('38.1 °C, 4 min ago');
   });

@@ -27,7 +27,8 @@ export function kelvin(value: number): string {
 export function sinceWords(probe: Probe, now_s: number): string[] {
   const words: string[] = [];
   const { observed_at = null, baseline = null, baseline_at = null, temperature } = probe;
-  if (observed_at !== null) words.push(`${duration(Math.max(0, now_s - observed_at))} ago`);
+  const looked_at = probe.temperature_at ?? observed_at;
+  if (looked_at !== null) words.push(`${duration(Math.max(0, now_s - looked_at))} ago`);
   if (temperature !== null && baseline !== null && baseline_at !== null && baseline_at !== observed_at) {
     words.push(`${change(temperature - baseline)} since ${localTime(baseline_at, now_s)}`);
   }

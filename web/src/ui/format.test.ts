@@ -45,6 +45,9 @@ describe('Numbers', () => {
   it('say what a sensor could not', () => {
     expect(plain(reading({ temperature: 21.5 }))).toBe('21.5 °C');
     expect(reading({ temperature: null })).toBe('no temperature');
+    expect(plain(reading({ temperature: 34.61, temperature_sigma: 0.32 }))).toBe('34.6 ± 0.3 °C');
+    expect(plain(reading({ temperature: 34.61, temperature_sigma: 0.02 }))).toBe('34.6 ± 0.1 °C');
+    expect(reading({ temperature: null, temperature_sigma: 0.3 })).toBe('no temperature');
     expect(reading({ temperature: null, temperature_range: 'over' })).toBe('over range');
     expect(reading({ temperature: null, temperature_range: 'under' })).toBe('under range');
   });

@@ -32,10 +32,14 @@ export function celsius(value: number | null | undefined): string {
   return value == null ? 'none' : withUnit(fixed(value, 1), 'degC');
 }
 
-/** What was read at a place, in words. */
-export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range'>): string {
-  if (probe.temperature_range != null) return celsius(probe.temperature_range === 'over' ? Infinity : -Infinity);
-  return probe.temperature === null ? 'no temperature' : celsius(probe.temperature);
+/** What was read at a place, in words; of how sure it is no less than the last decimal that is shown. */
+export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range' | 'temperature_sigma'>): string {
+  const { temperature, temperature_range, temperature_sigma } = probe;
+  if (temperature_range != null) return celsius(temperature_range === 'over' ? Infinity : -Infinity);
+  if (temperature === null) return 'no temperature';
+  return temperature_sigma === undefined
+    ? celsius(temperature)
+    : `${fixed(temperature, 1)} ± ${celsius(Math.max(0.1, temperature_sigma))}`;
 }
 
 /** Three figures and an SI prefix: 990 k, 1.97 M. */
