@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/asio/ip/address.hpp>
 #include <charconv>
 #include <utility>
 
@@ -49,29 +48,8 @@ std::string tidy_code(std::string_view text) {
 
 }  // namespace
 
-std::string who_counts(const std::string& address) {
-  boost::system::error_code error;
-  const auto parsed = boost::asio::ip::make_address(address, error);
-  if (error || !parsed.is_v6() || parsed.to_v6().is_v4_mapped()) return address;
-  auto bytes = parsed.to_v6().to_bytes();
-  std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
-  return boost::asio::ip::address_v6(bytes).to_string();
-}
-
 bool AttemptLimit::take(const std::string& address, double now_s) {
-  const std::string key = who_counts(address);
-  const auto known = by_address_.find(key);
-  if (known != by_address_.end()) {
-    entries_.splice(entries_.begin(), entries_, known->second);
-  } else {
-    if (entries_.size() >= kMostAddresses) {
-      by_address_.erase(entries_.back().address);
-      entries_.pop_back();
-    }
-    entries_.push_front({key});
-    by_address_[key] = entries_.begin();
-  }
-  return entries_.front().bucket.take(now_s) && all_.take(now_s);
+  return by_address_.of(address).take(now_s) && all_.take(now_s);
 }
 
 AccessControl::AccessControl(TokenList list, std::string cookie_name, Clock now)

@@ -2,24 +2,20 @@
 
 #include <chrono>
 #include <functional>
-#include <list>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "server/access/address_rates.hpp"
 #include "server/access/role.hpp"
 #include "server/access/token_bucket.hpp"
 #include "server/access/token_file.hpp"
 
 namespace spectra::access {
 
-/// As whom an address counts: one machine has all IPv6 addresses that begin with the same 64 bits.
-std::string who_counts(const std::string& address);
-
-/// Lets each address try so often, and all of them together. Remembers a bounded number of addresses. Not thread-safe.
+/// Lets each address try so often, and all of them together. Not thread-safe.
 class AttemptLimit {
  public:
   bool take(const std::string& address, double now_s);
@@ -28,15 +24,9 @@ class AttemptLimit {
   static constexpr double kBurst = 8;
   static constexpr double kPerSecondOfAll = 20;
   static constexpr double kBurstOfAll = 100;
-  static constexpr std::size_t kMostAddresses = 4096;
 
  private:
-  struct Entry {
-    std::string address;
-    TokenBucket bucket{kPerSecond, kBurst};
-  };
-  std::list<Entry> entries_;  ///< The last that tried in front.
-  std::map<std::string, std::list<Entry>::iterator> by_address_;
+  AddressRates by_address_{kPerSecond, kBurst};
   TokenBucket all_{kPerSecondOfAll, kBurstOfAll};
 };
 

@@ -18,6 +18,13 @@ class TokenBucket {
     return true;
   }
 
+  /// Takes a token that may not be there yet; returns the seconds after which it is. Who reserves later waits longer.
+  double reserve_s(double now_s) {
+    refill(now_s);
+    tokens_ -= 1;
+    return std::max(0.0, -tokens_ / rate_per_s_);
+  }
+
   /// Seconds until take() succeeds; 0 = now.
   double wait_s(double now_s, double count = 1) {
     refill(now_s);

@@ -175,8 +175,8 @@ void BlockApi::give(const std::string& id, const std::vector<std::pair<std::stri
   if (!at && !map_.has(id)) return reply(net::refused(unknown));
   const exports::ExportShelf::Slot slot = exports_.take();
   if (!slot) {
-    return reply(net::refused({503, "busy", "", "too many files are being made",
-                               std::to_string(exports::ExportShelf::kMost) + " at a time"}));
+    return reply(net::refused(
+        {503, "busy", "", "too many files are being made", std::to_string(exports_.most()) + " at a time"}));
   }
   if (at) {
     return map_.read_at(*at, id,

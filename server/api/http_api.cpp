@@ -109,8 +109,8 @@ base::Result<exports::SceneFile> fused_export(const map::SceneSnapshot& scene, c
 
 }  // namespace
 
-HttpApi::HttpApi(session::ServedScene& served, sources::MapKeeper& map)
-    : served_(served), blocks_(served, map, exports_) {}
+HttpApi::HttpApi(session::ServedScene& served, sources::MapKeeper& map, const net::NetLimits& limits)
+    : served_(served), exports_(limits.exports_at_once, limits.export_bytes), blocks_(served, map, exports_) {}
 
 void HttpApi::handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply) {
   const std::string& path = request.target.path;
@@ -152,7 +152,7 @@ void HttpApi::handle_export(net::RequestTarget target, const std::function<void(
   if (const auto file = exports_.find(key)) return reply(reply_of(file, asked, *format));
   const exports::ExportShelf::Slot slot = exports_.take();
   if (!slot) {
-    auto busy = json_error(503, "", "two exports are being made already, or too much is being sent");
+    auto busy = json_error(503, "", "other exports are being made already, or too much is being sent");
     busy.headers.emplace_back("Retry-After", "5");
     return reply(std::move(busy));
   }

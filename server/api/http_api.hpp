@@ -7,15 +7,16 @@
 #include "server/api/block_api.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
+#include "server/net/net_options.hpp"
 #include "server/session/served_scene.hpp"
 
 namespace spectra::api {
 
 /// The paths of docs/protocol.md, "HTTP", beside the web client: health, metrics, methods and palettes, the scene and its exports. What takes
-/// time runs on the worker pool; at most two exports are in memory at a time, further ones are told to come back.
+/// time runs on the worker pool; so many exports are made at a time as the limits say, further ones are told to come back.
 class HttpApi {
  public:
-  HttpApi(session::ServedScene& served, sources::MapKeeper& map);
+  HttpApi(session::ServedScene& served, sources::MapKeeper& map, const net::NetLimits& limits = {});
 
   void handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply);
 

@@ -35,15 +35,13 @@ namespace {
 
 /// From the last connection to the end of the program.
 constexpr std::chrono::milliseconds kLongestEnd{250};
-constexpr std::size_t kFrameCacheBytes = std::size_t{256} * 1024 * 1024;
 
 /// Every viewer needs a descriptor, and the usual limit of 1024 is only a default.
-void raise_descriptor_limit() {
+void set_descriptor_limit(std::size_t wanted) {
   rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < limit.rlim_max) {
-    limit.rlim_cur = limit.rlim_max;
-    setrlimit(RLIMIT_NOFILE, &limit);
-  }
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = std::min<rlim_t>(wanted, limit.rlim_max);
+  setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 /// Reads the file again; what is wrong with it is said, and nothing changes.
@@ -73,6 +71,14 @@ void print_invitation(const net::HttpServer& server, access::AccessControl& acce
   const std::string link = server.urls().back() + "/login#" + *code;
   std::printf("for one %s, within %d minutes: %s\n%s", std::string(to_string(role)).c_str(),
               static_cast<int>(access::AccessControl::kCodeLifetime.count()), link.c_str(), qr_text(link).c_str());
+}
+
+/// Whether a scene is beyond the limit, in words.
+std::optional<std::string> size_problem(const mesh::MultispectralMesh& mesh, std::uint64_t most_bytes) {
+  const std::uint64_t bytes = sources::MapKeeper::bytes_of(mesh.vertex_count(), mesh.triangle_count());
+  if (bytes <= most_bytes) return std::nullopt;
+  return "the scene would take about " + std::to_string(bytes) + " bytes of memory, and " + std::to_string(most_bytes) +
+         " are allowed; serve a smaller one, or with another --limit scene-bytes";
 }
 
 /// Reads and tiles the scene in a thread of its own, while the server already answers.
@@ -124,6 +130,7 @@ class SceneLoader {
     } else {
       loaded.mesh = demo::demo_scene({}, line.sink());
     }
+    if (const auto problem = size_problem(loaded.mesh, options.limits.scene_bytes)) throw std::runtime_error(*problem);
     print_notes(loaded.notes);
     served.progress.set("Cutting " + name + " into tiles (" + std::to_string(loaded.mesh.vertex_count()) +
                         " vertices)");
@@ -148,7 +155,7 @@ int run_serve(const ServeOptions& options) {
   auto looked = serve_setup(options);
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
   auto& setup = std::get<ServeSetup>(looked);
-  raise_descriptor_limit();
+  set_descriptor_limit(options.limits.descriptors);
   std::optional<sources::FrameStream> frames;
   if (options.frames) {
     auto folder = mapping::FrameFolder::open(*options.frames);
@@ -180,7 +187,7 @@ int run_serve(const ServeOptions& options) {
   net.stop_on_signals = true;
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto served = std::make_unique<session::ServedScene>(
-      options.thread_count > 0 ? options.thread_count : processors, kFrameCacheBytes);
+      options.thread_count > 0 ? options.thread_count : processors, options.limits.cache_bytes);
   std::unique_ptr<store::BlockStore> store;
   if (options.store) {
     store::StoreOptions keeping;
@@ -190,9 +197,9 @@ int run_serve(const ServeOptions& options) {
     if (!opened) return fail(kJobFailed, opened.error().message);
     store = std::move(opened).value();
   }
-  sources::MapKeeper map(served->scenes, served->pool, std::move(store), options.at);
+  sources::MapKeeper map(served->scenes, served->pool, std::move(store), options.at, options.limits.scene_bytes);
   served->mark_baseline = [&map](sources::BaselineDone done) { map.mark_baseline(std::move(done)); };
-  api::HttpApi api(*served, map);
+  api::HttpApi api(*served, map, options.limits);
   std::unique_ptr<net::HttpServer> server;
   try {
     server = std::make_unique<net::HttpServer>(

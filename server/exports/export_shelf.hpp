@@ -22,13 +22,14 @@ class ExportShelf {
   };
   using SharedFile = std::shared_ptr<const File>;
 
-  static constexpr int kMost = 2;
-  /// Of files that are being sent; beyond it no further one is made.
-  static constexpr std::size_t kMostBytes = std::size_t{512} << 20U;
+  /// How many may be made at a time, and how many bytes being sent beyond which no further one is made.
+  ExportShelf(std::size_t most, std::size_t most_bytes) : most_(most), most_bytes_(most_bytes) {}
+
+  std::size_t most() const { return most_; }
 
   /// Null when all are taken, or too much is being sent.
   Slot take() {
-    if (counts_->making.fetch_add(1) < kMost && counts_->bytes < kMostBytes) {
+    if (counts_->making.fetch_add(1) < most_ && counts_->bytes < most_bytes_) {
       return {this, [counts = counts_](const void*) { counts->making -= 1; }};
     }
     counts_->making -= 1;
@@ -57,9 +58,11 @@ class ExportShelf {
 
  private:
   struct Counts {
-    std::atomic<int> making{0};
+    std::atomic<std::size_t> making{0};
     std::atomic<std::size_t> bytes{0};
   };
+  const std::size_t most_;
+  const std::size_t most_bytes_;
   const std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();
   std::mutex mutex_;
   std::map<std::string, std::weak_ptr<const File>> files_;

@@ -182,7 +182,8 @@ HttpConnection::HttpConnection(ConnectionStream stream, ConnectionPlaces::Place 
       stream_(std::move(stream)),
       executor_(stream_.get_executor()),
       context_(context),
-      buffer_(64 * 1024) {}
+      buffer_(64 * 1024),
+      turn_timer_(executor_) {}
 
 asio::awaitable<void> HttpConnection::run() {
   const auto self = shared_from_this();
@@ -233,6 +234,7 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
   is_waiting_for_request_ = true;
   auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
   is_waiting_for_request_ = false;
+  co_await wait_for_turn();
   if (is_stopping_) co_return false;
   const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
   const bool is_change = is_block_change(parser.get());
@@ -250,14 +252,17 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
   if (!error) refusal = refusal_of(parser.get());
   std::optional<BlockRoom> room;
   if (!error && is_change && !refusal) {
-    room.emplace(context_, static_cast<std::size_t>(
-                               parser.content_length().value_or(parser.chunked() ? limits.block_size_bytes : 0)));
+    const auto most_bytes =
+        static_cast<std::size_t>(parser.content_length().value_or(parser.chunked() ? limits.block_size_bytes : 0));
+    room.emplace(context_, most_bytes);
     if (!room->is_there()) {
       context_.metrics.requests_refused += 1;
       const auto busy = refused({503, "busy", "", "too many bytes of blocks are being received",
                                  std::to_string(limits.block_bytes_at_once) + " bytes at once"});
       co_return co_await write(busy, 11, false, false);
     }
+    // Copying what has come into a larger place would keep everybody waiting. Memory is taken as it is filled.
+    parser.get().body().reserve(most_bytes);
     std::tie(error, size) = co_await read_body(parser);
   }
   if (!error && is_session && !refusal) std::tie(error, size) = co_await read_body(parser);
@@ -368,6 +373,17 @@ asio::awaitable<void> HttpConnection::refuse_upgrade(const Request& request, con
   co_await write(reply, request.version(), request.method() == http::verb::head, false);
 }
 
+asio::awaitable<void> HttpConnection::wait_for_turn() {
+  const double delay_s = context_.request_delay_s(peer_address_, steady_seconds());
+  if (delay_s <= 0 || is_stopping_) co_return;
+  context_.metrics.requests_delayed += 1;
+  stream_.next_layer().expires_never();
+  turn_timer_.expires_after(
+      std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(delay_s)));
+  co_await turn_timer_.async_wait(kAwait);
+  stream_.next_layer().expires_after(context_.options.limits.header_timeout);
+}
+
 asio::awaitable<error_code> HttpConnection::ask_for_body(const http::request_parser<http::string_body>& parser) {
   if (parser.is_done() || !beast::iequals(parser.get()[http::field::expect], "100-continue")) co_return error_code{};
   static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
@@ -379,6 +395,8 @@ asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_body(
     http::request_parser<http::string_body>& parser) {
   stream_.next_layer().expires_after(context_.options.limits.write_timeout);
   if (const auto error = co_await ask_for_body(parser)) co_return std::tuple(error, std::size_t{0});
+  // Else it is read in pieces of the size that a header needed, each of which costs as much as a large one.
+  if (!parser.is_done()) buffer_.reserve(buffer_.max_size());
   while (!parser.is_done()) {
     stream_.next_layer().expires_after(context_.options.limits.body_timeout);
     const auto [error, size] = co_await http::async_read_some(stream_, buffer_, parser, kAwait);
@@ -534,6 +552,7 @@ void HttpConnection::begin_stop() {
   asio::post(executor_, [self = shared_from_this()] {
     self->is_stopping_ = true;
     if (self->is_waiting_for_request_) self->stream_.next_layer().cancel();
+    self->turn_timer_.cancel();
   });
 }
 

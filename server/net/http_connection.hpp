@@ -42,10 +42,12 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<void> refuse_upgrade(const Request& request, const HttpReply& reply);
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
-  /// The rest of a request whose header was read and is good.
+  /// Waits as long as others of the address, and earlier requests, go before.
+  boost::asio::awaitable<void> wait_for_turn();
   /// Tells who waits for it that the body may come.
   boost::asio::awaitable<boost::beast::error_code> ask_for_body(
       const boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
+  /// The rest of a request whose header was read and is good.
   boost::asio::awaitable<std::tuple<boost::beast::error_code, std::size_t>> read_body(
       boost::beast::http::request_parser<boost::beast::http::string_body>& parser);
   HttpReply static_reply(const HttpRequest& request) const;
@@ -58,6 +60,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   const ConnectionStream::executor_type executor_;  ///< Of the stream, which a session may have taken over.
   ServerContext& context_;
   boost::beast::flat_buffer buffer_;
+  boost::asio::steady_timer turn_timer_;
   std::string local_address_;
   std::string peer_address_;
   access::AccessControl::Outcome who_;  ///< Asks now.

@@ -31,7 +31,15 @@ struct NetLimits {
   double message_bytes_per_s = 512 * 1024;        ///< Likewise.
   bool gives_raw_layers = true;                   ///< Temperatures and visible colours of tiles, beside fused colours.
   double requests_per_s = 300;                    ///< Beyond it requests are refused with Busy.
-  double message_burst_s = 2;                     ///< How many seconds' worth of either may come at once.
+  double http_requests_per_s = 1'000;             ///< Of one address; beyond it their reading pauses.
+  std::size_t json_depth = 16;                    ///< Objects and arrays in each other, in a message of a viewer.
+  std::size_t json_elements = 10'000;             ///< Values of every kind in it.
+  std::size_t exports_at_once = 2;                ///< Whole files that are being made.
+  std::size_t export_bytes = std::size_t{512} * 1024 * 1024;  ///< Of files that are being sent.
+  std::size_t cache_bytes = std::size_t{256} * 1024 * 1024;   ///< Encoded frames that are kept for further viewers.
+  std::uint64_t scene_bytes = std::uint64_t{16'000'000'000};  ///< As map_keeper.hpp counts them.
+  std::size_t descriptors = 1'000'000;                        ///< As many of them as the system gives.
+  double message_burst_s = 2;                                 ///< How many seconds' worth of either may come at once.
   /// A request must be complete within this; the peer sees the end well within 10 s.
   std::chrono::milliseconds header_timeout{9'500};
   std::chrono::milliseconds body_timeout{10'000};  ///< The body of a block may stand still for this long.

@@ -51,6 +51,13 @@ class ServerContext {
   NetMetrics& metrics;
   HostList hosts;
   ConnectionPlaces places;
+
+  /// Seconds for which a request from there is to wait for its turn.
+  double request_delay_s(const std::string& address, double now_s) {
+    const std::lock_guard lock(request_rates_mutex_);
+    return request_rates_.of(address).reserve_s(now_s);
+  }
+
   std::atomic<std::size_t> block_bytes{0};  ///< Of blocks that are being received or answered.
 
   /// Registers a connection for the staged stop; false when the server is stopping already.
@@ -92,6 +99,9 @@ class ServerContext {
     return alive;
   }
 
+  std::mutex request_rates_mutex_;
+  access::AddressRates request_rates_{options.limits.http_requests_per_s,
+                                      options.limits.http_requests_per_s* options.limits.message_burst_s};
   std::mutex mutex_;
   bool stopping_ = false;
   std::map<const Stoppable*, std::weak_ptr<Stoppable>> connections_;

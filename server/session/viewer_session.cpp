@@ -86,8 +86,7 @@ void ViewerSession::opened() {
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
                         "cache_bytes", "marks", "age",      "baseline"};
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
-  hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(protocol::JsonLimits{}.max_depth),
-                  limits_.requests_per_s};
+  hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(limits_.json_depth), limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
   hello.fusion = to_message(*plan_, temperature_of(scene_).summary);
   hello.quality = to_message(quality());
@@ -107,8 +106,9 @@ void ViewerSession::closed() {
 }
 
 void ViewerSession::text_received(std::string_view text) {
-  protocol::JsonLimits json_limits;
-  json_limits.max_size_bytes = limits_.message_size_bytes;
+  const protocol::JsonLimits json_limits{.max_size_bytes = limits_.message_size_bytes,
+                                         .max_depth = static_cast<int>(limits_.json_depth),
+                                         .max_elements = limits_.json_elements};
   const auto message = protocol::incoming_message(text, json_limits);
   if (const auto* bad = std::get_if<protocol::RefusedMessage>(&message)) {
     peer_.send(protocol::error_text(bad->id, bad->error));

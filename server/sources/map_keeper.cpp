@@ -171,11 +171,12 @@ std::optional<map::MapConstants> constants_of(const std::string& text) {
 }  // namespace
 
 MapKeeper::MapKeeper(map::SceneStore& scenes, jobs::WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
-                     const std::optional<store::StoreTime>& at)
+                     const std::optional<store::StoreTime>& at, std::uint64_t most_bytes)
     : scenes_(scenes),
       pool_(pool),
       store_(std::move(store)),
       at_(at),
+      most_bytes_(most_bytes),
       writer_([this] { run(); }),
       coarse_maker_([this] { make_coarse(); }) {}
 
@@ -464,6 +465,7 @@ MapKeeper::Shapes MapKeeper::shapes_of(const std::vector<Change>& batch) {
     if (const auto* put = std::get_if<Put>(&change)) {
       const auto& mesh = put->scene.mesh;
       shapes.put.push_back({put->block.id, mesh.vertex_count(), !mesh.is_point_cloud()});
+      shapes.put_bytes += bytes_of(mesh.vertex_count(), mesh.triangle_count());
     } else {
       shapes.removed.push_back(std::get<Remove>(change).id);
     }
@@ -471,11 +473,30 @@ MapKeeper::Shapes MapKeeper::shapes_of(const std::vector<Change>& batch) {
   return shapes;
 }
 
+std::optional<net::BlockRefusal> MapKeeper::why_not(const Shapes& shapes) const {
+  if (const auto refused = scenes_.refusal_of(shapes.put, shapes.removed)) {
+    return net::BlockRefusal{409, "conflict", "body", refused->message, ""};
+  }
+  if (shapes.put.empty()) return std::nullopt;
+  std::set<std::string_view> gone(shapes.removed.begin(), shapes.removed.end());
+  for (const map::BlockShape& shape : shapes.put) gone.insert(shape.id);
+  std::uint64_t bytes = shapes.put_bytes;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [id, entry] : entries_) {
+    if (!gone.contains(id)) bytes += bytes_of(entry.vertex_count, entry.triangle_count);
+  }
+  if (bytes <= most_bytes_) return std::nullopt;
+  return net::BlockRefusal{507, "map_full", "body",
+                           "the map would take about " + std::to_string(bytes) +
+                               " bytes of memory; delete blocks, or serve with another --limit scene-bytes",
+                           std::to_string(most_bytes_) + " bytes"};
+}
+
 void MapKeeper::take(std::vector<Change> batch) {
   // What the map refuses must not be stored.
   const Shapes shapes = shapes_of(batch);
-  if (const auto refused = scenes_.refusal_of(shapes.put, shapes.removed)) {
-    if (batch.size() == 1) return refuse(batch.front(), {409, "conflict", "body", refused->message, ""});
+  if (const auto refused = why_not(shapes)) {
+    if (batch.size() == 1) return refuse(batch.front(), *refused);
     for (Change& change : batch) {
       std::vector<Change> alone;
       alone.push_back(std::move(change));

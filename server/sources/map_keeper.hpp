@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <list>
 #include <map>
 #include <memory>
@@ -61,9 +62,11 @@ class MapKeeper {
   };
 
   /// `store` may be null: then the map is gone with the program. With a time the map is that of the store as it was then, and every
-  /// change is refused (409, as_it_was).
+  /// change is refused (409, as_it_was). A block that would take the map beyond `most_bytes`, as bytes_of() counts them, is refused
+  /// (507, map_full).
   MapKeeper(map::SceneStore& scenes, jobs::WorkerPool& pool, std::unique_ptr<store::BlockStore> store,
-            const std::optional<store::StoreTime>& at = std::nullopt);
+            const std::optional<store::StoreTime>& at = std::nullopt,
+            std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max());
   ~MapKeeper();  ///< As end().
   MapKeeper(const MapKeeper&) = delete;
   MapKeeper& operator=(const MapKeeper&) = delete;
@@ -103,6 +106,11 @@ class MapKeeper {
 
   /// Bytes of blocks that may wait at a time.
   static constexpr std::size_t kWaitingBytes = 256u << 20;
+  /// About what a served scene takes of memory, all levels of detail included.
+  static constexpr std::uint64_t bytes_of(std::uint64_t vertex_count, std::uint64_t triangle_count) {
+    return 100 * vertex_count + 70 * triangle_count;
+  }
+
   /// Changes that may wait at a time.
   static constexpr std::size_t kWaitingChanges = 4096;
   /// Bytes of blocks that become one version, beside the first.
@@ -136,6 +144,7 @@ class MapKeeper {
   struct Shapes {
     std::vector<map::BlockShape> put;
     std::vector<std::string> removed;
+    std::uint64_t put_bytes = 0;  ///< As bytes_of() counts.
   };
 
   void enqueue(Change change, std::size_t bytes, WhenFull when_full);
@@ -150,6 +159,8 @@ class MapKeeper {
   void make_coarse();
   std::vector<Change> next_batch();
   void take(std::vector<Change> batch);
+  /// Why the map may not have a batch; nothing when it may.
+  std::optional<net::BlockRefusal> why_not(const Shapes& shapes) const;
   std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
   /// Publishes the map with a change; its coarse tiles follow.
@@ -164,6 +175,7 @@ class MapKeeper {
   jobs::WorkerPool& pool_;
   const std::unique_ptr<store::BlockStore> store_;
   const std::optional<store::StoreTime> at_;
+  const std::uint64_t most_bytes_;
 
   mutable std::mutex mutex_;
   std::condition_variable has_work_;

@@ -317,6 +317,28 @@ TEST_F(HttpServerTest, GivesOneAddressSoManyConnectionsAndSaysSo) {
   }));
 }
 
+TEST_F(HttpServerTest, ReadsMoreSlowlyFromWhoAsksTooOften) {
+  net::NetOptions options = quick_options();
+  options.limits.http_requests_per_s = 100;
+  options.limits.message_burst_s = 0.1;
+  const TestServer server(std::move(options), answer_path, no_viewer);
+  const auto ask_on_two_connections = [&server](int times) {
+    RawClient one(server.port()), other(server.port());
+    const auto begin = steady_clock::now();
+    for (int i = 0; i < times; ++i) {
+      EXPECT_TRUE(one.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+      EXPECT_TRUE(other.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+      EXPECT_EQ(status_of(one.receive_some().value_or("")), 200) << "refused is nothing";
+      EXPECT_EQ(status_of(other.receive_some().value_or("")), 200);
+    }
+    return steady_clock::now() - begin;
+  };
+  ask_on_two_connections(5);
+  EXPECT_EQ(server.metrics().requests_delayed, 0U);
+  EXPECT_GE(ask_on_two_connections(15), milliseconds(150));
+  EXPECT_GE(server.metrics().requests_delayed, 15U);
+}
+
 TEST_F(HttpServerTest, AnswersGarbageWith400) {
   EXPECT_EQ(status_of(http_exchange(server_->port(), "\x16\x03\x01\x02\r\n\r\n")), 400);
   EXPECT_EQ(status_of(http_exchange(server_->port(), "GET / HTTP/9.9\r\nHost: localhost\r\n\r\n")), 400);

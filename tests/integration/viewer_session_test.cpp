@@ -488,6 +488,32 @@ TEST_F(ViewerSessionTest, RefusesBadMessagesAndLivesOn) {
   EXPECT_TRUE(viewer.call("fusion.get").contains("result"));
 }
 
+TEST_F(ViewerSessionTest, BoundsOfMessagesAreSettings) {
+  auto options = quick_options();
+  options.limits.json_depth = 8;
+  options.limits.json_elements = 100;
+  start(std::move(options));
+  Viewer viewer(server_->port());
+  const auto hello = viewer.wait_for("hello");
+  ASSERT_TRUE(hello);
+  EXPECT_EQ((*hello)["limits"]["max_depth"], 8);
+  const auto code_of = [&viewer](const std::string& value) -> json {
+    viewer.socket().send_text(R"({"jsonrpc":"2.0","id":1,"method":"no.such","params":{"a":)" + value + "}}");
+    const auto answer = viewer.receive();
+    return answer ? (*answer)["error"]["code"] : json{};
+  };
+  const auto nested = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+  const auto list = [](int count) {
+    std::string text = "[0";
+    for (int i = 1; i < count; ++i) text += ",0";
+    return text + "]";
+  };
+  EXPECT_EQ(code_of(nested(6)), -32601);
+  EXPECT_EQ(code_of(nested(7)), -32700);
+  EXPECT_EQ(code_of(list(90)), -32601);
+  EXPECT_EQ(code_of(list(100)), -32700);
+}
+
 TEST_F(ViewerSessionTest, LimitsTheRateOfRequests) {
   auto options = quick_options();
   options.limits.requests_per_s = 50;

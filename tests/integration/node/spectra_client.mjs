@@ -153,7 +153,7 @@ export class DracoReader {
 
 /** One connection: requests, notifications, tiles. Frames are decoded as they come and acknowledged. */
 export class SpectraClient {
-  static async connect(httpUrl, { decode = true, acknowledge = true, hello: form, ca } = {}) {
+  static async connect(httpUrl, { decode = true, acknowledge = true, hello: form, ca, token } = {}) {
     const client = new SpectraClient();
     client.draco = await DracoReader.create();
     client.decode = decode;
@@ -161,6 +161,7 @@ export class SpectraClient {
     client.socket = new WebSocket(`${httpUrl.replace(/^http/, "ws").replace(/\/$/, "")}/ws${form ? `?hello=${form}` : ""}`, "spectra.v1", {
       perMessageDeflate: false,
       ca,
+      headers: token ? { Authorization: `Bearer ${token}` } : {},
     });
     client.socket.binaryType = "nodebuffer";
     const hello = client.notification("hello", 30_000);

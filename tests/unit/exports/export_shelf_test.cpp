@@ -6,7 +6,7 @@ namespace spectra::exports {
 namespace {
 
 TEST(ExportShelf, BoundsWhatIsMadeAtATime) {
-  ExportShelf shelf;
+  ExportShelf shelf(2, 1000);
   auto one = shelf.take(), two = shelf.take();
   EXPECT_TRUE(one);
   EXPECT_TRUE(two);
@@ -16,7 +16,7 @@ TEST(ExportShelf, BoundsWhatIsMadeAtATime) {
 }
 
 TEST(ExportShelf, SharesAFileAsLongAsSomebodyIsSentIt) {
-  ExportShelf shelf;
+  ExportShelf shelf(2, 1000);
   auto kept = shelf.keep("1/scene.ply", {"bytes", "lost"});
   EXPECT_EQ(shelf.find("1/scene.ply"), kept);
   EXPECT_EQ(shelf.find("2/scene.ply"), nullptr);
@@ -28,8 +28,8 @@ TEST(ExportShelf, SharesAFileAsLongAsSomebodyIsSentIt) {
 }
 
 TEST(ExportShelf, MakesNoMoreWhileTooMuchIsSent) {
-  ExportShelf shelf;
-  auto large = shelf.keep("a", {std::string(ExportShelf::kMostBytes, 'x'), ""});
+  ExportShelf shelf(2, 1000);
+  auto large = shelf.keep("a", {std::string(1000, 'x'), ""});
   EXPECT_FALSE(shelf.take());
   large.reset();
   EXPECT_TRUE(shelf.take());

@@ -32,6 +32,16 @@ TEST(TokenBucket, GivesManyAtOnceAndMoreThanItHoldsWhenItIsFull) {
   EXPECT_FALSE(bucket.take(20, 1));
 }
 
+TEST(TokenBucket, WhoReservesWaitsForThoseBefore) {
+  access::TokenBucket bucket(10, 2);
+  EXPECT_EQ(bucket.reserve_s(50), 0);
+  EXPECT_EQ(bucket.reserve_s(50), 0);
+  EXPECT_NEAR(bucket.reserve_s(50), 0.1, 1e-9);
+  EXPECT_NEAR(bucket.reserve_s(50), 0.2, 1e-9);
+  EXPECT_NEAR(bucket.reserve_s(50.25), 0.05, 1e-9);
+  EXPECT_EQ(bucket.reserve_s(60), 0);
+}
+
 TEST(TokenBucket, NeverRefusesASliderAtItsPace) {
   access::TokenBucket bucket(300, 600);
   for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(bucket.take(i / 120.0));

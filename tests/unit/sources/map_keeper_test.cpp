@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <future>
+#include <limits>
 #include <thread>
 
 #include "server/sources/block_options.hpp"
@@ -47,7 +48,10 @@ std::string square(std::size_t side, std::size_t column = 0, double x0 = 0, doub
 
 class MapKeeperTest : public testing::Test {
  protected:
-  MapKeeperTest() { EXPECT_FALSE(map_.restore()); }
+  explicit MapKeeperTest(std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max())
+      : map_(scenes_, pool_, nullptr, std::nullopt, most_bytes) {
+    EXPECT_FALSE(map_.restore());
+  }
   ~MapKeeperTest() override {
     map_.end();
     pool_.stop();
@@ -85,7 +89,7 @@ class MapKeeperTest : public testing::Test {
 
   map::SceneStore scenes_;
   jobs::WorkerPool pool_{2};
-  MapKeeper map_{scenes_, pool_, nullptr};
+  MapKeeper map_;
 
  private:
   void tell(std::string answer) {
@@ -99,6 +103,29 @@ class MapKeeperTest : public testing::Test {
   std::vector<std::string> answers_;
   std::size_t asked_ = 0;
 };
+
+class FullMapTest : public MapKeeperTest {
+ protected:
+  FullMapTest() : MapKeeperTest(2 * MapKeeper::bytes_of(100, 162)) {}
+};
+
+TEST_F(FullMapTest, HasRoomAgainWhenABlockIsGoneOrSmaller) {
+  const auto answer = [this] { return answers().back(); };
+  put("a", square(10));
+  EXPECT_EQ(answer(), "a has 100");
+  put("b", square(10, 100));
+  EXPECT_EQ(answer(), "b has 100");
+  put("c", square(2, 200));
+  EXPECT_EQ(answer(), "c refused: map_full");
+  put("b", square(11, 100));
+  EXPECT_EQ(answer(), "b refused: map_full");
+  put("b", square(10, 100));
+  EXPECT_EQ(answer(), "b has 100") << "in its own place";
+  remove("a");
+  EXPECT_EQ(answer(), "a is gone");
+  put("c", square(2, 200));
+  EXPECT_EQ(answer(), "c has 4");
+}
 
 TEST_F(MapKeeperTest, ChangesOfABlockTakeEffectInTheirOrderHoweverLongTheyAreRead) {
   put("first", square(3, 1000));
