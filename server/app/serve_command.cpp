@@ -224,7 +224,7 @@ int run_serve(const ServeOptions& options) {
   if (frames) {
     feed = std::make_unique<sources::MapFeed>(std::move(*frames),
                                               options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01), map,
-                                              [&loader] { return loader.is_done(); });
+                                              served->robot, [&loader] { return loader.is_done(); });
   }
   server->run();
   if (!loader.is_done()) {

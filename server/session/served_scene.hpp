@@ -14,6 +14,7 @@
 #include "server/session/catalogue.hpp"
 #include "server/session/session_ids.hpp"
 #include "server/sources/baseline_marked.hpp"
+#include "server/sources/robot_track.hpp"
 #include "server/stream/viewer_stream.hpp"
 
 namespace spectra::session {
@@ -43,6 +44,7 @@ struct ServedScene {
 
   map::SceneStore scenes;
   LoadingProgress progress;
+  sources::RobotTrack robot;  ///< Of the robot that maps the scene, if one does.
   const SessionIds session_ids;
   const Catalogue catalogue;
   /// MapKeeper::mark_baseline() of the map; whoever makes the keeper sets it before there are sessions.

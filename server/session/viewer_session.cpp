@@ -14,6 +14,7 @@
 #include "fusion/colour/palette.hpp"
 #include "fusion/registry.hpp"
 #include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/robot_messages.hpp"
 #include "protocol/messages/scene_messages.hpp"
 #include "server/jobs/priority.hpp"
 #include "server/net/steady_seconds.hpp"
@@ -73,6 +74,8 @@ void ViewerSession::opened() {
     post([message](ViewerSession& self) { self.statuses_.set("scene_loading", protocol::StatusLevel::Info, message); });
   });
 
+  robot_subscription_ = served_.robot.subscribe([post] { post([](ViewerSession& self) { self.tell_robot(); }); });
+
   scene_ = served_.scenes.current();
   // The scene has the histogram of percentiles already, so this takes microseconds.
   const auto temperature = temperature_of(scene_);
@@ -84,7 +87,7 @@ void ViewerSession::opened() {
   hello.session_id = served_.session_ids.next();
   hello.role = access::may(peer_.role(), access::Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
-                        "cache_bytes", "marks", "age",      "baseline"};
+                        "cache_bytes", "marks", "age",      "baseline",         "robot"};
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(limits_.json_depth), limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -96,12 +99,14 @@ void ViewerSession::opened() {
   if (const auto message = served_.progress.message()) {
     statuses_.set("scene_loading", protocol::StatusLevel::Info, message);
   }
+  tell_robot();
 }
 
 void ViewerSession::closed() {
   if (stream_) stream_->close();
   scene_subscription_ = {};
   progress_subscription_.reset();
+  robot_subscription_.reset();
   served_.viewer_count -= 1;
 }
 
@@ -441,6 +446,18 @@ void ViewerSession::begin_stream() {
 
 void ViewerSession::tell_notes() {
   statuses_.set_notes(scene_ ? scene_->notes() : std::span<const files::Note>());
+}
+
+void ViewerSession::tell_robot() {
+  const auto news = served_.robot.news(robot_told_);
+  if (!news) return;
+  const auto vector = [](const base::Vec3d& v) { return std::array{v.x, v.y, v.z}; };
+  const sources::RobotPose& pose = news->pose;
+  protocol::RobotMoved message{pose.at, vector(pose.position), vector(pose.forward), vector(pose.up), {}, {}};
+  if (pose.is_lost) message.lost = true;
+  message.path.first = static_cast<std::uint32_t>(news->first_point);
+  for (const base::Vec3d& point : news->points) message.path.points.push_back(vector(point));
+  notify("robot.moved", protocol::to_json(message));
 }
 
 void ViewerSession::set_plan(fusion::FusionPlan plan) {

@@ -87,6 +87,8 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   void begin_stream();
   /// Says what was noticed while the scene was read, and takes back what was said of the one before.
   void tell_notes();
+  /// Says where the robot is now, and of its way what the viewer does not know.
+  void tell_robot();
   /// What the method of now cannot show in the scene of now, and what palette does not suit it.
   void tell_method_limits();
   void set_plan(fusion::FusionPlan plan);
@@ -103,6 +105,8 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
 
   map::SceneStore::Subscription scene_subscription_;
   std::shared_ptr<const LoadingProgress::Listener> progress_subscription_;
+  std::shared_ptr<const sources::RobotTrack::Listener> robot_subscription_;
+  sources::RobotTrack::Told robot_told_;
   std::shared_ptr<const map::SceneSnapshot> scene_;
   std::shared_ptr<const map::SceneSnapshot> coming_scene_;
   std::shared_ptr<stream::ViewerStream> stream_;

@@ -56,6 +56,12 @@ double unix_now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
+RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_s) {
+  const auto vector = [](const Eigen::Vector3d& v) { return base::Vec3d{v.x(), v.y(), v.z()}; };
+  return {at_unix_s, vector(world_from_camera.translation()), vector(world_from_camera.linear().col(2)),
+          vector(-world_from_camera.linear().col(1)), false};
+}
+
 std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& frames, const Eigen::Vector3d& eye) {
   std::vector<std::pair<std::string, std::string>> query{
       {"observed_at", fmt::format("{:.3f}", unix_now_s())},
@@ -71,6 +77,8 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
   const auto begin = Clock::now();
   auto last = begin;
   FeedMoment moment;
+  RobotPose robot;
+  bool is_robot_known = false;
   for (std::size_t i = 0; i < frames.frame_count; ++i) {
     const auto due = begin + std::chrono::duration<double>(frames.stamp_s(i) - frames.stamp_s(0));
     do {
@@ -79,17 +87,30 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
     } while (frames.is_paced && Clock::now() < due);
     mapper.fuse(frames.load(i, faults), *frames.trajectory, faults);
     const mapping::PoseAnswer pose = frames.trajectory->at(frames.stamp_s(i));
-    if (pose.state == mapping::PoseState::Known) moment.eye = pose.pose.translation();
-    run.progress(static_cast<double>(i + 1) / static_cast<double>(frames.frame_count));
-    if (Clock::now() - last < kPublishEvery && i + 1 < frames.frame_count) continue;
-    last = Clock::now();
+    const bool is_last = i + 1 == frames.frame_count;
     moment.begin_unix_s = mapping::unix_begin_s(mapper.begin_s(), mapper.newest_s(), unix_now_s());
+    const double at = moment.begin_unix_s + frames.stamp_s(i) - mapper.begin_s();
+    if (pose.state == mapping::PoseState::Known) {
+      moment.eye = pose.pose.translation();
+      robot = robot_pose(pose.pose, at);
+      is_robot_known = true;
+    }
+    robot.at = at;
+    robot.is_lost = pose.state != mapping::PoseState::Known;
+    if (is_robot_known) run.moved(robot, is_last);
+    run.progress(static_cast<double>(i + 1) / static_cast<double>(frames.frame_count));
+    if (Clock::now() - last < kPublishEvery && !is_last) continue;
+    last = Clock::now();
     if (!run.hand_over(mapper.changed_units(publisher, moment.eye, pool), moment)) return;
   }
 }
 
-MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, std::function<bool()> may_begin)
-    : frames_(std::move(frames)), voxel_m_(voxel_m), map_(map), thread_([this, may_begin = std::move(may_begin)] {
+MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack& robot, std::function<bool()> may_begin)
+    : frames_(std::move(frames)),
+      voxel_m_(voxel_m),
+      map_(map),
+      robot_(robot),
+      thread_([this, may_begin = std::move(may_begin)] {
         try {
           work(may_begin);
         } catch (const std::exception& error) {
@@ -118,6 +139,7 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
     return hand_over(std::move(units), moment);
   };
+  run.moved = [this](const RobotPose& pose, bool is_last) { robot_.moved(pose, is_last); };
   run_feed(frames_, run, mapper, pool, faults);
   for (const mapping::FrameFault& fault : faults.all()) {
     if (fault.count > 0) spdlog::warn("{} ({} times)", fault.what, fault.count);

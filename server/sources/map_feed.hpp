@@ -12,6 +12,7 @@
 #include "server/mapping/mapper.hpp"
 #include "server/mapping/unit_publisher.hpp"
 #include "server/sources/map_keeper.hpp"
+#include "server/sources/robot_track.hpp"
 
 namespace spectra::sources {
 
@@ -44,9 +45,14 @@ struct FeedRun {
   std::function<bool()> is_over = [] { return false; };
   std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment& moment)> hand_over;
   std::function<void(double share)> progress = [](double) {};
+  /// Where the robot is, with every frame; nothing new where no pose is known.
+  std::function<void(const RobotPose& pose, bool is_last)> moved = [](const RobotPose&, bool) {};
 };
 void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
               mapping::FaultLog& faults);
+
+/// The pose of a depth camera (x to the right and y down in its picture) as that of the robot.
+RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_s);
 
 /// Unix seconds.
 double unix_now_s();
@@ -57,8 +63,8 @@ std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& f
 /// Maps frames in a thread of its own and puts what has changed into a map. Says in the log what was wrong, and when it is done.
 class MapFeed {
  public:
-  /// Begins when `may_begin`. At most kUnderWay units are on their way into the map at a time.
-  MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, std::function<bool()> may_begin);
+  /// Begins when `may_begin`, and says in `robot` where the cameras are. At most kUnderWay units are on their way into the map at a time.
+  MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack& robot, std::function<bool()> may_begin);
   ~MapFeed();  ///< Ends it after the frame that is being fused.
   MapFeed(const MapFeed&) = delete;
   MapFeed& operator=(const MapFeed&) = delete;
@@ -72,6 +78,7 @@ class MapFeed {
   const FrameStream frames_;
   const double voxel_m_;
   MapKeeper& map_;
+  RobotTrack& robot_;
   /// Shared with answers that may come when this is gone.
   struct State {
     std::atomic<bool> is_over{false};

@@ -268,4 +268,62 @@ export function addLiveTests(browser) {
     await page.close();
     await server.stop();
   });
+
+  test('The robot that maps and its way stand in the scene; the camera goes along with it by key and by touch, until somebody moves it; a reading says how sure it is', async () => {
+    const server = await startServer(['--demo-drive']);
+    const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 800 });
+    const store = (path) => page.evaluate((key) => globalThis.spectra.store[key], path);
+    await page.waitForFunction(() => (globalThis.spectra?.store.robot?.path.length ?? 0) > 3, null, { timeout: 60_000 });
+    const follow = page.getByRole('button', { name: 'Follow robot' });
+    await follow.waitFor();
+    assert.equal(await follow.getAttribute('aria-pressed'), 'false');
+
+    await page.keyboard.press('g');
+    assert.equal(await follow.getAttribute('aria-pressed'), 'true');
+    const marker = page.locator('[data-robot=marker]');
+    await marker.waitFor();
+    const away = () =>
+      page.evaluate(() => {
+        const { camera, robot, scene } = globalThis.spectra.store;
+        return Math.hypot(...camera.eye.map((value, axis) => value - (robot.position[axis] - scene.origin[axis])));
+      });
+    // It goes on, and the camera with it.
+    const before = await store('camera');
+    await page.waitForFunction(
+      ([eye]) => Math.hypot(...globalThis.spectra.store.camera.eye.map((value, axis) => value - eye[axis])) > 0.1,
+      [before.eye],
+    );
+    assert.ok((await away()) < 4, `${await away()} m from the robot`);
+    const x = Number(await marker.getAttribute('data-x'));
+    assert.ok(x > 200 && x < 1100, `the robot is at ${x}`);
+    assert.ok((await page.locator('[data-robot=path]').last().getAttribute('d')).includes('L'));
+    await screenshot(page, 'robot-followed');
+
+    // Whoever moves the camera has it.
+    await page.mouse.move(600, 400);
+    await page.mouse.down();
+    await page.mouse.move(640, 410, { steps: 3 });
+    await page.mouse.up();
+    assert.equal(await follow.getAttribute('aria-pressed'), 'false');
+    await follow.click();
+    assert.equal(await store('followsRobot'), true);
+    await page.keyboard.press('f');
+    assert.equal(await store('followsRobot'), false);
+
+    await page.getByRole('checkbox', { name: 'Robot and its way' }).uncheck();
+    await marker.waitFor({ state: 'detached' });
+
+    await page.waitForFunction(() => globalThis.spectra.store.extremes?.hottest != null);
+    await page.evaluate(async () => {
+      const { viewport, store, pin } = globalThis.spectra;
+      const at = viewport.project(store.extremes.hottest.position);
+      await pin.call(globalThis.spectra, at);
+    });
+    await page.locator('[data-probe]').waitFor();
+    assert.match(await page.locator('[data-probe]').innerText(), /^\d+\.\d ± \d+\.\d\u202f°C, \d+\u202fs ago/);
+    await assertAccessible(page, 'a robot');
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
 }

@@ -20,6 +20,7 @@
 #include "protocol/messages/ingest_messages.hpp"
 #include "protocol/messages/quality_messages.hpp"
 #include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/robot_messages.hpp"
 #include "protocol/messages/scene_messages.hpp"
 #include "protocol/messages/stream_messages.hpp"
 #include "protocol/tile_frame.hpp"
@@ -79,6 +80,7 @@ const std::map<std::string, MethodPassages> kMethods{
     {"fusion.changed", {through<FusionReply>(), unchanged}},
     {"stream.complete", {through<StreamComplete>(), unchanged}},
     {"stream.stats", {through<StreamStats>(), unchanged}},
+    {"robot.moved", {through<RobotMoved>(), unchanged}},
     {"status", {through<Status>(), unchanged}},
     {"ingest.hello", {through<IngestHello>(), unchanged}},
     {"ingest.acknowledged", {through<IngestAcknowledged>(), unchanged}},

@@ -56,6 +56,27 @@ export type MissingDisplay = string;
 export type UpAxis = "x" | "y" | "z" | "-x" | "-y" | "-z";
 export type QualityMode = "auto" | "manual";
 /**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector33 = [number, number, number];
+/**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector34 = [number, number, number];
+/**
+ * x, y, z in metres.
+ *
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vector35 = [number, number, number];
+/**
  * Chosen by the client.
  */
 export type RpcId = number | string;
@@ -112,6 +133,8 @@ export interface ProtocolDefinitions {
   RangeChange: RangeChange;
   RangeMode: RangeMode;
   ResumeRequest: ResumeRequest;
+  RobotMoved: RobotMoved;
+  RobotPath: RobotPath;
   RpcError: RpcError;
   RpcErrorData: RpcErrorData;
   RpcFailure: RpcFailure;
@@ -814,6 +837,36 @@ export interface ResumeRequest {
    * Places in tiles of those of which it has both raw layers, in the form that it asks for now; absent: none.
    */
   raw?: number[];
+}
+/**
+ * Params of the notification robot.moved.
+ */
+export interface RobotMoved {
+  /**
+   * Unix seconds.
+   */
+  at: number;
+  position: Vector33;
+  forward: Vector34;
+  up: Vector35;
+  /**
+   * True: it does not know where it is, and this is where it was last.
+   */
+  lost?: boolean;
+  path: RobotPath;
+}
+/**
+ * A part of the way the robot has come.
+ */
+export interface RobotPath {
+  /**
+   * What the client has of the way from this point on is replaced.
+   */
+  first: number;
+  /**
+   * Metres, in the coordinates of the map.
+   */
+  points: Vector3[];
 }
 /**
  * A refusal; a refused request changes nothing.

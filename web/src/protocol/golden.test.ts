@@ -27,6 +27,7 @@ const readers: Record<string, (value: unknown, path: string) => unknown> = {
   'quality.set.': messages.qualityState,
   'stream.complete.': messages.streamComplete,
   'stream.stats.': messages.streamStats,
+  'robot.moved.': messages.robotMoved,
   'status.': messages.status,
   'scene.subscribe.': messages.subscribed,
   'scene.unsubscribe.': (value) => value,
@@ -50,6 +51,7 @@ const optionalFields = new Set([
   'observed_at',
   'temperature_sigma',
   'temperature_at',
+  'lost',
 ]);
 /** What a viewer sends, or only a sender of blocks is sent. */
 const notForViewers = ['camera.set', 'stream.ack', 'ingest.'];

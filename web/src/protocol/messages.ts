@@ -49,6 +49,7 @@ export type Extremes = wire.ExtremesReply;
 export type StreamComplete = wire.StreamComplete;
 export type StreamStats = wire.StreamStats;
 export type Status = wire.Status;
+export type RobotMoved = wire.RobotMoved;
 export type RpcErrorBody = wire.RpcError;
 export type RpcId = wire.RpcId;
 export type CameraPose = wire.CameraSet;
@@ -256,6 +257,15 @@ export const streamStats: Decoder<StreamStats> = object({
     pixel_error: nullable(number),
     temperature_celsius: nullable(number),
   }),
+});
+
+export const robotMoved: Decoder<RobotMoved> = object({
+  at: number,
+  position: triple(number),
+  forward: triple(number),
+  up: triple(number),
+  lost: optional(boolean),
+  path: object({ first: count, points: array(triple(number)) }),
 });
 
 export const status: Decoder<Status> = object({

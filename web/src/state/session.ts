@@ -5,6 +5,7 @@ import {
   type CameraPose,
   fusionState,
   type QualityChange,
+  robotMoved,
   sceneChanged,
   status,
   type StreamComplete,
@@ -29,6 +30,7 @@ import { Fusing, type FusingWish } from './fusing';
 import { Progress } from './progress';
 import { QualityWish } from './quality_wish';
 import { Readings } from './readings';
+import { robotAfter } from './robot';
 import { Settings } from './settings';
 import type { OutlineWish, Store } from './store.svelte';
 import { Subscription } from './subscription';
@@ -71,7 +73,7 @@ export class Session {
     const events: ViewportEvents = {
       onCamera: (pose) => this.#cameraMoved(pose),
       onResize: () => this.#look.pictureIs(null),
-      onUserMove: () => this.#look.userMoved(),
+      onUserMove: () => this.#userMoved(),
       beforeRender: () => this.#bringIn(),
       onDetail: (levels) => this.tiles.leaveOut(levels),
       onContext: (isLost) => {
@@ -135,7 +137,10 @@ export class Session {
     this.#connection = new Connection(
       url,
       {
-        onHello: (message) => this.#subscription.greeted(message),
+        onHello: (message) => {
+          store.robot = null;
+          this.#subscription.greeted(message);
+        },
         onNotification: (method, params) => this.#notified(method, params),
         onFrame: (message) => this.#received(message),
         onState: (state) => {
@@ -262,13 +267,14 @@ export class Session {
 
   /** `fit` keeps the direction of the camera, `reset` goes back to the first view. */
   fitView(mode: 'fit' | 'reset'): void {
+    this.followRobot(false);
     if (mode === 'fit') this.#look.fit();
     else this.#look.reset();
   }
 
   /** Looks from a place the caller has chosen, and stays there. */
   setView(view: View): void {
-    this.#look.userMoved();
+    this.#userMoved();
     this.viewport.setView(view, false);
   }
 
@@ -284,8 +290,15 @@ export class Session {
       this.#say(new Error(`The ${kind} place lies between surfaces that touch each other: it cannot be seen from anywhere.`));
       return;
     }
-    this.#look.userMoved();
+    this.#userMoved();
     this.viewport.setView({ eye: found, target }, true);
+  }
+
+  /** Goes along with the robot, until it is told not to or somebody moves the camera. */
+  followRobot(isOn: boolean): void {
+    if (isOn && this.store.robot === null) return;
+    if (isOn) this.#look.userMoved();
+    this.store.followsRobot = isOn;
   }
 
   retryNow(): void {
@@ -308,6 +321,11 @@ export class Session {
 
   unpin(): void {
     this.readings.unpin();
+  }
+
+  #userMoved(): void {
+    this.store.followsRobot = false;
+    this.#look.userMoved();
   }
 
   // The connection
@@ -340,6 +358,9 @@ export class Session {
         break;
       case 'stream.stats':
         store.stats = streamStats(params, method);
+        break;
+      case 'robot.moved':
+        store.robot = robotAfter(store.robot, robotMoved(params, method));
         break;
       case 'status': {
         const message = status(params, method);

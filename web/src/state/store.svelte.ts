@@ -25,6 +25,7 @@ import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
 import { MapAge } from './map_age';
 import { type Note, notesOf } from './notes';
+import type { Robot } from './robot';
 
 /** A reading of the scene at a place. */
 export interface Reading {
@@ -89,6 +90,11 @@ export class Store {
   /** The hottest and the coldest place of the scene, and of what is on the screen, as they stand on it. */
   marks = $state.raw<readonly Mark[]>([]);
   marksShown = $state(true);
+  /** The robot that maps the scene; null: none is known. */
+  robot = $state.raw<Robot | null>(null);
+  robotShown = $state(true);
+  /** The camera goes along with it. */
+  followsRobot = $state(false);
   outlineWish = $state<OutlineWish>('automatic');
   /** Of the newest colours of the whole scene; null where they say of nothing that it is highlighted. */
   highlightContrast = $state.raw<HighlightContrast | null>(null);

@@ -13,6 +13,7 @@ export const KEYS: readonly (readonly [string, string])[] = [
   ['3', 'Fused, with the last method used'],
   ['F', 'Fit the scene into the window'],
   ['R', 'Back to the first view'],
+  ['G', 'Go along with the robot, where one maps the scene'],
   ['L', 'Lock the temperature range, or let it follow the scene'],
   ['E', 'Range to the extremes of the scene, or to all but the outermost temperatures'],
   ['H', 'Hide the controls, or show them'],
@@ -53,6 +54,7 @@ export function handleKey(event: KeyboardEvent, session: Session, actions: KeyAc
   else if (event.key === 'Escape') session.unpin();
   else if (event.key.toLowerCase() === 'f') session.fitView('fit');
   else if (event.key.toLowerCase() === 'r') session.fitView('reset');
+  else if (event.key.toLowerCase() === 'g') session.followRobot(!store.followsRobot);
   else if (event.key.toLowerCase() === 'l') session.settings.toggleRangeLock();
   else if (event.key.toLowerCase() === 'e') session.settings.toggleRangeExtremes();
   else if (event.key.toLowerCase() === 'h') store.panelsHidden = !store.panelsHidden;

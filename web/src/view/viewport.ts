@@ -280,6 +280,15 @@ export class Viewport {
     this.invalidate();
   }
 
+  /** Takes the camera along with something that moves: a picture of the way, not of an end. */
+  carryTo({ eye, target }: View): void {
+    if (this.#steering === null) {
+      this.#stand(eye, target);
+      this.#hasMoved = true;
+    } else this.#steering.setView(eye, target, false);
+    this.invalidate();
+  }
+
   /** Turns the camera about its target so that it looks along an axis of the scene. */
   lookAlong(direction: Vec3): void {
     const { target } = this.pose;
