@@ -120,6 +120,14 @@ struct MapOptions {
   unsigned thread_count = 0;
 };
 
+struct CalibrateOptions {
+  std::filesystem::path frames;  ///< A folder of them.
+  std::filesystem::path output;  ///< Of vignetting: the picture.
+  double within_s = 0.5;         ///< Of thermal-delay: how far from what calibration.json says it is looked for.
+  double voxel_m = 0.03;
+  unsigned thread_count = 0;
+};
+
 struct DemoFramesOptions {
   std::filesystem::path folder;  ///< Made when it does not exist.
   double seconds = 60;
@@ -144,6 +152,8 @@ int run_demo_scene(const DemoSceneFileOptions& options);
 int run_tradeoff(const TradeoffCommandOptions& options);
 int run_push(const PushOptions& options);
 int run_map(const MapOptions& options);
+int run_calibrate_delay(const CalibrateOptions& options);
+int run_calibrate_vignetting(const CalibrateOptions& options);
 int run_demo_frames(const DemoFramesOptions& options);
 int run_store_check(const std::filesystem::path& store);
 int run_store_salvage(const StoreSalvageOptions& options);

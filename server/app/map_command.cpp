@@ -14,6 +14,7 @@
 
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
+#include "server/app/frame_faults.hpp"
 #include "server/app/interruption.hpp"
 #include "server/app/progress_line.hpp"
 #include "server/app/unit_sender.hpp"
@@ -61,12 +62,6 @@ double quantile(std::vector<double> values, double share) {
   const auto at = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
   return values[at];
-}
-
-void print_faults(const mapping::FaultLog& faults) {
-  for (const mapping::FrameFault& fault : faults.all()) {
-    if (fault.count > 0) warn(fault.what + (fault.count > 1 ? fmt::format(" ({} times)", fault.count) : ""));
-  }
 }
 
 void print_figures(const mapping::Mapper& mapper, const mapping::UnitMesh& mesh, const std::vector<double>& frame_ms,

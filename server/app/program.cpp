@@ -303,6 +303,30 @@ void add_demo_frames(CLI::App& app, DemoFramesOptions& options, Run& run) {
   command->final_callback([&options, &run] { run = [&options] { return run_demo_frames(options); }; });
 }
 
+void add_calibrate(CLI::App& app, CalibrateOptions& options, Run& run) {
+  auto* command = app.add_subcommand("calibrate", "Find out about the thermal camera from frames");
+  command->require_subcommand(1);
+  auto* delay = command->add_subcommand("thermal-delay", "Find the delay between its timestamps and its pictures");
+  delay->add_option("--within", options.within_s, "How far from what calibration.json says it is looked for, seconds")
+      ->check(CLI::Range(0.02, 5.0))
+      ->capture_default_str();
+  delay->final_callback([&options, &run] { run = [&options] { return run_calibrate_delay(options); }; });
+  auto* vignetting = command->add_subcommand("vignetting", "Find what it reads too much, by place in its picture");
+  vignetting->final_callback([&options, &run] { run = [&options] { return run_calibrate_vignetting(options); }; });
+  for (CLI::App* part : {delay, vignetting}) {
+    part->add_option("frames", options.frames, "A folder with frames.txt, poses.txt and calibration.json")->required();
+    if (part == vignetting) {
+      part->add_option("output", options.output, "The picture to write, PFM: kelvin to subtract from each pixel")
+          ->required();
+    }
+    part->add_option("--voxel", options.voxel_m, "The size of a voxel of the surface in metres")
+        ->check(CLI::Range(0.001, 1.0))
+        ->capture_default_str();
+    part->add_option("--threads", options.thread_count, "Threads that work; 0 = one a processor")
+        ->check(CLI::Range(0, 1024));
+  }
+}
+
 void add_token(CLI::App& app, TokenOptions& options, Run& run) {
   auto* command = app.add_subcommand("token", "Make a token that a server lets in, or take one back");
   command->add_option("--file", options.file, "The file of the server's tokens; made when it is not there")->required();
@@ -399,6 +423,7 @@ int parse_and_run(int argc, const char* const* argv) {
   TradeoffCommandOptions tradeoff;
   PushOptions push;
   MapOptions map;
+  CalibrateOptions calibrate;
   DemoFramesOptions demo_frames;
   TokenOptions token;
   CertificateOptions certificate;
@@ -419,6 +444,7 @@ int parse_and_run(int argc, const char* const* argv) {
   add_tradeoff(app, tradeoff, run);
   add_push(app, push, run);
   add_map(app, map, run);
+  add_calibrate(app, calibrate, run);
   add_demo_frames(app, demo_frames, run);
   add_store(app, checked_store, salvage, run);
   add_token(app, token, run);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace spectra::mapping {
 namespace {
@@ -124,6 +125,12 @@ void read_thermal(const Reader& reader, ThermalCalibration& thermal) {
     reader.number("reflected_celsius", reflected, -273, 2000);
     thermal.reflected_celsius = reflected;
   }
+  if (const json* file = reader.member("vignetting", false)) {
+    const std::filesystem::path path = file->is_string() ? file->get<std::string>() : std::string();
+    if (path.empty() || path.has_parent_path() || path.filename() == "..")
+      reader.wrong("vignetting", "must be the name of a PFM picture in the same folder");
+    thermal.vignetting_file = path.string();
+  }
   const json* unit = reader.member("unit", false);
   if (unit != nullptr && *unit != "centikelvin")
     reader.wrong("unit", "must be \"centikelvin\", which is all that is read");
@@ -188,7 +195,19 @@ Result<Calibration> read_calibration(const std::filesystem::path& file) {
   text.resize(kMostBytes);
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(in.gcount()));
-  return calibration_from_text(text, file.string());
+  BOOST_OUTCOME_TRY(auto calibration, calibration_from_text(text, file.string()));
+  if (calibration.thermal && !calibration.thermal->vignetting_file.empty()) {
+    ThermalCalibration& thermal = *calibration.thermal;
+    BOOST_OUTCOME_TRY(auto picture, read_pfm(file.parent_path() / thermal.vignetting_file));
+    if (picture.width != thermal.camera.width || picture.height != thermal.camera.height) {
+      return base::failure(
+          ErrorCode::BadValue,
+          file.string() + ": thermal.vignetting names a picture that is not of the size of the thermal camera",
+          "calibration");
+    }
+    thermal.vignetting = std::move(picture);
+  }
+  return calibration;
 }
 
 }  // namespace spectra::mapping

@@ -8,6 +8,7 @@
 
 #include "fusion/base/error.hpp"
 #include "server/mapping/camera.hpp"
+#include "server/mapping/picture_file.hpp"
 
 namespace spectra::mapping {
 
@@ -46,6 +47,8 @@ struct ThermalCalibration {
   double emissivity = 1;      ///< That the camera has not taken into account itself; 1: it has, or is not to be.
   /// What the surfaces reflect; absent: the median of each picture.
   std::optional<double> reflected_celsius;
+  std::string vignetting_file;  ///< Beside the calibration, PFM; empty: none.
+  PictureFloat vignetting;      ///< Kelvin to subtract from each pixel; empty: nothing. read_calibration() fills it.
 };
 
 /// Three cameras rigidly together.
@@ -58,8 +61,9 @@ struct Calibration {
   bool is_world_to_camera = false;    ///< The sense of the poses.
 };
 
-/// Reads calibration.json. Errors name the key: what is missing, no number, not finite, no rotation, or absurd. Safe on untrusted input.
+/// Reads calibration.json and the picture that it names. Errors name the key: what is missing, no number, not finite, no rotation, or absurd. Safe on untrusted input.
 base::Result<Calibration> read_calibration(const std::filesystem::path& file);
+/// The same of its text alone, without the picture.
 base::Result<Calibration> calibration_from_text(const std::string& text, const std::string& name);
 
 }  // namespace spectra::mapping

@@ -122,15 +122,21 @@ Picture<Pixel> FrameFolder::load_picture(const fs::path& name, const CameraModel
   return std::move(picture).value();
 }
 
-Frame FrameFolder::load(std::size_t row, FaultLog& faults) const {
+Frame FrameFolder::load(std::size_t row, FaultLog& faults, FrameParts parts) const {
   const FrameRow& from = rows_[row];
   Frame frame;
   frame.time_s = from.time_s;
-  frame.depth = load_picture<std::uint16_t>(from.depth, &calibration_.depth.camera, read_png16, "depth", faults);
-  frame.colour = load_picture<base::Rgb8>(from.colour, calibration_.colour ? &calibration_.colour->camera : nullptr,
-                                          read_colour, "color", faults);
-  frame.thermal = load_picture<std::uint16_t>(
-      from.thermal, calibration_.thermal ? &calibration_.thermal->camera : nullptr, read_png16, "thermal", faults);
+  if (parts.depth) {
+    frame.depth = load_picture<std::uint16_t>(from.depth, &calibration_.depth.camera, read_png16, "depth", faults);
+  }
+  if (parts.colour) {
+    frame.colour = load_picture<base::Rgb8>(from.colour, calibration_.colour ? &calibration_.colour->camera : nullptr,
+                                            read_colour, "color", faults);
+  }
+  if (parts.thermal) {
+    frame.thermal = load_picture<std::uint16_t>(
+        from.thermal, calibration_.thermal ? &calibration_.thermal->camera : nullptr, read_png16, "thermal", faults);
+  }
   return frame;
 }
 

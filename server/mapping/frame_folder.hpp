@@ -62,6 +62,11 @@ struct FrameRow {
   std::filesystem::path depth, colour, thermal;
 };
 
+/// Which pictures of a row are wanted.
+struct FrameParts {
+  bool depth = true, colour = true, thermal = true;
+};
+
 /// A folder of frames: frames.txt (timestamp, then depth, color and thermal picture, - for none), poses.txt, calibration.json.
 class FrameFolder {
  public:
@@ -77,7 +82,7 @@ class FrameFolder {
   const FaultLog& faults() const { return faults_; }
 
   /// The pictures of a row; those that cannot be used are missing and stand in `faults`. From any thread.
-  Frame load(std::size_t row, FaultLog& faults) const;
+  Frame load(std::size_t row, FaultLog& faults, FrameParts parts = {}) const;
 
  private:
   FrameFolder(std::filesystem::path folder, Calibration calibration, Trajectory trajectory)

@@ -77,6 +77,28 @@ std::string name_of(const char* folder, std::size_t index, const char* ending) {
   return name;
 }
 
+/// A line a moment: what has the same stamp shares one.
+std::string row_lines(const SimulatedDrive& drive) {
+  std::string lines;
+  for (std::size_t i = 0; i < drive.frame_count(); ++i) {
+    char stamp[40], next[40] = "";
+    std::snprintf(stamp, sizeof stamp, "%.6f ", drive.stamp_s(i));
+    if (i + 1 < drive.frame_count()) std::snprintf(next, sizeof next, "%.6f ", drive.stamp_s(i + 1));
+    const bool is_shared = std::string(stamp) == next;
+    std::string depth = "- - ", thermal = "-";
+    for (const std::size_t k : {i, is_shared ? i + 1 : i}) {
+      if (drive.is_thermal(k)) {
+        thermal = name_of("thermal", k, "png");
+      } else {
+        depth = name_of("depth", k, "png") + " " + name_of("color", k, "jpg") + " ";
+      }
+    }
+    lines += stamp + depth + thermal + "\n";
+    if (is_shared) ++i;
+  }
+  return lines;
+}
+
 Result<void> write_frame(const fs::path& folder, const SimulatedDrive& drive, std::size_t index) {
   const Frame frame = drive.frame(index);
   if (drive.is_thermal(index)) return write_png16(folder / name_of("thermal", index, "png"), frame.thermal);
@@ -99,7 +121,8 @@ Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, jo
   }
   BOOST_OUTCOME_TRYV(write_text(folder / "calibration.json", calibration_text(drive.calibration())));
   const std::string head = "# timestamp tx ty tz qx qy qz qw  (depth camera to world, Hamilton, w last)\n";
-  std::string told = head, truth = head, rows = "# timestamp depth color thermal\n";
+  std::string told = head, truth = head;
+  const std::string rows = "# timestamp depth color thermal\n";
   for (double time = drive.trajectory().begin_s(); time <= drive.trajectory().end_s(); time += 0.02) {
     if (drive.trajectory().at(time).state == PoseState::Known)
       told += pose_line(time, drive.trajectory().at(time).pose);
@@ -126,15 +149,7 @@ Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, jo
     base::report(progress, base::kWritingPhase, static_cast<double>(++done) / static_cast<double>(drive.frame_count()));
   });
   if (problem) return BOOST_OUTCOME_V2_NAMESPACE::failure(*problem);
-  for (std::size_t i = 0; i < drive.frame_count(); ++i) {
-    char stamp[40];
-    std::snprintf(stamp, sizeof stamp, "%.6f ", drive.stamp_s(i));
-    rows += stamp +
-            (drive.is_thermal(i) ? "- - " + name_of("thermal", i, "png")
-                                 : name_of("depth", i, "png") + " " + name_of("color", i, "jpg") + " -") +
-            "\n";
-  }
-  return write_text(folder / "frames.txt", rows);
+  return write_text(folder / "frames.txt", rows + row_lines(drive));
 }
 
 }  // namespace spectra::mapping

@@ -36,7 +36,9 @@ Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, j
       pool_(pool),
       rays_(calibration.depth.camera),
       map_(settings.voxel_m) {
-  if (calibration.thermal && settings.use_thermal) heat_.emplace(*calibration.thermal, settings.heat);
+  if (!calibration.thermal || !settings.use_thermal) return;
+  heat_.emplace(*calibration.thermal, settings.heat);
+  heat_->set_vignetting(calibration.thermal->vignetting);
 }
 
 base::Result<void> Mapper::set_vignetting(PictureFloat picture) {

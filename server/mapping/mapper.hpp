@@ -37,7 +37,7 @@ class Mapper {
  public:
   Mapper(const Calibration& calibration, const MapperSettings& settings, jobs::WorkerPool& pool);
 
-  /// Kelvin to subtract from each thermal pixel. Inconsistent when it is not of the camera's size.
+  /// Kelvin to subtract from each thermal pixel, in place of the calibration's. Inconsistent when it is not of the camera's size.
   base::Result<void> set_vignetting(PictureFloat picture);
 
   /// Fuses what of a frame has a pose; frames in order of their time. What cannot be fused is left out and stands in `faults`.

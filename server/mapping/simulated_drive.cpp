@@ -186,8 +186,9 @@ void SimulatedDrive::plan_rows() {
     }
     rows.push_back({time, true, offset, time - shutter, 0});
   }
-  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
-    return std::pair(a.time_s, a.is_thermal) < std::pair(b.time_s, b.is_thermal);
+  const auto stamp = [this](const Row& row) { return row.time_s + (row.is_thermal ? options_.clock_offset_s : 0); };
+  std::sort(rows.begin(), rows.end(), [&stamp](const Row& a, const Row& b) {
+    return std::pair(stamp(a), a.is_thermal) < std::pair(stamp(b), b.is_thermal);
   });
   std::size_t open = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {

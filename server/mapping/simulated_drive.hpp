@@ -39,7 +39,7 @@ class SimulatedDrive {
   const mesh::MultispectralMesh& truth() const { return truth_; }
 
   std::size_t frame_count() const { return rows_.size(); }
-  /// The stamp of a frame.
+  /// The stamp of a frame; frames are in its order.
   double stamp_s(std::size_t index) const;
   bool is_thermal(std::size_t index) const { return rows_[index].is_thermal; }
   Frame frame(std::size_t index) const;

@@ -156,6 +156,20 @@ class Frames(unittest.TestCase):
         self.assertEqual(sum(block["triangle_count"] for block in blocks), mesh["triangle_count"])
         self.assertEqual(subprocess.run([SPECTRA, "map", self.folder], capture_output=True).returncode, 2)
 
+    def test_calibration_is_refused_where_it_cannot_be_told(self):
+        done = subprocess.run([SPECTRA, "calibrate", "thermal-delay", self.folder], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("the delay of the thermal camera cannot be told: only 0 of 10 thermal pictures", done.stderr)
+        picture = self.path("v.pfm")
+        done = subprocess.run([SPECTRA, "calibrate", "vignetting", self.folder, picture], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("the vignetting of the thermal camera cannot be told", done.stderr)
+        self.assertFalse(os.path.exists(picture))
+        done = subprocess.run([SPECTRA, "calibrate", "vignetting", self.folder, self.path("v.png")], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("must end in .pfm", done.stderr)
+        self.assertEqual(subprocess.run([SPECTRA, "calibrate"], capture_output=True).returncode, 2)
+
     def test_a_server_maps_frames_itself(self):
         self.write("index.html", "")
         self.assertGreater(len(self.wait_for_blocks(self.server("--map", self.folder, "--voxel", "0.02"), 4)), 3)

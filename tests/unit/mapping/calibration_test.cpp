@@ -1,8 +1,12 @@
 #include "server/mapping/calibration.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <string>
+#include <vector>
 
 namespace spectra::mapping {
 namespace {
@@ -46,6 +50,28 @@ TEST(Calibration, NamesWhatDoesNotFit) {
   EXPECT_NE(problem_of(R"({"depth": {"width": 640, "height": 1e9, "fx": 561, "fy": 569, "cx": 1, "cy": 1}})")
                 .find("depth.height"),
             std::string::npos);
+}
+
+TEST(Calibration, ReadsTheVignettingPictureThatItNames) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::temp_directory_path() / ("spectra-calibration-" + std::to_string(::getpid()));
+  fs::create_directory(folder);
+  const std::string thermal = R"(, "thermal": {"width": 8, "height": 9, "fx": 80, "fy": 80, "cx": 3.5, "cy": 4,
+      "from_depth": )" + kUnit +
+                              R"(, "vignetting": )";
+  std::ofstream(folder / "calibration.json") << "{" + kDepth + thermal + "\"v.pfm\"}}";
+  EXPECT_FALSE(read_calibration(folder / "calibration.json"));
+  ASSERT_TRUE(write_pfm(folder / "v.pfm", {8, 9, std::vector<float>(72, 0.5F)}));
+  const auto read = read_calibration(folder / "calibration.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read.value().thermal->vignetting.pixels, std::vector<float>(72, 0.5F));
+  ASSERT_TRUE(write_pfm(folder / "v.pfm", {9, 8, std::vector<float>(72, 0.5F)}));
+  const auto wrong = read_calibration(folder / "calibration.json");
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().message.find("not of the size"), std::string::npos);
+  fs::remove_all(folder);
+  EXPECT_NE(problem_of("{" + kDepth + thermal + "\"../v.pfm\"}}").find("thermal.vignetting"), std::string::npos);
+  EXPECT_NE(problem_of("{" + kDepth + thermal + "3}}").find("thermal.vignetting"), std::string::npos);
 }
 
 TEST(CameraModel, UndoesItsOwnDistortion) {
