@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
@@ -15,8 +16,8 @@
 
 #include "protocol/messages/message.hpp"
 
-/// How the messages are read and written. Each struct has one function `describe(fields, message)` that names its fields
-/// once (in this namespace, static, so that it is found from here); FieldReader and FieldWriter run it. For the .cpp files of this folder only.
+/// How the messages are read and written. Each struct has one function `describe(fields, message)` that is made from protocol/schema
+/// (in this namespace, static, so that it is found from here); FieldReader and FieldWriter run it. For the .cpp files of this folder only.
 namespace spectra::protocol {
 
 /// A word of the wire for each enumerator; specialised per enumeration.
@@ -309,12 +310,13 @@ nlohmann::json Wire<Message>::written(const Message& message) {
   return std::move(fields).object();
 }
 
-/// True when every coordinate stays finite as a float.
-inline bool are_float_coordinates(const std::array<double, 3>& position) {
-  constexpr double kLargest = static_cast<double>(std::numeric_limits<float>::max());
-  for (const double coordinate : position)
-    if (!(std::abs(coordinate) <= kLargest)) return false;
-  return true;
+/// Whether the whole text is what a regular expression (ECMAScript) describes.
+bool matches(const std::string& text, const char* pattern);
+
+/// Whether every item of a list keeps to a rule.
+template <class List, class Rule>
+bool each(const List& list, Rule rule) {
+  return std::all_of(list.begin(), list.end(), rule);
 }
 
 }  // namespace spectra::protocol

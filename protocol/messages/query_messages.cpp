@@ -1,6 +1,8 @@
+// Made by protocol/generate from protocol/schema. Not to be edited.
 #include "protocol/messages/query_messages.hpp"
 
 #include "protocol/messages/fields.hpp"
+#include "protocol/messages/rules.hpp"
 
 namespace spectra::protocol {
 
@@ -19,22 +21,30 @@ std::span<const EnumWord<BaselineAction>> words_of() {
 static void describe(auto& fields, Is<HistogramRequest> auto& message) {
   fields.field("bins", message.bins);
   fields.require("bins", message.bins >= 1 && message.bins <= 4096, "an integer from 1 to 4096");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<HistogramReply> auto& message) {
   fields.field("edges", message.edges);
   fields.field("counts", message.counts);
-  fields.require("edges", message.edges.size() == message.counts.size() + (message.counts.empty() ? 0U : 1U),
-                 "a list of one more than counts");
   fields.nullable("mean", message.mean);
   fields.nullable("sigma", message.sigma);
   fields.field("highlighted", message.highlighted);
   fields.optional("highlighted_share", message.highlighted_share);
+  fields.require("highlighted_share",
+                 !message.highlighted_share || (*message.highlighted_share >= 0 && *message.highlighted_share <= 1),
+                 "a number from 0 to 1");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<ProbeRequest> auto& message) {
   fields.field("position", message.position);
-  fields.require("position", are_float_coordinates(message.position), "a list of 3 numbers that fit a 32-bit float");
+  fields.require(
+      "position",
+      each(message.position,
+           [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; }),
+      "a list of 3 numbers that fit a 32-bit float");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<ProbeReply> auto& message) {
@@ -50,32 +60,36 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.nullable("baseline", message.baseline);
   fields.nullable("baseline_at", message.baseline_at);
   fields.optional("temperature_sigma", message.temperature_sigma);
-  fields.require("temperature_sigma", message.temperature_sigma.value_or(0) >= 0, "a number not below 0");
+  fields.require("temperature_sigma", !message.temperature_sigma || (*message.temperature_sigma >= 0),
+                 "a number not below 0");
   fields.optional("temperature_at", message.temperature_at);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<BaselineRequest> auto& message) {
   fields.field("action", message.action);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<BaselineReply> auto& message) {
   fields.nullable("marked_at", message.marked_at);
   fields.field("revision", message.revision);
-}
-
-static void describe(auto& fields, Is<ExtremesRequest> auto& message) {
-  fields.optional("camera", message.camera);
-  fields.optional("window", message.window);
-  const auto is_part = [](const std::array<double, 4>& w) {
-    return w[0] >= 0 && w[0] < w[2] && w[2] <= 1 && w[1] >= 0 && w[1] < w[3] && w[3] <= 1;
-  };
-  fields.require("window", !message.window || is_part(*message.window),
-                 "left, top, right and bottom from 0 to 1, left below right and top below bottom");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<Extreme> auto& message) {
   fields.field("position", message.position);
   fields.field("temperature", message.temperature);
+  rules(fields, message);
+}
+
+static void describe(auto& fields, Is<ExtremesRequest> auto& message) {
+  fields.optional("camera", message.camera);
+  fields.optional("window", message.window);
+  fields.require("window",
+                 !message.window || (each(*message.window, [](const auto& item) { return item >= 0 && item <= 1; })),
+                 "a list of 4 numbers from 0 to 1");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<ExtremesReply> auto& message) {
@@ -83,13 +97,14 @@ static void describe(auto& fields, Is<ExtremesReply> auto& message) {
   fields.nullable("coldest", message.coldest);
   fields.optional("over_range", message.over_range);
   fields.optional("under_range", message.under_range);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<FactsRequest> auto& message) {
   fields.optional("bins", message.bins);
-  const std::uint32_t bins = message.bins.value_or(1);
-  fields.require("bins", bins >= 1 && bins <= 4096, "an integer from 1 to 4096");
+  fields.require("bins", !message.bins || (*message.bins >= 1 && *message.bins <= 4096), "an integer from 1 to 4096");
   fields.optional("hues", message.hues);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<FactsReply> auto& message) {
@@ -103,18 +118,19 @@ static void describe(auto& fields, Is<FactsReply> auto& message) {
   fields.field("sigma", message.sigma);
   fields.optional("counts", message.counts);
   fields.optional("hues", message.hues);
+  rules(fields, message);
 }
 
-template struct Wire<FactsRequest>;
-template struct Wire<FactsReply>;
 template struct Wire<HistogramRequest>;
 template struct Wire<HistogramReply>;
 template struct Wire<ProbeRequest>;
 template struct Wire<ProbeReply>;
 template struct Wire<BaselineRequest>;
 template struct Wire<BaselineReply>;
-template struct Wire<ExtremesRequest>;
 template struct Wire<Extreme>;
+template struct Wire<ExtremesRequest>;
 template struct Wire<ExtremesReply>;
+template struct Wire<FactsRequest>;
+template struct Wire<FactsReply>;
 
 }  // namespace spectra::protocol

@@ -1,27 +1,38 @@
+// Made by protocol/generate from protocol/schema. Not to be edited.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/scene_messages.hpp"
 
+/// Where the robot is that maps the scene.
 namespace spectra::protocol {
 
 /// A part of the way the robot has come.
 struct RobotPath {
-  std::uint32_t first = 0;                    ///< What the client has of the way from this point on is replaced.
-  std::vector<std::array<double, 3>> points;  ///< Metres, in the coordinates of the map.
+  /// What the client has of the way from this point on is replaced.
+  std::uint32_t first = 0;
+  /// Metres, in the coordinates of the map.
+  std::vector<Vector3> points;
 };
 
-/// Params of robot.moved.
+/// Params of the notification robot.moved.
 struct RobotMoved {
-  double at = 0;                     ///< Unix seconds.
-  std::array<double, 3> position{};  ///< Of its depth camera: metres, in the coordinates of the map.
-  std::array<double, 3> forward{};   ///< Where that looks; of length 1.
-  std::array<double, 3> up{};        ///< Up in its picture; of length 1.
-  std::optional<bool> lost;          ///< True: it does not know where it is, and this is where it was last.
+  /// Unix seconds.
+  double at = 0;
+  /// Of its depth camera: metres, in the coordinates of the map; minus SCENE.origin they are those of the scene.
+  Vector3 position{};
+  /// Where that looks; of length 1.
+  Vector3 forward{};
+  /// Up in its picture; of length 1.
+  Vector3 up{};
+  /// True: it does not know where it is, and this is where it was last.
+  std::optional<bool> lost;
   RobotPath path;
 };
 

@@ -1,8 +1,8 @@
+// Made by protocol/generate from protocol/schema. Not to be edited.
 #include "protocol/messages/stream_messages.hpp"
 
-#include <algorithm>
-
 #include "protocol/messages/fields.hpp"
+#include "protocol/messages/rules.hpp"
 
 namespace spectra::protocol {
 
@@ -14,76 +14,90 @@ std::span<const EnumWord<Channel>> words_of() {
 }
 
 template <>
-std::span<const EnumWord<StatusLevel>> words_of() {
-  static constexpr EnumWord<StatusLevel> kWords[] = {
-      {StatusLevel::Info, "info"}, {StatusLevel::Warning, "warning"}, {StatusLevel::Error, "error"}};
-  return kWords;
-}
-
-template <>
 std::span<const EnumWord<ColourTransform>> words_of() {
   static constexpr EnumWord<ColourTransform> kWords[] = {{ColourTransform::None, "none"},
                                                          {ColourTransform::SubtractGreen, "subtract_green"}};
   return kWords;
 }
 
-static constexpr const char* kPosition = "a list of 3 numbers that fit a 32-bit float";
-
-// With the largest numbers they stay within 64 KiB, and within 10,000 JSON values.
-static constexpr std::size_t kMostResumedTiles = 1500;
-
-static void describe(auto& fields, Is<ResumeRequest> auto& message) {
-  fields.field("session_id", message.session_id);
-  fields.field("tiles", message.tiles);
-  fields.require("tiles", message.tiles.size() <= kMostResumedTiles, "a list of at most 1500 tiles");
-  const bool are_tiles =
-      std::all_of(message.tiles.begin(), message.tiles.end(), [](const auto& t) { return t[0] <= 255 && t[4] >= 1; });
-  fields.require("tiles", are_tiles, "a list of [level from 0 to 255, x, y, z, revision from 1]");
-  fields.optional("raw", message.raw);
-  const bool are_places =
-      !message.raw || std::all_of(message.raw->begin(), message.raw->end(),
-                                  [&](std::uint32_t place) { return place < message.tiles.size(); });
-  fields.require("raw", are_places, "a list of places in tiles, from 0");
-}
-
-static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
-  fields.field("channels", message.channels);
-  fields.require("channels", !message.channels.empty(), "a list of at least one channel");
-  const auto bytes = [&fields](const char* key, auto& value) {
-    fields.optional(key, value);
-    const std::uint32_t given = value.value_or(1);
-    fields.require(key, given >= 1 && given <= 2'147'483'647U, "an integer from 1 to 2147483647");
-  };
-  bytes("in_flight_bytes", message.in_flight_bytes);
-  bytes("cache_bytes", message.cache_bytes);
-  fields.optional("colour_transform", message.colour_transform);
-  fields.optional("temperature_step_celsius", message.temperature_step_celsius);
-  const double step = message.temperature_step_celsius.value_or(1);
-  fields.require("temperature_step_celsius", step > 0 && step <= 1000, "a number above 0 and of at most 1000");
-  fields.optional("resume", message.resume);
-}
-
-static void describe(auto& fields, Is<SubscribeReply> auto& message) {
-  fields.optional("resumed_tiles", message.resumed_tiles);
+template <>
+std::span<const EnumWord<StatusLevel>> words_of() {
+  static constexpr EnumWord<StatusLevel> kWords[] = {
+      {StatusLevel::Info, "info"}, {StatusLevel::Warning, "warning"}, {StatusLevel::Error, "error"}};
+  return kWords;
 }
 
 static void describe(auto& fields, Is<CameraSet> auto& message) {
   fields.field("eye", message.eye);
-  fields.require("eye", are_float_coordinates(message.eye), kPosition);
+  fields.require(
+      "eye",
+      each(message.eye,
+           [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; }),
+      "a list of 3 numbers that fit a 32-bit float");
   fields.field("target", message.target);
-  fields.require("target", are_float_coordinates(message.target), kPosition);
+  fields.require(
+      "target",
+      each(message.target,
+           [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; }),
+      "a list of 3 numbers that fit a 32-bit float");
   fields.field("up", message.up);
-  fields.require("up", are_float_coordinates(message.up), kPosition);
+  fields.require(
+      "up",
+      each(message.up,
+           [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; }),
+      "a list of 3 numbers that fit a 32-bit float");
   fields.field("fov_y_deg", message.fov_y_deg);
   fields.require("fov_y_deg", message.fov_y_deg > 0 && message.fov_y_deg < 180, "a number above 0 and below 180");
   fields.field("viewport", message.viewport);
-  const auto is_side = [](int pixels) { return pixels >= 1 && pixels <= 32'768; };
-  fields.require("viewport", is_side(message.viewport[0]) && is_side(message.viewport[1]),
+  fields.require("viewport", each(message.viewport, [](const auto& item) { return item >= 1 && item <= 32768; }),
                  "a list of 2 integers from 1 to 32768");
+  rules(fields, message);
+}
+
+static void describe(auto& fields, Is<ResumeRequest> auto& message) {
+  fields.field("session_id", message.session_id);
+  fields.field("tiles", message.tiles);
+  fields.require("tiles",
+                 message.tiles.size() <= 1500 &&
+                     each(message.tiles, [](const auto& item) { return item[0] <= 255U && item[4] >= 1U; }),
+                 "a list of at most 1500 tiles [level 0..255, x, y, z, revision from 1]");
+  fields.optional("raw", message.raw);
+  rules(fields, message);
+}
+
+static void describe(auto& fields, Is<SubscribeRequest> auto& message) {
+  fields.field("channels", message.channels);
+  fields.require("channels", message.channels.size() >= 1, "a list of at least 1");
+  fields.optional("in_flight_bytes", message.in_flight_bytes);
+  fields.require(
+      "in_flight_bytes",
+      !message.in_flight_bytes || (*message.in_flight_bytes >= 1U && *message.in_flight_bytes <= 2147483647U),
+      "an integer from 1 to 2147483647");
+  fields.optional("cache_bytes", message.cache_bytes);
+  fields.require("cache_bytes",
+                 !message.cache_bytes || (*message.cache_bytes >= 1U && *message.cache_bytes <= 2147483647U),
+                 "an integer from 1 to 2147483647");
+  fields.optional("colour_transform", message.colour_transform);
+  fields.optional("temperature_step_celsius", message.temperature_step_celsius);
+  fields.require("temperature_step_celsius",
+                 !message.temperature_step_celsius ||
+                     (*message.temperature_step_celsius > 0 && *message.temperature_step_celsius <= 1000),
+                 "a number above 0, at most 1000");
+  fields.optional("resume", message.resume);
+  rules(fields, message);
+}
+
+static void describe(auto& fields, Is<SubscribeReply> auto& message) {
+  fields.optional("resumed_tiles", message.resumed_tiles);
+  fields.require("resumed_tiles",
+                 !message.resumed_tiles || (*message.resumed_tiles >= 0 && *message.resumed_tiles <= 1500),
+                 "an integer from 0 to 1500");
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<StreamAck> auto& message) {
   fields.field("sequence", message.sequence);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<StreamComplete> auto& message) {
@@ -91,13 +105,17 @@ static void describe(auto& fields, Is<StreamComplete> auto& message) {
   fields.field("scene_revision", message.scene_revision);
   fields.field("tiles", message.tiles);
   fields.field("vertices", message.vertices);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<StreamAccuracy> auto& message) {
   fields.nullable("position_mm", message.position_mm);
   fields.field("colour_levels", message.colour_levels);
+  fields.require("colour_levels", message.colour_levels >= 1 && message.colour_levels <= 256,
+                 "an integer from 1 to 256");
   fields.nullable("pixel_error", message.pixel_error);
   fields.nullable("temperature_celsius", message.temperature_celsius);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<StreamStats> auto& message) {
@@ -107,18 +125,20 @@ static void describe(auto& fields, Is<StreamStats> auto& message) {
   fields.field("skipped_frames", message.skipped_frames);
   fields.field("viewers", message.viewers);
   fields.field("accuracy", message.accuracy);
+  rules(fields, message);
 }
 
 static void describe(auto& fields, Is<Status> auto& message) {
   fields.field("id", message.id);
   fields.field("level", message.level);
   fields.nullable("message", message.message);
+  rules(fields, message);
 }
 
+template struct Wire<CameraSet>;
 template struct Wire<ResumeRequest>;
 template struct Wire<SubscribeRequest>;
 template struct Wire<SubscribeReply>;
-template struct Wire<CameraSet>;
 template struct Wire<StreamAck>;
 template struct Wire<StreamComplete>;
 template struct Wire<StreamAccuracy>;

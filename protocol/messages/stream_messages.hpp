@@ -1,3 +1,4 @@
+// Made by protocol/generate from protocol/schema. Not to be edited.
 #pragma once
 
 #include <array>
@@ -7,51 +8,63 @@
 #include <vector>
 
 #include "protocol/messages/message.hpp"
+#include "protocol/messages/scene_messages.hpp"
 #include "protocol/tile_frame.hpp"
 
+/// Subscription, camera, stream and status.
 namespace spectra::protocol {
+
+/// Params of the notification camera.set; metres relative to the scene origin.
+struct CameraSet {
+  Position eye{};
+  Position target{};
+  Position up{};
+  double fov_y_deg = 50;
+  /// Width and height, pixels.
+  std::array<int, 2> viewport{1, 1};
+};
 
 enum class Channel { Fused, Temperature, Visible };
 
-/// Tiles that a client still has, with colours, from an earlier connection.
+/// Tiles that the client still has, with colours, from an earlier connection.
 struct ResumeRequest {
-  std::string session_id;                           ///< Of the hello of that connection.
-  std::vector<std::array<std::uint32_t, 5>> tiles;  ///< Level (0..255), x, y, z, revision (from 1); at most 1,500.
-  /// Which of `tiles`, by their places in it, it has both raw layers of, in the form that it asks for now; absent: none.
+  /// Of the hello of that connection.
+  std::string session_id;
+  /// Those it holds.
+  std::vector<std::array<std::uint32_t, 5>> tiles;
+  /// Places in `tiles` of those of which it has both raw layers, in the form that it asks for now; absent: none.
   std::optional<std::vector<std::uint32_t>> raw;
 };
 
-/// Params of scene.subscribe; at least one channel.
+/// Params of scene.subscribe.
 struct SubscribeRequest {
   std::vector<Channel> channels;
-  std::optional<std::uint32_t> in_flight_bytes;  ///< 1..2^31-1; absent: the server's choice.
-  std::optional<std::uint32_t> cache_bytes;  ///< 1..2^31-1, of decoded tiles; absent: no bound to what is asked for.
-  std::optional<ColourTransform> colour_transform;  ///< Absent: none.
-  std::optional<double>
-      temperature_step_celsius;  ///< Of the channel temperature; above 0; absent: the server's choice.
+  /// Most frame bytes beyond the last stream.ack; absent: the server's choice.
+  std::optional<std::uint32_t> in_flight_bytes;
+  /// Most bytes of decoded tiles (16 a vertex, 12 a triangle) held by the client; absent: no bound to what it asks
+  /// for.
+  std::optional<std::uint32_t> cache_bytes;
+  /// How colours are written: frames of kind 2, or of kind 6. Absent: none.
+  std::optional<ColourTransform> colour_transform;
+  /// Step of the channel temperature; absent: the larger of 0.01 degC and a 65,000th of the tile's span.
+  std::optional<double> temperature_step_celsius;
+  /// Absent: the client holds nothing. Refused while frames flow.
   std::optional<ResumeRequest> resume;
 };
 
 /// Result of scene.subscribe.
 struct SubscribeReply {
-  std::optional<std::uint32_t> resumed_tiles;  ///< There when the request had `resume`: claims that hold.
+  /// There when the request had `resume`: how many of the claimed tiles are current and are not sent again.
+  std::optional<int> resumed_tiles;
 };
 
-/// Params of camera.set; metres relative to the scene origin, finite as float.
-struct CameraSet {
-  std::array<double, 3> eye{};
-  std::array<double, 3> target{};
-  std::array<double, 3> up{};
-  double fov_y_deg = 50;              ///< Above 0, below 180.
-  std::array<int, 2> viewport{1, 1};  ///< Width and height, 1..32768 pixels.
-};
-
-/// Params of stream.ack: every frame up to this one is decoded.
+/// Params of the notification stream.ack.
 struct StreamAck {
+  /// Every frame up to this one is decoded.
   std::uint32_t sequence = 0;
 };
 
-/// Params of stream.complete.
+/// Params of the notification stream.complete: all that camera and quality ask for has been sent.
 struct StreamComplete {
   std::uint32_t generation = 0;
   std::uint32_t scene_revision = 0;
@@ -59,37 +72,46 @@ struct StreamComplete {
   std::uint64_t vertices = 0;
 };
 
-/// What is on the screen now; nullopt = null: nothing yet.
+/// What is on the screen now.
 struct StreamAccuracy {
+  /// Largest error per axis. nullopt = null.
   std::optional<double> position_mm;
+  /// Levels of a colour channel that can be told apart; coarse tiles count.
   int colour_levels = 256;
+  /// nullopt = null.
   std::optional<double> pixel_error;
+  /// Of temperatures, for 95 % of the surface; null: there are none.
   std::optional<double> temperature_celsius;
 };
 
-/// Params of stream.stats; nullopt = null: not measured yet.
+/// Params of the notification stream.stats.
 struct StreamStats {
+  /// null: not measured yet.
   std::optional<double> round_trip_ms;
+  /// null: not measured yet.
   std::optional<double> throughput_bytes_per_s;
   std::uint64_t queued_bytes = 0;
+  /// Superseded before they were sent.
   std::uint64_t skipped_frames = 0;
+  /// Connected now.
   std::uint64_t viewers = 0;
   StreamAccuracy accuracy;
 };
 
 enum class StatusLevel { Info, Warning, Error };
 
-/// Params of status; the same id replaces, message null clears.
+/// Params of the notification status; the same id replaces, message null clears.
 struct Status {
   std::string id;
   StatusLevel level = StatusLevel::Info;
+  /// nullopt = null.
   std::optional<std::string> message;
 };
 
+extern template struct Wire<CameraSet>;
 extern template struct Wire<ResumeRequest>;
 extern template struct Wire<SubscribeRequest>;
 extern template struct Wire<SubscribeReply>;
-extern template struct Wire<CameraSet>;
 extern template struct Wire<StreamAck>;
 extern template struct Wire<StreamComplete>;
 extern template struct Wire<StreamAccuracy>;

@@ -28,7 +28,7 @@ Result<SceneQuestion> histogram_question(const json& params, const AskedAbout& a
   const auto request = protocol::from_json<protocol::HistogramRequest>(params);
   if (!request) return refused(request.error());
   if (!about.scene) return no_scene();
-  const auto bins = request.value().bins;
+  const auto bins = static_cast<std::uint32_t>(request.value().bins);
   return SceneQuestion{kSmallAnswerBytes + std::size_t{bins} * kBinBytes,
                        [scene = about.scene, plan = *about.plan, bins]() -> Result<json> {
                          const auto& temperature = scene->temperature();
@@ -44,15 +44,17 @@ Result<SceneQuestion> facts_question(const json& params, const AskedAbout& about
   const auto request = protocol::from_json<protocol::FactsRequest>(params);
   if (!request) return refused(request.error());
   if (!about.scene) return no_scene();
+  const auto bins =
+      request.value().bins ? std::optional(static_cast<std::uint32_t>(*request.value().bins)) : std::nullopt;
   // With what plans are prepared, which follows a live map in steps.
   const std::size_t size_bytes =
-      kSmallAnswerBytes + (request.value().bins.value_or(0) + fusion::Hues::kSectors) * kBinBytes;
+      kSmallAnswerBytes + (std::size_t{bins.value_or(0)} + fusion::Hues::kSectors) * kBinBytes;
   return SceneQuestion{
-      size_bytes, [temperature = about.scene->reference_temperature(), request = request.value()]() -> Result<json> {
+      size_bytes,
+      [temperature = about.scene->reference_temperature(), bins, request = request.value()]() -> Result<json> {
         protocol::FactsReply reply = facts_message(temperature->summary);
-        if (request.bins && temperature->summary.has_temperature())
-          reply.counts = temperature->histogram(*request.bins).counts;
-        if (request.bins && !reply.counts) reply.counts.emplace(*request.bins, 0);
+        if (bins && temperature->summary.has_temperature()) reply.counts = temperature->histogram(*bins).counts;
+        if (bins && !reply.counts) reply.counts.emplace(*bins, 0);
         if (request.hues.value_or(false)) {
           const auto chroma = temperature->hues().chroma;
           reply.hues.emplace(chroma.begin(), chroma.end());

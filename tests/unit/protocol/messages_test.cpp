@@ -118,7 +118,9 @@ TEST(SubscribeRequest, OfAsManyTilesAsAreAllowedFitsTheLimitsOfAMessage) {
   EXPECT_TRUE(from_json<SubscribeRequest>(std::get<IncomingMessage>(incoming).params).has_value());
   const auto refused = from_json<SubscribeRequest>(to_json(request(1501)));
   ASSERT_TRUE(refused.has_error());
-  EXPECT_EQ(refused.error().message, "resume.tiles must be a list of at most 1500 tiles, not a list of 1501");
+  EXPECT_EQ(
+      refused.error().message,
+      "resume.tiles must be a list of at most 1500 tiles [level 0..255, x, y, z, revision from 1], not a list of 1501");
 }
 
 TEST(FusionChange, KeepsWhatIsAbsentAbsent) {

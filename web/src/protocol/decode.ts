@@ -58,6 +58,10 @@ export const count: Decoder<number> = (value, path) => {
   return value;
 };
 
+/** A value whose type only the JSON tells. */
+export const scalar: Decoder<number | string | boolean | null> = (value, path) =>
+  value === null || typeof value === 'boolean' || typeof value === 'string' ? value : number(value, path);
+
 export const unknown: Decoder<unknown> = (value) => value;
 
 export function nullable<T>(inner: Decoder<T>): Decoder<T | null> {

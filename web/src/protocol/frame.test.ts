@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { childTile, decodeTileFrame, FRAME_MAGIC, parentTile } from './frame';
+import { childTile, decodeTileFrame, parentTile } from './frame';
+import { FRAME_MAGIC } from './generated_frame';
 
 function frame(change: (view: DataView) => void, size = 76): ArrayBuffer {
   const buffer = new ArrayBuffer(size);

@@ -1,18 +1,8 @@
 /** Tile frames: the binary messages of docs/protocol.md. */
 
-export const FRAME_MAGIC = 0x31435053;
-/** The shortest header; from 80 on it states the errors of colour and temperature too. */
-export const FRAME_HEADER_BYTES = 72;
+import { FRAME_HEADER_BYTES, FRAME_MAGIC, HEADER_SIZE_OFFSET, readHeader, type TileFrameHeader } from './generated_frame';
 
-export const FrameKind = {
-  geometry: 1,
-  colours: 2,
-  remove: 3,
-  temperature: 4,
-  visible: 5,
-  colours_subtract_green: 6,
-  visible_subtract_green: 7,
-} as const;
+export { FrameKind } from './generated_frame';
 
 export interface TileId {
   level: number;
@@ -21,25 +11,8 @@ export interface TileId {
   z: number;
 }
 
-export interface TileFrame {
-  /** One of FrameKind, or a number this client does not know and ignores. */
-  kind: number;
-  child_mask: number;
-  sequence: number;
-  generation: number;
-  tile: TileId;
-  revision: number;
-  vertex_count: number;
-  origin_m: [number, number, number];
-  position_step_m: number;
-  geometric_error_m: number;
-  /** NaN = no temperature under this tile. */
-  lowest_celsius: number;
-  highest_celsius: number;
-  /** Largest difference of a channel between the tile and the full mesh, 95th percentile, levels; NaN = not said. */
-  colour_error_levels: number;
-  /** The same of the temperature; NaN = none, or not said. */
-  temperature_error_celsius: number;
+/** Its kind is one of FrameKind, or a number this client does not know and ignores. */
+export interface TileFrame extends Omit<TileFrameHeader, 'payload_size_bytes'> {
   /** A view into the message, not a copy. */
   payload: Uint8Array<ArrayBuffer>;
 }
@@ -71,32 +44,15 @@ export function decodeTileFrame(message: ArrayBuffer): TileFrame {
     throw new Error(`tile frame: ${message.byteLength} bytes are fewer than the header's ${FRAME_HEADER_BYTES}`);
   }
   const view = new DataView(message);
-  const u32 = (offset: number) => view.getUint32(offset, true);
-  const f32 = (offset: number) => view.getFloat32(offset, true);
-  if (u32(0) !== FRAME_MAGIC) throw new Error(`tile frame: magic 0x${u32(0).toString(16)} is not 0x31435053`);
-  const headerSize = view.getUint16(6, true);
-  if (headerSize < FRAME_HEADER_BYTES || headerSize > message.byteLength) {
-    throw new Error(`tile frame: header size ${headerSize} is outside 72..${message.byteLength}`);
+  const magic = view.getUint32(0, true);
+  if (magic !== FRAME_MAGIC) throw new Error(`tile frame: magic 0x${magic.toString(16)} is not 0x${FRAME_MAGIC.toString(16)}`);
+  const size = view.getUint16(HEADER_SIZE_OFFSET, true);
+  if (size < FRAME_HEADER_BYTES || size > message.byteLength) {
+    throw new Error(`tile frame: header size ${size} is outside ${FRAME_HEADER_BYTES}..${message.byteLength}`);
   }
-  const payloadSize = u32(68);
-  if (payloadSize !== message.byteLength - headerSize) {
-    throw new Error(`tile frame: payload of ${message.byteLength - headerSize} bytes, the header says ${payloadSize}`);
+  const { payload_size_bytes, ...header } = readHeader(view, size);
+  if (payload_size_bytes !== message.byteLength - size) {
+    throw new Error(`tile frame: payload of ${message.byteLength - size} bytes, the header says ${payload_size_bytes}`);
   }
-  return {
-    kind: view.getUint8(4),
-    child_mask: view.getUint8(5),
-    sequence: u32(8),
-    generation: u32(12),
-    tile: { level: view.getUint8(16), x: u32(20), y: u32(24), z: u32(28) },
-    revision: u32(32),
-    vertex_count: u32(36),
-    origin_m: [f32(40), f32(44), f32(48)],
-    position_step_m: f32(52),
-    geometric_error_m: f32(56),
-    lowest_celsius: f32(60),
-    highest_celsius: f32(64),
-    colour_error_levels: headerSize >= 80 ? f32(72) : Number.NaN,
-    temperature_error_celsius: headerSize >= 80 ? f32(76) : Number.NaN,
-    payload: new Uint8Array(message, headerSize, payloadSize),
-  };
+  return { ...header, payload: new Uint8Array(message, size, payload_size_bytes) };
 }

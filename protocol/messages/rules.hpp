@@ -1,0 +1,47 @@
+#pragma once
+
+#include "protocol/messages/fields.hpp"
+#include "protocol/messages/fusion_messages.hpp"
+#include "protocol/messages/query_messages.hpp"
+#include "protocol/messages/scene_messages.hpp"
+#include "protocol/messages/stream_messages.hpp"
+
+/// What a schema cannot say: how the fields of one message depend on each other. The generated `describe` asks for the rules after it
+/// has told the fields; most have none.
+namespace spectra::protocol {
+
+void rules(auto&, auto&) {}
+
+void rules(auto& fields, Is<RangeChange> auto& range) {
+  const bool is_manual = range.mode == RangeMode::Manual;
+  fields.require("min", !is_manual || range.min, "a number (degC) for a manual range");
+  fields.require("max", !is_manual || range.max, "a number (degC) for a manual range");
+  fields.require("max", !is_manual || range.min <= range.max, "a number not below min");
+}
+
+void rules(auto& fields, Is<ChangeScale> auto& scale) {
+  fields.require("max", scale.min < scale.max, "a number above min");
+}
+
+void rules(auto& fields, Is<Hello> auto& hello) {
+  fields.require("methods", hello.methods || hello.catalogue, "a list, where catalogue is absent");
+  fields.require("palettes", hello.palettes || hello.catalogue, "a list, where catalogue is absent");
+}
+
+void rules(auto& fields, Is<HistogramReply> auto& histogram) {
+  fields.require("edges", histogram.edges.size() == histogram.counts.size() + (histogram.counts.empty() ? 0U : 1U),
+                 "a list of one more than counts");
+}
+
+void rules(auto& fields, Is<ExtremesRequest> auto& request) {
+  const auto is_part = [](const std::array<double, 4>& w) { return w[0] < w[2] && w[1] < w[3]; };
+  fields.require("window", !request.window || is_part(*request.window), "left below right and top below bottom");
+}
+
+void rules(auto& fields, Is<ResumeRequest> auto& resume) {
+  fields.require("raw",
+                 !resume.raw || each(*resume.raw, [&](std::uint32_t place) { return place < resume.tiles.size(); }),
+                 "a list of places in tiles, from 0");
+}
+
+}  // namespace spectra::protocol
