@@ -169,6 +169,7 @@ TEST(GoldenMessages, CoverEveryMethodOfTheSchema) {
       named.insert(method);
       EXPECT_TRUE(kMethods.contains(method)) << method;
       for (const auto& [part, reference] : types.items()) {
+        if (part == "description") continue;
         const auto text = reference.get<std::string>();
         const std::size_t hash = text.find('#');
         const json schema = json::parse(content(fs::path(SPECTRA_PROTOCOL_DIR) / "schema" / text.substr(0, hash)));
