@@ -5,11 +5,21 @@ import { licences, shippedPackages } from './scripts/licences';
 import { leanThree } from './scripts/lean_three';
 import { precompressed } from './scripts/precompressed';
 import { programPreload } from './scripts/program_preload';
+import { smallKeeper } from './scripts/small_keeper';
 
 const server = process.env.SPECTRA_URL ?? 'http://127.0.0.1:8600';
 
 export default defineConfig({
-  plugins: [leanThree(), fusionModule(), svelte(), programPreload(), precompressed(), shippedPackages(), licences()],
+  plugins: [
+    leanThree(),
+    fusionModule(),
+    svelte(),
+    programPreload(),
+    precompressed(),
+    smallKeeper(),
+    shippedPackages(),
+    licences(),
+  ],
   base: './',
   // One style sheet and plain imports: the page itself says what is to be loaded early.
   build: {

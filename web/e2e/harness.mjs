@@ -15,7 +15,13 @@ export async function startServer(args, port = 0) {
   if (!existsSync(PROGRAM)) throw new Error(`there is no server program at ${PROGRAM}; build it or set SPECTRA_BIN`);
   const child = spawn(
     PROGRAM,
-    ['serve', ...args, '--listen', `127.0.0.1:${port}`, '--web', process.env.SPECTRA_WEB ?? here('../dist')],
+    [
+      'serve',
+      ...args,
+      '--listen',
+      `127.0.0.1:${port}`,
+      ...(args.includes('--web') ? [] : ['--web', process.env.SPECTRA_WEB ?? here('../dist')]),
+    ],
     {
       stdio: ['ignore', 'pipe', 'pipe'],
     },

@@ -22,6 +22,7 @@ import { addAccessTests } from './access.mjs';
 import { addAccuracyTests } from './accuracy.mjs';
 import { addAxeTests } from './axe.mjs';
 import { addFusingTests } from './fusing.mjs';
+import { addKeptTests } from './kept.mjs';
 import { addLayoutTests } from './layout.mjs';
 import { addLetteringTests } from './lettering.mjs';
 import { addLinkTests } from './links.mjs';
@@ -533,6 +534,7 @@ test('Nothing broke the content policy', () => {
 addAccuracyTests(browser);
 addAxeTests(browser);
 addFusingTests(browser);
+addKeptTests(browser, scratch);
 addLayoutTests(browser);
 addLetteringTests(browser);
 addLinkTests(browser);

@@ -1,5 +1,6 @@
 /** The controls and the sheets around the picture: a part of the program of their own, which comes when the first picture has. */
 
+export { keepClient } from '../transport/kept_client';
 export { Steering } from '../view/steering';
 export { default as Gizmo } from './Gizmo.svelte';
 export { default as Help } from './Help.svelte';
