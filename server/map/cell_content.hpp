@@ -14,6 +14,7 @@ using BlockNumber = std::uint32_t;
 /// What is known of a block beside its mesh.
 struct BlockLabel {
   std::string name;
+  bool is_settled = false;            ///< What the scene began with; other blocks are expected to change.
   double observed_at = kUnknownTime;  ///< Unix seconds.
   double baseline_at =
       kUnknownTime;  ///< The time of the baseline of those of its vertices that are compared with themselves.
@@ -31,16 +32,19 @@ struct BlockLabels {
 /// has it, or, of no triangle, where it is itself.
 struct CellContent {
   std::uint64_t triangle_count = 0;
-  std::uint64_t owned_count = 0;  ///< Vertices.
+  std::uint64_t owned_count = 0;     ///< Vertices.
+  std::uint64_t changing_count = 0;  ///< Elements of blocks that are not settled.
   bool is_empty() const { return triangle_count == 0 && owned_count == 0; }
   CellContent& operator+=(const CellContent& other) {
     triangle_count += other.triangle_count;
     owned_count += other.owned_count;
+    changing_count += other.changing_count;
     return *this;
   }
   CellContent& operator-=(const CellContent& other) {
     triangle_count -= other.triangle_count;
     owned_count -= other.owned_count;
+    changing_count -= other.changing_count;
     return *this;
   }
   friend bool operator==(const CellContent&, const CellContent&) = default;

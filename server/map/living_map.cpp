@@ -112,6 +112,9 @@ LivingMap::LivingMap(const Options& options, const std::optional<MapConstants>& 
 
 TileSizes LivingMap::sizes() const {
   TileSizes sizes{.leaf_vertex_count = std::max(1u, options_.leaf_vertex_count)};
+  sizes.changing_leaf_vertex_count = options_.settled_block.empty()
+                                         ? sizes.leaf_vertex_count
+                                         : std::max(1u, sizes.leaf_vertex_count / kSmallerWhereChanging);
   // 20,000 of 32,000: with 32,000 vertices geometry and colours of a noisy scene would be more than a first picture should
   // cost.
   if (options_.levels == LevelsOfDetail::All) sizes.root_vertex_count = std::max(1u, sizes.leaf_vertex_count / 8 * 5);
@@ -376,6 +379,7 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
     const double observed_at = block.observed_at.value_or(kUnknownTime);
     labels_.of_block[info->number] = {
         .name = block.id,
+        .is_settled = block.id == options_.settled_block,
         .observed_at = observed_at,
         .baseline_at = block.was_marked ? mark_.marked_at.value_or(observed_at) : observed_at};
     one.baseline = std::move(block.baseline).value_or(BlockBaseline{});

@@ -24,9 +24,10 @@
 
 namespace spectra::map {
 
-/// Of a map that is expected to grow. A quarter of what others have: a block that comes in makes whole leaves anew, and coarse
-/// tiles above them.
-inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / 4;
+/// A block that comes in makes whole leaves anew, and coarse tiles above them: where blocks come and go, leaves are so many times smaller.
+inline constexpr std::uint32_t kSmallerWhereChanging = 4;
+/// Of a map that is expected to grow.
+inline constexpr std::uint32_t kLiveLeafVertexCount = kLeafVertexCount / kSmallerWhereChanging;
 
 /// How far a replaced block hands its baseline on, in position steps of the map: about two edges of its first block.
 inline constexpr double kHandedOnSteps = 8;
@@ -75,6 +76,8 @@ class LivingMap {
   struct Options {
     LevelsOfDetail levels = LevelsOfDetail::All;
     std::uint32_t leaf_vertex_count = kLeafVertexCount;
+    /// The block that is not expected to change: where another one lies, leaves are kSmallerWhereChanging times smaller. Empty: they are the same everywhere.
+    std::string settled_block = {};
     /// The level of the tile that the first block just fills: how often the map may double its extent.
     int first_level = 0;
     bool is_live = false;    ///< Begins empty, and is expected to grow.

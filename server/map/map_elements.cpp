@@ -189,7 +189,14 @@ base::Bounds bounds_of(std::span<const Element> elements) {
 }
 
 std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::size_t owned_count,
-                                 std::span<const std::uint32_t> triangle_order) {
+                                 std::span<const std::uint32_t> triangle_order, const BlockLabels& labels) {
+  BlockNumber last_block = piece.block;
+  bool is_last_changing = !labels.at(last_block).is_settled;
+  const auto is_changing = [&](BlockNumber block) {
+    if (block != last_block) is_last_changing = !labels.at(block).is_settled;
+    last_block = block;
+    return is_last_changing ? 1u : 0u;
+  };
   std::vector<Element> elements(piece.triangles.size());
   std::vector<bool> is_used(piece.positions.size());
   for (std::size_t i = 0; i < elements.size(); ++i) {
@@ -197,7 +204,8 @@ std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::
     Element& element = elements[i];
     element.place = centroid(piece, piece.triangles[t]);
     element.index = t;
-    element.piece = number & 0xfffffffu;
+    element.piece = number & 0x7ffffffu;
+    element.is_changing = is_changing(piece.block_of_triangle(t)) & 1u;
     for (unsigned corner = 0; corner < 3; ++corner) {
       const std::uint32_t v = piece.triangles[t][corner];
       auto used = is_used[v];
@@ -210,7 +218,8 @@ std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::
     Element& element = elements.emplace_back();
     element.place = piece.positions[v];
     element.index = v;
-    element.piece = number & 0xfffffffu;
+    element.piece = number & 0x7ffffffu;
+    element.is_changing = is_changing(piece.block_of_vertex(v)) & 1u;
     element.owned_corners = Element::kLoneVertex;
   }
   return elements;

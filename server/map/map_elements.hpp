@@ -80,7 +80,8 @@ class Pieces {
 struct Element {
   base::Vec3f place;
   std::uint32_t index = 0;  ///< In its piece, of the triangle or the vertex.
-  std::uint32_t piece : 28 = 0;
+  std::uint32_t piece : 27 = 0;
+  std::uint32_t is_changing : 1 = 0;  ///< Of a block that is not settled.
   /// Bit k: corner k is the first in its block to use its vertex, which is therefore owned where this triangle is.
   /// kLoneVertex: the element is a vertex.
   std::uint32_t owned_corners : 4 = 0;
@@ -90,7 +91,8 @@ struct Element {
   bool is_lone_vertex() const { return owned_corners == kLoneVertex; }
   CellContent content() const {
     // A lone vertex has one bit, too.
-    return {is_lone_vertex() ? 0u : 1u, static_cast<std::uint64_t>(std::popcount(std::uint32_t{owned_corners}))};
+    return {is_lone_vertex() ? 0u : 1u, static_cast<std::uint64_t>(std::popcount(std::uint32_t{owned_corners})),
+            is_changing};
   }
 };
 
@@ -121,7 +123,7 @@ base::Bounds bounds_of(std::span<const Element> elements);
 /// The elements of a piece. `triangle_order`: its triangles in an order in which those of each block ascend; empty: as they are.
 /// Vertices from `owned_count` on are owned elsewhere.
 std::vector<Element> elements_of(const Piece& piece, std::uint32_t number, std::size_t owned_count,
-                                 std::span<const std::uint32_t> triangle_order);
+                                 std::span<const std::uint32_t> triangle_order, const BlockLabels& labels);
 
 /// Copies a leaf out of its pieces, its elements along a space-filling curve. They are put in the order of the names of their blocks before, in each as the
 /// block has them, triangles before vertices of none: the same tile in whatever order they came. Thread-safe for different elements.

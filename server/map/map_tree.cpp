@@ -58,7 +58,7 @@ class TreeChange {
     std::vector<std::uint32_t> numbers;
     for (const BlockMesh& block : added) numbers.push_back(pieces_.add(piece_of(block)));
     pool.for_each(added.size(), [&](std::size_t i) {
-      parts[i] = elements_of(pieces_[numbers[i]], numbers[i], added[i].mesh->vertex_count(), {});
+      parts[i] = elements_of(pieces_[numbers[i]], numbers[i], added[i].mesh->vertex_count(), {}, labels_);
     });
     std::vector<Element> incoming;
     if (parts.size() == 1) {
@@ -135,7 +135,7 @@ class TreeChange {
       return std::pair(its_piece.block_of_triangle(a), tile.source_triangle[a]) <
              std::pair(its_piece.block_of_triangle(b), tile.source_triangle[b]);
     });
-    return elements_of(its_piece, number, tile.owned_count, order);
+    return elements_of(its_piece, number, tile.owned_count, order, labels_);
   }
 
   // Before anything else: which leaves lose something, and what.
@@ -180,7 +180,7 @@ class TreeChange {
   bool is_leaf(const CellContent& content, int level) const {
     if (level >= kDeepestLevel) return true;
     if (content.owned_count > sizes_.root_vertex_count && content == total_) return false;
-    return 4 * content.owned_count <= 5 * std::uint64_t{sizes_.leaf_vertex_count};
+    return 4 * content.owned_count <= 5 * std::uint64_t{sizes_.leaf_size(content)};
   }
 
   /// Appends what stays of all that lies beneath a node, if it lies in one of these octants of a cell; its leaves are dropped.
@@ -310,8 +310,10 @@ class TreeChange {
     CellContent sum;
     for (const CellContent& octant : contents) sum += octant;
     // Not all of them may become one again.
-    const std::uint64_t most = std::min<std::uint64_t>(sizes_.leaf_vertex_count, sum.owned_count / 2);
-    const std::vector<OctantGroup> groups = octant_groups(contents, most, total_.triangle_count > 0);
+    const auto leaf_size = [this, most = sum.owned_count / 2](const CellContent& content) {
+      return std::min<std::uint64_t>(sizes_.leaf_size(content), most);
+    };
+    const std::vector<OctantGroup> groups = octant_groups(contents, leaf_size, total_.triangle_count > 0);
     std::array<std::size_t, 8> group_of{};
     for (std::size_t g = 0; g < groups.size(); ++g) {
       for (unsigned octant = 0; octant < 8; ++octant) {

@@ -21,7 +21,8 @@ int distance(const OctantGroup& a, const OctantGroup& b) {
 
 }  // namespace
 
-std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64_t leaf_vertex_count,
+std::vector<OctantGroup> octant_groups(const OctantContents& counts,
+                                       const std::function<std::uint64_t(const CellContent&)>& leaf_size,
                                        bool has_triangles) {
   std::vector<OctantGroup> groups;
   for (unsigned i = 0; i < 8; ++i) {
@@ -40,8 +41,10 @@ std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64
     std::optional<std::tuple<std::uint64_t, std::size_t, std::size_t>> best;
     for (std::size_t a = 0; a < groups.size(); ++a) {
       for (std::size_t b = a + 1; b < groups.size(); ++b) {
-        const std::uint64_t sum = groups[a].count.owned_count + groups[b].count.owned_count;
-        if (sum > leaf_vertex_count || distance(groups[a], groups[b]) > 1) continue;
+        CellContent both = groups[a].count;
+        both += groups[b].count;
+        const std::uint64_t sum = both.owned_count;
+        if (sum > leaf_size(both) || distance(groups[a], groups[b]) > 1) continue;
         if (!best || std::tuple(sum, a, b) < *best) best = {sum, a, b};
       }
     }
@@ -53,7 +56,7 @@ std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64
     std::optional<std::pair<std::uint64_t, std::size_t>> smallest;
     for (std::size_t a = 0; a < groups.size(); ++a) {
       const bool is_bare = has_triangles && groups[a].count.triangle_count == 0;
-      const bool is_small = 4 * groups[a].count.owned_count < leaf_vertex_count;
+      const bool is_small = 4 * groups[a].count.owned_count < leaf_size(groups[a].count);
       if (!is_bare && !is_small) continue;
       const std::pair candidate(groups[a].count.owned_count, a);
       if (!smallest || candidate < *smallest) smallest = candidate;

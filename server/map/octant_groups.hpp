@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "server/map/cell_content.hpp"
@@ -18,8 +19,10 @@ struct OctantGroup {
 };
 
 /// Joins octants that are not empty until none is small beside the leaf size: neighbours that fit into one leaf, and what has less than a
-/// quarter of one with the nearest other. `has_triangles`: none may be without any. What is in them alone decides.
-std::vector<OctantGroup> octant_groups(const OctantContents& counts, std::uint64_t leaf_vertex_count,
+/// quarter of one with the nearest other. `leaf_size`: how many vertices a leaf of such a content may own. `has_triangles`: none may be without
+/// any. What is in them alone decides.
+std::vector<OctantGroup> octant_groups(const OctantContents& counts,
+                                       const std::function<std::uint64_t(const CellContent&)>& leaf_size,
                                        bool has_triangles);
 
 }  // namespace spectra::map

@@ -29,7 +29,8 @@ std::shared_ptr<const SceneSnapshot> SceneStore::replace(files::LoadedScene scen
                                                          const base::Progress& progress) {
   const std::lock_guard replacing(replace_mutex_);
   const auto previous = current();
-  map_ = std::make_shared<LivingMap>(LivingMap::Options{.levels = levels, .first_level = kFirstLevel});
+  map_ = std::make_shared<LivingMap>(
+      LivingMap::Options{.levels = levels, .settled_block = std::string(kFileBlock), .first_level = kFirstLevel});
   MapChange change;
   change.put.push_back({.id = std::string(kFileBlock), .scene = std::move(scene), .observed_at = {}});
   return publish(map_->apply(std::move(change), previous ? previous->revision() + 1 : 1, pool, progress), before);

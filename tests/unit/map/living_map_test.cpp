@@ -260,5 +260,37 @@ TEST_F(LivingMapTest, RefusesWhatCannotBeOneMap) {
   EXPECT_EQ(code({"large", 0xffffffff, true}), static_cast<int>(base::ErrorCode::TooLarge));
 }
 
+TEST(LivingMapOfAFile, HasSmallerLeavesWhereBlocksComeAndGo) {
+  jobs::WorkerPool pool{2};
+  LivingMap map({.leaf_vertex_count = 2000, .settled_block = "file", .first_level = 6});
+  auto change = [&, revision = 0u](BlockPut block, std::vector<std::string> removed = {}) mutable {
+    MapChange of{.put = {}, .removed = std::move(removed)};
+    if (!block.id.empty()) of.put.push_back(std::move(block));
+    return map.apply(std::move(of), ++revision, pool);
+  };
+  const auto leaves = [](const SceneSnapshot& scene) {
+    std::vector<std::shared_ptr<const Tile>> found;
+    for (const auto& tile : scene.tiles())
+      if (tile->child_mask == 0) found.push_back(tile);
+    return found;
+  };
+  // 6,400 vertices in a square of which the block covers a corner.
+  const auto before = leaves(*change(put("file", testing::terrain({.columns = 80, .rows = 80, .seed = 1}))));
+  const auto after = leaves(*change(put("new", testing::terrain({.columns = 10, .rows = 10, .seed = 2}))));
+  std::size_t kept = 0, smaller = 0;
+  for (const auto& leaf : after) {
+    kept += static_cast<std::size_t>(std::count(before.begin(), before.end(), leaf));
+    if (!leaf->vertex_block.empty()) {
+      ++smaller;
+      EXPECT_LE(leaf->owned_count, 2000u / kSmallerWhereChanging * 5 / 4);
+    }
+  }
+  EXPECT_GE(smaller, 1u);
+  EXPECT_GE(kept, before.size() - 1) << "leaves elsewhere stay as they are";
+  EXPECT_GT(after.size(), before.size());
+  const auto again = leaves(*change({}, {"new"}));
+  EXPECT_EQ(again.size(), before.size()) << "without the block they are as they were";
+}
+
 }  // namespace
 }  // namespace spectra::map
