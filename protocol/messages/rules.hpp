@@ -1,6 +1,7 @@
 #pragma once
 
 #include "protocol/messages/fields.hpp"
+#include "protocol/messages/frames_messages.hpp"
 #include "protocol/messages/fusion_messages.hpp"
 #include "protocol/messages/query_messages.hpp"
 #include "protocol/messages/scene_messages.hpp"
@@ -36,6 +37,18 @@ void rules(auto& fields, Is<HistogramReply> auto& histogram) {
 void rules(auto& fields, Is<ExtremesRequest> auto& request) {
   const auto is_part = [](const std::array<double, 4>& w) { return w[0] < w[2] && w[1] < w[3]; };
   fields.require("window", !request.window || is_part(*request.window), "left below right and top below bottom");
+}
+
+void rules(auto& fields, Is<FrameHead> auto& head) {
+  constexpr std::uint64_t kLargestSequence = (std::uint64_t{1} << 53U) - 1;
+  fields.require("sequence", head.sequence <= kLargestSequence, "an integer from 1 to 2^53 - 1");
+  const bool is_picture = head.kind == FramesKind::Picture;
+  fields.require("time", !is_picture || head.time, "the stamp of the picture, seconds");
+  fields.require("sensor", !is_picture || head.sensor, "depth, color or thermal");
+  fields.require("encoding", !is_picture || head.encoding, "png, jpeg or raw16");
+  const bool is_raw = is_picture && head.encoding == FrameEncoding::Raw16;
+  fields.require("width", !is_raw || head.width, "an integer from 1 to 8192");
+  fields.require("height", !is_raw || head.height, "an integer from 1 to 8192");
 }
 
 void rules(auto& fields, Is<ResumeRequest> auto& resume) {

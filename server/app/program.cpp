@@ -75,7 +75,8 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
   command
       ->add_option("--map", options.frames,
-                   "Begin with an empty map and fill it with what is made of a folder of frames")
+                   "Begin with an empty map and fill it with what is made of a folder of frames, or of those that a "
+                   "robot sends (live)")
       ->excludes(scene)
       ->excludes("--demo");
   command->add_flag("--demo-drive", options.is_demo_drive, "Begin with an empty map that a simulated robot fills")

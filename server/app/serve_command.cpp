@@ -25,6 +25,7 @@
 #include "server/net/tls_identity.hpp"
 #include "server/session/served_scene.hpp"
 #include "server/session/viewer_session.hpp"
+#include "server/sources/live_feed.hpp"
 #include "server/sources/map_feed.hpp"
 #include "server/sources/map_keeper.hpp"
 #include "server/stream/first_picture.hpp"
@@ -35,6 +36,8 @@ namespace {
 
 /// From the last connection to the end of the program.
 constexpr std::chrono::milliseconds kLongestEnd{250};
+/// In the place of a folder: a robot sends the frames.
+constexpr std::string_view kLiveFrames = "live";
 
 /// Every viewer needs a descriptor, and the usual limit of 1024 is only a default.
 void set_descriptor_limit(std::size_t wanted) {
@@ -157,7 +160,8 @@ int run_serve(const ServeOptions& options) {
   auto& setup = std::get<ServeSetup>(looked);
   set_descriptor_limit(options.limits.descriptors);
   std::optional<sources::FrameStream> frames;
-  if (options.frames) {
+  const bool takes_frames = options.frames == kLiveFrames;
+  if (options.frames && !takes_frames) {
     auto folder = mapping::FrameFolder::open(*options.frames);
     if (!folder) return fail(folder.error());
     frames = sources::stream_of(std::move(folder).value());
@@ -226,6 +230,18 @@ int run_serve(const ServeOptions& options) {
                                               options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01), map,
                                               served->robot, [&loader] { return loader.is_done(); });
   }
+  std::optional<sources::UnitHandOver> hand_over;
+  std::unique_ptr<sources::LiveFeed> live;
+  if (takes_frames) {
+    hand_over.emplace(map, "");
+    live = std::make_unique<sources::LiveFeed>(
+        options.voxel_m.value_or(0.01),
+        sources::LiveFeed::Sinks{
+            [&hand_over](auto units, const auto& moment) { return (*hand_over)(std::move(units), moment); },
+            [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); }},
+        [&loader] { return loader.is_done(); });
+    server->set_frame_receiver(*live);
+  }
   server->run();
   if (!loader.is_done()) {
     // Reading cannot be interrupted, and nothing of it needs to be put in order.
@@ -240,6 +256,8 @@ int run_serve(const ServeOptions& options) {
     std::_Exit(kDone);
   }).detach();
   feed.reset();
+  if (hand_over) hand_over->end();
+  live.reset();
   // Whoever still answers does so to a server that is there.
   map.end();
   served->pool.stop();

@@ -8,7 +8,7 @@
 #include "server/app/command_output.hpp"
 #include "server/mapping/map_ply.hpp"
 #include "server/net/request_target.hpp"
-#include "server/sources/map_feed.hpp"
+#include "server/sources/unit_hand_over.hpp"
 
 namespace spectra::app {
 namespace {
@@ -45,7 +45,7 @@ std::optional<std::string> UnitSender::send_changes(mapping::Mapper& mapper, con
   blocks.read = [&](std::size_t index, std::uint64_t max_block_bytes) -> std::optional<net::OutgoingBlock> {
     const mapping::PublishedUnit& unit = units[index];
     if (unit.mesh.triangles.empty()) return net::OutgoingBlock{net::target_text(unit.id, {}), ""};
-    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query({}, eye_)),
+    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query("", eye_)),
                              mapping::block_ply(unit.mesh, begin_unix_s)};
     if (block.ply.size() <= max_block_bytes) return block;
     ++refused_count_;

@@ -20,6 +20,8 @@ struct Frame {
   Picture16 depth;  ///< In units of the calibration.
   PictureRgb colour;
   Picture16 thermal;  ///< Centikelvin.
+  /// Of the colour picture, where it was taken at another time.
+  std::optional<double> colour_time_s;
 };
 
 /// Something that is wrong with a source or a frame, and how often it was.

@@ -96,7 +96,7 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
   }
   std::optional<ColourLook> colour;
   if (!frame.colour.empty() && settings_.use_colour) {
-    const PoseAnswer at = trajectory.at(frame.time_s + calibration_.colour->delay_s);
+    const PoseAnswer at = trajectory.at(frame.colour_time_s.value_or(frame.time_s) + calibration_.colour->delay_s);
     if (at.state == PoseState::Known) {
       colour.emplace(
           ColourLook{frame.colour, calibration_.colour->camera, at.pose * calibration_.colour->from_depth.inverse()});

@@ -108,7 +108,7 @@ bool decode(PngInput& input, PngRows& rows, bool want_rows) {
   return true;
 }
 
-Result<PngRows> read_png(const std::filesystem::path& file, const std::vector<unsigned char>& bytes) {
+Result<PngRows> read_png(const std::filesystem::path& file, std::span<const unsigned char> bytes) {
   auto input = std::make_unique<PngInput>();
   input->bytes = bytes;
   PngRows rows;
@@ -121,7 +121,7 @@ Result<PngRows> read_png(const std::filesystem::path& file, const std::vector<un
   return rows;
 }
 
-bool is_png(const std::vector<unsigned char>& bytes) {
+bool is_png(std::span<const unsigned char> bytes) {
   return bytes.size() > 8 && png_sig_cmp(bytes.data(), 0, 8) == 0;
 }
 
@@ -135,7 +135,7 @@ struct JpegHandle {
   }
 };
 
-Result<PictureRgb> read_jpeg(const std::filesystem::path& file, const std::vector<unsigned char>& bytes) {
+Result<PictureRgb> read_jpeg(const std::filesystem::path& file, std::span<const unsigned char> bytes) {
   const JpegHandle jpeg(tjInitDecompress());
   PictureRgb picture;
   int subsampling = 0, colours = 0;
@@ -167,8 +167,7 @@ Result<void> write_bytes(const std::filesystem::path& file, std::span<const unsi
 
 }  // namespace
 
-Result<Picture16> read_png16(const std::filesystem::path& file) {
-  BOOST_OUTCOME_TRY(const auto bytes, bytes_of(file));
+Result<Picture16> png16_of(std::span<const unsigned char> bytes, const std::string& file) {
   if (!is_png(bytes)) return failed(file, "is no PNG");
   BOOST_OUTCOME_TRY(const auto rows, read_png(file, bytes));
   if (!rows.is_wide_grey) return failed(file, "is no PNG of 16-bit grey");
@@ -177,14 +176,23 @@ Result<Picture16> read_png16(const std::filesystem::path& file) {
   return picture;
 }
 
-Result<PictureRgb> read_colour(const std::filesystem::path& file) {
-  BOOST_OUTCOME_TRY(const auto bytes, bytes_of(file));
+Result<PictureRgb> colour_of(std::span<const unsigned char> bytes, const std::string& file) {
   if (!is_png(bytes)) return read_jpeg(file, bytes);
   BOOST_OUTCOME_TRY(const auto rows, read_png(file, bytes));
   if (rows.is_wide_grey) return failed(file, "is a PNG of 16-bit grey, no colour picture");
   PictureRgb picture{rows.width, rows.height, std::vector<base::Rgb8>(rows.bytes.size() / 3)};
   std::memcpy(&picture.pixels.front().r, rows.bytes.data(), rows.bytes.size());
   return picture;
+}
+
+Result<Picture16> read_png16(const std::filesystem::path& file) {
+  BOOST_OUTCOME_TRY(const auto bytes, bytes_of(file));
+  return png16_of(bytes, file.string());
+}
+
+Result<PictureRgb> read_colour(const std::filesystem::path& file) {
+  BOOST_OUTCOME_TRY(const auto bytes, bytes_of(file));
+  return colour_of(bytes, file.string());
 }
 
 Result<PictureFloat> read_pfm(const std::filesystem::path& file) {

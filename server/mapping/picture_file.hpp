@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ using PictureFloat = Picture<float>;
 /// that names the file, and no more memory is taken than the head of the file justifies.
 base::Result<Picture16> read_png16(const std::filesystem::path& file);    ///< Grey, 16 bits.
 base::Result<PictureRgb> read_colour(const std::filesystem::path& file);  ///< JPEG, or PNG of 8 bits a channel.
+/// The same of bytes in memory, which a message calls `name`.
+base::Result<Picture16> png16_of(std::span<const unsigned char> bytes, const std::string& name);
+base::Result<PictureRgb> colour_of(std::span<const unsigned char> bytes, const std::string& name);
 base::Result<PictureFloat> read_pfm(
     const std::filesystem::path& file);  ///< One channel; rows from the bottom in the file.
 

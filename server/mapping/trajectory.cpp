@@ -79,6 +79,15 @@ void Trajectory::change_to(bool is_world_to_camera, const Eigen::Isometry3d& cam
   for (Eigen::Isometry3d& pose : poses_) pose = (is_world_to_camera ? pose.inverse() : pose) * own_from_camera;
 }
 
+void Trajectory::forget_before(double time_s) {
+  const auto first = std::lower_bound(times_.begin(), times_.end(), time_s) - times_.begin();
+  // All but the two before.
+  const std::ptrdiff_t gone = std::max<std::ptrdiff_t>(0, first - 2);
+  times_.erase(times_.begin(), times_.begin() + gone);
+  poses_.erase(poses_.begin(), poses_.begin() + gone);
+  jumps_.erase(jumps_.begin(), jumps_.begin() + gone);
+}
+
 bool Trajectory::is_near(std::size_t first) const {
   return times_[first + 1] - times_[first] <= kMaxGapSeconds + kSameMoment;
 }

@@ -53,6 +53,9 @@ class Trajectory {
   /// pose of exactly this moment, within a microsecond.
   PoseAnswer at(double time_s) const;
 
+  /// Takes out what is earlier; the last one before stays, so that what is between can be told.
+  void forget_before(double time_s);
+
   std::size_t size() const { return times_.size(); }
   double begin_s() const { return times_.front(); }
   double end_s() const { return times_.back(); }

@@ -20,9 +20,11 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/frame_message.hpp"
 #include "protocol/ingest_message.hpp"
 #include "server/net/block_refusal.hpp"
 #include "server/net/block_room.hpp"
+#include "server/net/frames_session.hpp"
 #include "server/net/ingest_session.hpp"
 #include "server/net/request_right.hpp"
 #include "server/net/session_api.hpp"
@@ -330,6 +332,11 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
     co_return false;
   }
 
+  if (target.path == "/frames" && context_.frames != nullptr) {
+    co_await serve_frames(std::move(request));
+    co_return false;
+  }
+
   const HttpRequest checked{std::move(target), joined(request, http::field::if_none_match),
                             joined(request, http::field::accept_encoding)};
   const HttpReply reply = co_await answer(checked);
@@ -365,6 +372,22 @@ asio::awaitable<void> HttpConnection::serve_sender(Request request) {
   }
   is_handed_over_ = true;
   const auto session = std::make_shared<IngestSession>(std::move(stream_), context_, *who_.identity);
+  context_.remove(this);
+  co_await session->run(std::move(request));
+}
+
+asio::awaitable<void> HttpConnection::serve_frames(Request request) {
+  auto refused = upgrade_refusal_of(request, protocol::kFramesProtocol);
+  if (!refused && !context_.frames->begin()) {
+    refused = text_reply(503, "another robot sends frames already, or the map is not open yet\n");
+    refused->headers.emplace_back("Retry-After", "1");
+  }
+  if (refused) {
+    co_await refuse_upgrade(request, *refused);
+    co_return;
+  }
+  is_handed_over_ = true;
+  const auto session = std::make_shared<FramesSession>(std::move(stream_), context_, *context_.frames, *who_.identity);
   context_.remove(this);
   co_await session->run(std::move(request));
 }

@@ -39,6 +39,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   /// The connection becomes a session, or the upgrade is refused; it ends in any case.
   boost::asio::awaitable<void> serve_viewer(Request request, const RequestTarget& target);
   boost::asio::awaitable<void> serve_sender(Request request);
+  boost::asio::awaitable<void> serve_frames(Request request);
   boost::asio::awaitable<void> refuse_upgrade(const Request& request, const HttpReply& reply);
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);

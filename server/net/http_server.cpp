@@ -251,6 +251,10 @@ HttpServer::HttpServer(NetOptions options, HttpHandler http, ViewerClientFactory
 
 HttpServer::~HttpServer() = default;
 
+void HttpServer::set_frame_receiver(FrameReceiver& receiver) {
+  state_->context.frames = &receiver;
+}
+
 void HttpServer::run() {
   State& state = *state_;
   if (state.context.options.stop_on_signals) {

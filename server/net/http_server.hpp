@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/net/block_change.hpp"
+#include "server/net/frame_receiver.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
 #include "server/net/net_options.hpp"
@@ -37,6 +38,9 @@ class HttpServer {
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
+
+  /// Takes frames over /frames from now on. Before run(); `receiver` outlives it.
+  void set_frame_receiver(FrameReceiver& receiver);
 
   /// Serves until stop(), with NetOptions::io_thread_count threads, the caller's among them.
   void run();

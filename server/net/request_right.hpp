@@ -25,6 +25,7 @@ inline access::Right right_of(std::string_view path, bool is_change) {
   constexpr Row kRows[] = {
       {"/ws", access::Right::Watch},
       {"/ingest", access::Right::ChangeMap},
+      {"/frames", access::Right::ChangeMap},
       {"/metrics", access::Right::Operate},
       {kCodesPath, access::Right::Operate},
       {kSessionPath, access::Right::Nothing},

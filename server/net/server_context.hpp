@@ -12,6 +12,7 @@
 
 #include "server/net/block_change.hpp"
 #include "server/net/connection_places.hpp"
+#include "server/net/frame_receiver.hpp"
 #include "server/net/host_list.hpp"
 #include "server/net/http_types.hpp"
 #include "server/net/net_metrics.hpp"
@@ -47,6 +48,8 @@ class ServerContext {
   const HttpHandler http;
   const ViewerClientFactory viewers;
   const BlockHandler blocks;  ///< Empty: there is no /ingest.
+  /// Null: there is no /frames. Set before anything is served.
+  FrameReceiver* frames = nullptr;
   StaticFiles& files;
   NetMetrics& metrics;
   HostList hosts;

@@ -1,6 +1,5 @@
 #include "server/sources/map_feed.hpp"
 
-#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 
 #include "server/mapping/map_ply.hpp"
 #include "server/mapping/simulated_drive.hpp"
-#include "server/sources/block_options.hpp"
 
 namespace spectra::sources {
 namespace {
@@ -52,23 +50,10 @@ FrameStream demo_drive_stream() {
   return stream;
 }
 
-double unix_now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_s) {
   const auto vector = [](const Eigen::Vector3d& v) { return base::Vec3d{v.x(), v.y(), v.z()}; };
   return {at_unix_s, vector(world_from_camera.translation()), vector(world_from_camera.linear().col(2)),
           vector(-world_from_camera.linear().col(1)), false};
-}
-
-std::vector<std::pair<std::string, std::string>> unit_query(const FrameStream& frames, const Eigen::Vector3d& eye) {
-  std::vector<std::pair<std::string, std::string>> query{
-      {"observed_at", fmt::format("{:.3f}", unix_now_s())},
-      {"sensor", fmt::format("{:.3f},{:.3f},{:.3f}", eye.x(), eye.y(), eye.z())},
-      {"scale", "1"}};
-  if (!frames.up.empty()) query.emplace_back("up", frames.up);
-  return query;
 }
 
 void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
@@ -108,7 +93,7 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
 MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack& robot, std::function<bool()> may_begin)
     : frames_(std::move(frames)),
       voxel_m_(voxel_m),
-      map_(map),
+      hand_over_(map, frames_.up),
       robot_(robot),
       thread_([this, may_begin = std::move(may_begin)] {
         try {
@@ -119,13 +104,13 @@ MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack&
       }) {}
 
 MapFeed::~MapFeed() {
-  state_->is_over = true;
+  hand_over_.end();
   thread_.join();
 }
 
 void MapFeed::work(const std::function<bool()>& may_begin) {
   while (!may_begin()) {
-    if (state_->is_over) return;
+    if (hand_over_.is_over()) return;
     std::this_thread::sleep_for(kWait);
   }
   jobs::WorkerPool pool(1);
@@ -135,9 +120,9 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   mapping::FaultLog faults;
   FeedRun run;
   run.voxel_m = voxel_m_;
-  run.is_over = [this] { return state_->is_over.load(); };
+  run.is_over = [this] { return hand_over_.is_over(); };
   run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
-    return hand_over(std::move(units), moment);
+    return hand_over_(std::move(units), moment);
   };
   run.moved = [this](const RobotPose& pose, bool is_last) { robot_.moved(pose, is_last); };
   run_feed(frames_, run, mapper, pool, faults);
@@ -146,35 +131,6 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   }
   spdlog::info("mapping is done: {} depth and {} thermal frames, {} blocks of voxels", mapper.figures().depth_frames,
                mapper.figures().thermal_frames, mapper.map().block_count());
-}
-
-bool MapFeed::hand_over(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
-  for (mapping::PublishedUnit& unit : units) {
-    // A map that is behind is waited for: what is told then is newer.
-    while (state_->under_way >= kUnderWay) {
-      if (state_->is_over) return false;
-      std::this_thread::sleep_for(kWait);
-    }
-    ++state_->under_way;
-    const auto done = [state = state_, id = unit.id](const auto& outcome) {
-      --state->under_way;
-      const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
-      if (refusal != nullptr && !state->is_over) spdlog::warn("{} is refused: {}", id, refusal->reason);
-    };
-    if (unit.mesh.triangles.empty()) {
-      map_.remove(unit.id, done, MapKeeper::WhenFull::Take);
-      continue;
-    }
-    auto block = incoming_block(unit.id, unit_query(frames_, moment.eye));
-    if (!block) {
-      --state_->under_way;
-      spdlog::error("{}: {}", unit.id, block.error().message);
-      return false;
-    }
-    block.value().ply = std::make_shared<const std::string>(mapping::block_ply(unit.mesh, moment.begin_unix_s));
-    map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
-  }
-  return !state_->is_over;
 }
 
 }  // namespace spectra::sources

@@ -16,6 +16,7 @@
 
 #include "protocol/codec/draco_codec.hpp"
 #include "protocol/incoming_message.hpp"
+#include "protocol/messages/frames_messages.hpp"
 #include "protocol/messages/fusion_messages.hpp"
 #include "protocol/messages/ingest_messages.hpp"
 #include "protocol/messages/quality_messages.hpp"
@@ -82,6 +83,9 @@ const std::map<std::string, MethodPassages> kMethods{
     {"stream.stats", {through<StreamStats>(), unchanged}},
     {"robot.moved", {through<RobotMoved>(), unchanged}},
     {"status", {through<Status>(), unchanged}},
+    {"frames.hello", {through<FramesHello>(), unchanged}},
+    {"frames.taken", {through<FramesTaken>(), unchanged}},
+    {"frames.refused", {through<FramesRefused>(), unchanged}},
     {"ingest.hello", {through<IngestHello>(), unchanged}},
     {"ingest.acknowledged", {through<IngestAcknowledged>(), unchanged}},
     {"ingest.refused", {through<IngestRefused>(), unchanged}},

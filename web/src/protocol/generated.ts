@@ -134,6 +134,80 @@ export interface FactsRequest {
   hues?: boolean;
 }
 
+export type FrameEncoding = 'png' | 'jpeg' | 'raw16';
+
+/** The head of a message; what it speaks of stands behind it. */
+export interface FrameHead {
+  kind: FramesKind;
+  /** At most 2^53 - 1; chosen by the sender, the answer names it. */
+  sequence: number;
+  /** Of a picture: its stamp, seconds. */
+  time?: number;
+  /** Of a picture. */
+  sensor?: FrameSensor;
+  /** Of a picture. */
+  encoding?: FrameEncoding;
+  /** Of a raw picture, pixels. */
+  width?: number;
+  /** Of a raw picture, pixels. */
+  height?: number;
+  /** Of the camera, and in the sense, that the calibration says. */
+  poses?: StampedPose[];
+}
+
+export type FrameSensor = 'depth' | 'color' | 'thermal';
+
+/** What may have been sent since the connection began; only ever grows. */
+export interface FramesCredit {
+  /** Messages. */
+  messages: number;
+  /** Of messages; the last one may go beyond it. */
+  bytes: number;
+}
+
+/** Params of the notification frames.hello. */
+export interface FramesHello {
+  /** spectra.frames.v1 */
+  protocol: string;
+  limits: FramesLimits;
+  credit: FramesCredit;
+}
+
+/** what a message of /frames speaks of */
+export type FramesKind = 'calibration' | 'poses' | 'picture' | 'end';
+
+/** What one message may hold. */
+export interface FramesLimits {
+  /** A larger one ends the connection (1009). */
+  max_message_bytes: number;
+  /** Of the head. */
+  max_head_bytes: number;
+}
+
+/** Params of the notification frames.refused: the map is as it was. */
+export interface FramesRefused {
+  /** Of the message; 0: its head could not be read. */
+  sequence: number;
+  /** snake_case, stable. */
+  code: string;
+  /** May be empty. */
+  field: string;
+  /** One sentence for a person. */
+  reason: string;
+  credit: FramesCredit;
+}
+
+/** Params of the notification frames.taken. */
+export interface FramesTaken {
+  /** Of the message. */
+  sequence: number;
+  /** The mapper had no time for the picture. */
+  skipped?: boolean;
+  /** No more than so many are wanted, of all sensors together; absent: as many as come. */
+  pictures_per_s?: number;
+  credit: FramesCredit;
+}
+
 /** How the age of what was seen is shown. */
 export interface FusionAge {
   mode: AgeMode;
@@ -608,6 +682,9 @@ export interface ServerInfo {
   name: string;
   version: string;
 }
+
+/** stamp in seconds, position in metres, orientation x y z w */
+export type StampedPose = number[];
 
 /** Params of the notification status; the same id replaces, message null clears. */
 export interface Status {

@@ -54,7 +54,7 @@ const optionalFields = new Set([
   'lost',
 ]);
 /** What a viewer sends, or only a sender of blocks is sent. */
-const notForViewers = ['camera.set', 'stream.ack', 'ingest.'];
+const notForViewers = ['camera.set', 'stream.ack', 'ingest.', 'frames.'];
 const fromServer = list('messages/', '.json').filter(
   (name) => !name.includes('.request.') && !notForViewers.some((start) => name.startsWith(start)),
 );

@@ -1,0 +1,405 @@
+#include "server/sources/live_feed.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <span>
+
+#include "server/mapping/map_ply.hpp"
+#include "server/mapping/picture_file.hpp"
+#include "server/sources/map_feed.hpp"
+
+namespace spectra::sources {
+namespace {
+
+using mapping::FaultKind;
+using protocol::FrameEncoding;
+using protocol::FrameSensor;
+using protocol::FramesKind;
+
+constexpr std::chrono::milliseconds kLookEvery{50};
+constexpr double kPublishEveryS = 0.5;
+/// After a picture was skipped fewer are asked for as long.
+constexpr double kOverloadS = 2;
+/// Of what it could do that is asked for, so that it catches up.
+constexpr double kAskedShare = 0.9;
+/// A clock of another sender that is behind goes on so much later.
+constexpr double kNewClockGapS = 1;
+constexpr double kLostAfterS = 1;
+constexpr std::size_t kManyPoses = 4096;
+
+double steady_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string name_of(FrameSensor sensor) {
+  return sensor == FrameSensor::Depth ? "depth" : sensor == FrameSensor::Color ? "color" : "thermal";
+}
+
+std::string code_of(FaultKind kind) {
+  switch (kind) {
+    case FaultKind::NoPose:
+      return "no_pose";
+    case FaultKind::JumpingPose:
+      return "jumping_pose";
+    case FaultKind::UnfittingPose:
+      return "unfitting_pose";
+    case FaultKind::WrongSize:
+      return "wrong_size";
+    case FaultKind::DamagedFile:
+      return "damaged_picture";
+    default:
+      return "not_mapped";
+  }
+}
+
+std::optional<Eigen::Isometry3d> pose_of(const std::vector<double>& v) {
+  if (v.size() != 8) return std::nullopt;
+  const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
+  const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
+  if (!is_finite || !(std::abs(rotation.norm() - 1) <= 0.05)) return std::nullopt;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
+  return pose;
+}
+
+std::span<const unsigned char> body_of(const net::IncomingFrame& frame) {
+  const auto* data = std::bit_cast<const unsigned char*>(frame.message.data());
+  return {data + frame.body_begin, frame.message.size() - frame.body_begin};
+}
+
+base::Result<mapping::Picture16> picture16_of(const net::IncomingFrame& frame, const std::string& name) {
+  const auto body = body_of(frame);
+  if (frame.head.encoding == FrameEncoding::Png) return mapping::png16_of(body, name);
+  if (frame.head.encoding == FrameEncoding::Jpeg) {
+    return base::failure(base::ErrorCode::FileUnreadable, name + ": a JPEG has no 16 bits; png or raw16 is wanted");
+  }
+  mapping::Picture16 picture;
+  picture.width = *frame.head.width;
+  picture.height = *frame.head.height;
+  const std::size_t pixels = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+  if (body.size() != 2 * pixels) {
+    return base::failure(base::ErrorCode::FileUnreadable, name + ": has " + std::to_string(body.size()) +
+                                                              " bytes, and " + std::to_string(2 * pixels) +
+                                                              " are wanted of its width and height");
+  }
+  picture.pixels.resize(pixels);
+  for (std::size_t i = 0; i < pixels; ++i)
+    picture.pixels[i] = static_cast<std::uint16_t>(body[2 * i] | body[2 * i + 1] << 8U);
+  return picture;
+}
+
+base::Result<mapping::PictureRgb> colour_picture_of(const net::IncomingFrame& frame, const std::string& name) {
+  if (frame.head.encoding != FrameEncoding::Raw16) return mapping::colour_of(body_of(frame), name);
+  return base::failure(base::ErrorCode::FileUnreadable, name + ": is no colour picture; png or jpeg is wanted");
+}
+
+}  // namespace
+
+LiveFeed::LiveFeed(double voxel_m, Sinks sinks, std::function<bool()> may_begin)
+    : voxel_m_(voxel_m), sinks_(std::move(sinks)), may_begin_(std::move(may_begin)), thread_([this] {
+        try {
+          work();
+        } catch (const std::exception& error) {
+          spdlog::error("mapping ended: {}", error.what());
+        }
+      }) {}
+
+LiveFeed::~LiveFeed() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_over_ = true;
+  }
+  has_work_.notify_all();
+  thread_.join();
+}
+
+bool LiveFeed::begin() {
+  if (!may_begin_()) return false;
+  const std::lock_guard lock(mutex_);
+  if (has_sender_ || is_over_) return false;
+  has_sender_ = true;
+  is_flushing_ = false;
+  shift_s_.reset();
+  pose_end_s_.reset();
+  last_s_ = {};
+  return true;
+}
+
+void LiveFeed::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    has_sender_ = false;
+    is_flushing_ = true;
+    for (const mapping::FrameFault& fault : faults_.all()) {
+      if (fault.count > 1) spdlog::warn("{} ({} times so far)", fault.what, fault.count);
+    }
+    if (skipped_count_ > 0) spdlog::warn("{} pictures were skipped so far: there was no time for them", skipped_count_);
+  }
+  has_work_.notify_all();
+}
+
+mapping::FaultLog LiveFeed::faults() const {
+  const std::lock_guard lock(mutex_);
+  return faults_;
+}
+
+std::size_t LiveFeed::skipped_count() const {
+  const std::lock_guard lock(mutex_);
+  return skipped_count_;
+}
+
+void LiveFeed::note(FaultKind kind, const std::string& what) {
+  if (faults_.of(kind).count == 0) spdlog::warn("{}; said once", what);
+  faults_.add(kind, what);
+}
+
+net::BlockRefusal LiveFeed::refused(FaultKind kind, std::string code, std::string field, const std::string& reason) {
+  note(kind, reason);
+  return {400, std::move(code), std::move(field), reason, ""};
+}
+
+double LiveFeed::on_own_clock(double stamp_s) {
+  if (!shift_s_) shift_s_ = newest_s_ && stamp_s < *newest_s_ ? *newest_s_ + kNewClockGapS - stamp_s : 0;
+  return stamp_s + *shift_s_;
+}
+
+net::FrameOutcome LiveFeed::take_calibration(const net::IncomingFrame& frame) {
+  const std::string text = frame.message.substr(frame.body_begin);
+  if (calibration_ && text == calibration_text_) return net::FrameTaken{};
+  if (calibration_) {
+    return refused(FaultKind::NoCalibration, "other_calibration", "body",
+                   "the calibration is another than that of the map, which stays; start the server anew for it");
+  }
+  auto read = mapping::calibration_from_text(text, "the calibration");
+  if (!read) return refused(FaultKind::NoCalibration, "bad_calibration", "body", read.error().message);
+  calibration_ = std::move(read).value();
+  calibration_text_ = text;
+  return net::FrameTaken{};
+}
+
+net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
+  if (!calibration_) {
+    return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
+  }
+  std::optional<net::BlockRefusal> refusal;
+  for (const auto& values : frame.head.poses) {
+    const auto pose = pose_of(values);
+    if (!pose) {
+      refusal = refused(FaultKind::UnreadablePose, "bad_pose", "poses",
+                        "a pose is not eight finite numbers with a rotation in the last four");
+      continue;
+    }
+    const double time_s = on_own_clock(values[0]);
+    if (pose_end_s_ && !(time_s > *pose_end_s_)) {
+      refusal = refused(FaultKind::BackwardPose, "backward_pose", "poses", "a pose is not later than the one before");
+      continue;
+    }
+    pose_end_s_ = time_s;
+    newest_s_ = std::max(newest_s_.value_or(time_s), time_s);
+    const Eigen::Isometry3d own = calibration_->is_world_to_camera ? pose->inverse() : *pose;
+    new_poses_.emplace_back(time_s, own * calibration_->depth_from_pose.inverse());
+  }
+  if (refusal) return *refusal;
+  return net::FrameTaken{};
+}
+
+std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::FrameHead& head, double time_s) {
+  const std::string name = "a " + name_of(*head.sensor) + " picture ";
+  if (!calibration_) {
+    return refused(FaultKind::NoCalibration, "no_calibration", "", name + "has come before the calibration");
+  }
+  const bool has_camera =
+      *head.sensor == FrameSensor::Depth ||
+      (*head.sensor == FrameSensor::Color ? calibration_->colour.has_value() : calibration_->thermal.has_value());
+  if (!has_camera) {
+    return refused(FaultKind::NoCalibration, "no_calibration", "sensor",
+                   "the calibration has no " + name_of(*head.sensor) + " camera");
+  }
+  if (pose_end_s_ && std::abs(time_s - *pose_end_s_) > kFarthestStampS) {
+    return refused(FaultKind::NoPose, "no_pose", "time", name + "has a stamp more than 10 s from the newest pose");
+  }
+  return std::nullopt;
+}
+
+std::optional<net::FrameOutcome> LiveFeed::take_picture(net::IncomingFrame& frame, Done& done, Answers& answers) {
+  const protocol::FrameHead& head = frame.head;
+  const double time_s = on_own_clock(*head.time);
+  if (auto refusal = refusal_of_picture(head, time_s)) return std::move(*refusal);
+  const Rank rank = *head.sensor == FrameSensor::Color   ? Rank::Colour
+                    : *head.sensor == FrameSensor::Depth ? Rank::Depth
+                                                         : Rank::Thermal;
+  auto& last_s = last_s_[static_cast<std::size_t>(rank)];
+  if (last_s && !(time_s > *last_s)) {
+    return refused(FaultKind::BackwardClock, "backward_clock", "time",
+                   "a " + name_of(*head.sensor) + " picture is not later than the one before");
+  }
+  last_s = time_s;
+  newest_s_ = std::max(newest_s_.value_or(time_s), time_s);
+  waiting_.emplace(Key{time_s, rank}, Waiting{std::move(frame), std::move(done)});
+  if (waiting_.size() <= kMostWaiting) return std::nullopt;
+  // The picture itself is not lost among those of another sensor: the one that sends most gives way.
+  std::array<std::size_t, 3> counts{};
+  for (const auto& [key, item] : waiting_) ++counts[static_cast<std::size_t>(key.second)];
+  const auto most = std::max_element(counts.begin(), counts.end()) - counts.begin();
+  const auto oldest = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& entry) {
+    return static_cast<std::ptrdiff_t>(entry.first.second) == most;
+  });
+  if (skipped_count_ == 0) spdlog::warn("pictures come faster than they can be mapped: some are skipped; said once");
+  ++skipped_count_;
+  last_skip_s_ = steady_s();
+  answers.emplace_back(std::move(oldest->second.done), net::FrameTaken{true, wanted_rate()});
+  waiting_.erase(oldest);
+  return std::nullopt;
+}
+
+std::optional<double> LiveFeed::wanted_rate() const {
+  if (picture_s_ <= 0 || steady_s() - last_skip_s_ > kOverloadS) return std::nullopt;
+  return kAskedShare / picture_s_;
+}
+
+void LiveFeed::take(net::IncomingFrame frame, Done done) {
+  Answers answers;
+  {
+    const std::lock_guard lock(mutex_);
+    std::optional<net::FrameOutcome> outcome;
+    last_arrival_s_ = steady_s();
+    switch (frame.head.kind) {
+      case FramesKind::Calibration:
+        outcome = take_calibration(frame);
+        break;
+      case FramesKind::Poses:
+        outcome = take_poses(frame);
+        break;
+      case FramesKind::Picture:
+        outcome = take_picture(frame, done, answers);
+        break;
+      case FramesKind::End:
+        is_flushing_ = true;
+        outcome = net::FrameTaken{};
+        break;
+    }
+    if (outcome) answers.emplace_back(std::move(done), std::move(*outcome));
+  }
+  has_work_.notify_all();
+  for (auto& [answer, outcome] : answers) answer(std::move(outcome));
+}
+
+bool LiveFeed::is_ready() const {
+  if (waiting_.empty()) return false;
+  const bool is_quiet = steady_s() - last_arrival_s_ > kPatienceS;
+  if (is_flushing_ || is_quiet || waiting_.size() >= kMostWaiting) return true;
+  const auto& [time_s, rank] = waiting_.begin()->first;
+  const double delay_s = rank == Rank::Depth                              ? calibration_->depth.delay_s
+                         : rank == Rank::Colour && calibration_->colour   ? calibration_->colour->delay_s
+                         : rank == Rank::Thermal && calibration_->thermal ? calibration_->thermal->delay_s
+                                                                          : 0;
+  return (pose_end_s_ && *pose_end_s_ >= time_s + delay_s) || (newest_s_ && *newest_s_ - time_s > kPatienceS);
+}
+
+void LiveFeed::work() {
+  double last_published_s = steady_s();
+  for (;;) {
+    std::optional<std::pair<Key, Waiting>> next;
+    std::optional<double> pose_end_s, newest_s;
+    {
+      std::unique_lock lock(mutex_);
+      has_work_.wait_for(lock, kLookEvery, [&] { return is_over_ || is_ready(); });
+      if (is_over_) return;
+      if (!mapper_ && calibration_) {
+        mapping::MapperSettings settings;
+        settings.voxel_m = voxel_m_;
+        mapper_.emplace(*calibration_, settings, pool_);
+      }
+      for (const auto& [time_s, pose] : new_poses_) trajectory_.add(time_s, pose);
+      new_poses_.clear();
+      pose_end_s = pose_end_s_;
+      newest_s = newest_s_;
+      if (is_ready()) {
+        next.emplace(waiting_.begin()->first, std::move(waiting_.begin()->second));
+        waiting_.erase(waiting_.begin());
+      } else if (waiting_.empty() && has_sender_) {
+        is_flushing_ = false;
+      }
+    }
+    if (mapper_ && pose_end_s) {
+      const mapping::PoseAnswer latest = trajectory_.at(*pose_end_s);
+      moment_.eye = latest.pose.translation();
+      moment_.begin_unix_s = mapping::unix_begin_s(mapper_->begin_s(), newest_s.value_or(0), unix_now_s());
+      RobotPose robot = robot_pose(latest.pose, moment_.begin_unix_s + *pose_end_s - mapper_->begin_s());
+      robot.is_lost = newest_s && *newest_s - *pose_end_s > kLostAfterS;
+      if (latest.state != mapping::PoseState::Unknown) sinks_.moved(robot, false);
+    }
+    if (next) {
+      const double begun_s = steady_s();
+      net::FrameOutcome outcome = map_picture(next->first, next->second.frame);
+      {
+        const std::lock_guard lock(mutex_);
+        const double took_s = steady_s() - begun_s;
+        picture_s_ = picture_s_ > 0 ? 0.9 * picture_s_ + 0.1 * took_s : took_s;
+        if (auto* taken = std::get_if<net::FrameTaken>(&outcome)) taken->pictures_per_s = wanted_rate();
+      }
+      next->second.done(std::move(outcome));
+    }
+    const bool is_due = steady_s() - last_published_s >= kPublishEveryS;
+    if (has_changed_ && is_due) {
+      last_published_s = steady_s();
+      has_changed_ = false;
+      if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_), moment_)) return;
+    }
+  }
+}
+
+mapping::Frame LiveFeed::decoded(const Key& key, const net::IncomingFrame& frame, mapping::FaultLog& faults) {
+  const auto& [time_s, rank] = key;
+  const std::string name = "a " + name_of(*frame.head.sensor) + " picture";
+  mapping::Frame result;
+  result.time_s = time_s;
+  const auto take = [&](auto read, const mapping::CameraModel& camera, auto& into) {
+    if (!read) {
+      faults.add(FaultKind::DamagedFile, read.error().message);
+    } else if (read.value().width != camera.width || read.value().height != camera.height) {
+      faults.add(FaultKind::WrongSize, name + " has " + std::to_string(read.value().width) + " x " +
+                                           std::to_string(read.value().height) + " pixels, and its camera has " +
+                                           std::to_string(camera.width) + " x " + std::to_string(camera.height));
+    } else {
+      into = std::move(read).value();
+    }
+  };
+  if (rank == Rank::Depth) take(picture16_of(frame, name), calibration_->depth.camera, result.depth);
+  if (rank == Rank::Thermal) take(picture16_of(frame, name), calibration_->thermal->camera, result.thermal);
+  if (rank == Rank::Colour) take(colour_picture_of(frame, name), calibration_->colour->camera, result.colour);
+  return result;
+}
+
+net::FrameOutcome LiveFeed::map_picture(const Key& key, const net::IncomingFrame& incoming) {
+  mapping::FaultLog faults;
+  mapping::Frame frame = decoded(key, incoming, faults);
+  if (key.second == Rank::Colour) {
+    colour_ = std::move(frame.colour);
+    colour_s_ = key.first;
+  } else {
+    if (!frame.depth.empty() && !colour_.empty() && std::abs(key.first - colour_s_) <= kColourAgeS) {
+      frame.colour = std::move(colour_);
+      frame.colour_time_s = colour_s_;
+      colour_ = {};
+    }
+    mapper_->fuse(frame, trajectory_, faults);
+    has_changed_ = true;
+  }
+  if (trajectory_.size() > kManyPoses) trajectory_.forget_before(key.first - kFarthestStampS);
+  const auto wrong = std::find_if(faults.all().begin(), faults.all().end(),
+                                  [](const mapping::FrameFault& fault) { return fault.count > 0; });
+  if (wrong == faults.all().end()) return net::FrameTaken{};
+  const auto kind = static_cast<FaultKind>(wrong - faults.all().begin());
+  const std::lock_guard lock(mutex_);
+  return refused(kind, code_of(kind), kind == FaultKind::NoPose ? "time" : "body", wrong->what);
+}
+
+}  // namespace spectra::sources

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/mapping/frame_folder.hpp"
+#include "server/mapping/mapper.hpp"
+#include "server/mapping/unit_publisher.hpp"
+#include "server/net/frame_receiver.hpp"
+#include "server/sources/robot_track.hpp"
+#include "server/sources/unit_hand_over.hpp"
+
+namespace spectra::sources {
+
+/// Maps the frames that a robot sends, in a thread of its own. A picture waits until poses of its moment are there, but no longer than until
+/// something kPatienceS later has come, or nothing for as long; pictures are taken in the order of their time. When more than kMostWaiting wait, the oldest of the sensor
+/// that has most of them is skipped, and fewer are asked for. What is wrong with a message is answered, said once in the log, and counted.
+class LiveFeed final : public net::FrameReceiver {
+ public:
+  static constexpr double kPatienceS = 0.3;
+  static constexpr std::size_t kMostWaiting = 24;
+  /// A stamp that is farther than this from every pose cannot be meant.
+  static constexpr double kFarthestStampS = 10;
+  /// A depth picture takes its colours from one that is at most so much older.
+  static constexpr double kColourAgeS = 0.15;
+
+  struct Sinks {
+    /// As FeedRun::hand_over.
+    std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment&)> hand_over;
+    std::function<void(const RobotPose& pose, bool is_last)> moved;
+  };
+
+  /// Takes nobody's frames before `may_begin`.
+  LiveFeed(double voxel_m, Sinks sinks, std::function<bool()> may_begin);
+  ~LiveFeed() override;  ///< Ends it after the picture that is being fused; what waits is answered by nobody.
+  LiveFeed(const LiveFeed&) = delete;
+  LiveFeed& operator=(const LiveFeed&) = delete;
+
+  bool begin() override;
+  void take(net::IncomingFrame frame, std::function<void(net::FrameOutcome)> done) override;
+  void end() override;
+
+  /// What was wrong so far, and how many pictures were skipped.
+  mapping::FaultLog faults() const;
+  std::size_t skipped_count() const;
+
+ private:
+  using Done = std::function<void(net::FrameOutcome)>;
+  /// Sensors in the order in which pictures of one time are taken.
+  enum class Rank { Colour, Depth, Thermal };
+  struct Waiting {
+    net::IncomingFrame frame;
+    Done done;
+  };
+  using Key = std::pair<double, Rank>;
+  using Answers = std::vector<std::pair<Done, net::FrameOutcome>>;
+
+  // Under the lock.
+  net::FrameOutcome take_calibration(const net::IncomingFrame& frame);
+  net::FrameOutcome take_poses(const net::IncomingFrame& frame);
+  /// Nothing: it waits.
+  std::optional<net::FrameOutcome> take_picture(net::IncomingFrame& frame, Done& done, Answers& answers);
+  std::optional<net::BlockRefusal> refusal_of_picture(const protocol::FrameHead& head, double time_s);
+  net::BlockRefusal refused(mapping::FaultKind kind, std::string code, std::string field, const std::string& reason);
+  void note(mapping::FaultKind kind, const std::string& what);
+  double on_own_clock(double stamp_s);
+  bool is_ready() const;
+  std::optional<double> wanted_rate() const;
+
+  void work();
+  net::FrameOutcome map_picture(const Key& key, const net::IncomingFrame& frame);
+  mapping::Frame decoded(const Key& key, const net::IncomingFrame& frame, mapping::FaultLog& faults);
+
+  const double voxel_m_;
+  const Sinks sinks_;
+  const std::function<bool()> may_begin_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable has_work_;
+  bool is_over_ = false;
+  bool has_sender_ = false;
+  bool is_flushing_ = false;  ///< Nobody is waited for any more.
+  std::string calibration_text_;
+  std::optional<mapping::Calibration> calibration_;
+  std::multimap<Key, Waiting> waiting_;
+  std::vector<std::pair<double, Eigen::Isometry3d>> new_poses_;
+  std::optional<double> shift_s_;                ///< Added to the stamps of this sender, once it has said one.
+  std::optional<double> newest_s_;               ///< Of all stamps.
+  std::optional<double> pose_end_s_;             ///< Of this sender.
+  std::array<std::optional<double>, 3> last_s_;  ///< Of this sender's sensors, by rank.
+  mapping::FaultLog faults_;
+  std::size_t skipped_count_ = 0;
+  double last_skip_s_ = -1e9;  ///< On a steady clock.
+  double last_arrival_s_ = 0;  ///< The same, of any message.
+  double picture_s_ = 0;       ///< What a picture takes, in the mean of the last ones.
+
+  // Of the thread.
+  jobs::WorkerPool pool_{1};
+  std::optional<mapping::Mapper> mapper_;
+  mapping::Trajectory trajectory_;
+  mapping::UnitPublisher publisher_;
+  mapping::PictureRgb colour_;
+  double colour_s_ = 0;
+  FeedMoment moment_;
+  bool has_changed_ = false;
+  std::thread thread_;
+};
+
+}  // namespace spectra::sources

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/mapping/unit_publisher.hpp"
+#include "server/sources/map_keeper.hpp"
+
+namespace spectra::sources {
+
+/// What is known when units are handed over.
+struct FeedMoment {
+  Eigen::Vector3d eye = Eigen::Vector3d::Zero();  ///< Where the depth camera is.
+  double begin_unix_s = 0;                        ///< When the map's first moment was.
+};
+
+/// Unix seconds.
+double unix_now_s();
+
+/// What a block that is a unit is asked to be read with, and when it was seen: now. `up` may be empty.
+std::vector<std::pair<std::string, std::string>> unit_query(const std::string& up, const Eigen::Vector3d& eye);
+
+/// Puts units into a map, at most kUnderWay at a time. For one thread, but for end().
+class UnitHandOver {
+ public:
+  static constexpr std::size_t kUnderWay = 32;
+
+  UnitHandOver(MapKeeper& map, std::string_view up) : map_(map), up_(up) {}
+
+  /// False: it is over, or cannot be done.
+  bool operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment);
+
+  /// From any thread: nothing is waited for any more.
+  void end() { state_->is_over = true; }
+  bool is_over() const { return state_->is_over; }
+
+ private:
+  MapKeeper& map_;
+  const std::string up_;
+  /// Shared with answers that may come when this is gone.
+  struct State {
+    std::atomic<bool> is_over{false};
+    std::atomic<std::size_t> under_way{0};
+  };
+  const std::shared_ptr<State> state_ = std::make_shared<State>();
+};
+
+}  // namespace spectra::sources
