@@ -25,7 +25,7 @@ install(FILES ${package_made}/licences.txt DESTINATION share/spectra/web)
 install(FILES ${package_made}/spectra.1.gz DESTINATION share/man/man1)
 install(FILES ${package_made}/spectra DESTINATION share/bash-completion/completions)
 install(FILES ${package_made}/third-party-notices.gz ${package_made}/CHANGELOG.md.gz ${package_folder}/copyright
-  docs/operations.md docs/access.md docs/ingest.md docs/store.md DESTINATION share/doc/spectra)
+  docs/operations.md docs/access.md docs/ingest.md docs/limits.md docs/reliability.md docs/store.md DESTINATION share/doc/spectra)
 install(DIRECTORY deploy/proxy/ DESTINATION share/doc/spectra/examples)
 install(PROGRAMS ${package_folder}/hand-over DESTINATION lib/spectra)
 # Not GNUInstallDirs' lib/x86_64-linux-gnu: systemd looks here.

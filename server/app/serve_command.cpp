@@ -250,9 +250,10 @@ int run_serve(const ServeOptions& options) {
     std::_Exit(kDone);
   }
   // What is being computed cannot be interrupted, and need not be ended: a store survives more than that.
-  std::thread([] {
+  // The program's own hold on the log may end meanwhile.
+  std::thread([log = spdlog::default_logger()] {
     std::this_thread::sleep_for(kLongestEnd);
-    spdlog::default_logger()->flush();
+    log->flush();
     std::_Exit(kDone);
   }).detach();
   feed.reset();

@@ -355,7 +355,7 @@ TEST_F(HttpServerTest, KeepsAConnectionForFurtherRequests) {
 
 TEST_F(HttpServerTest, ClosesSlowHeadersWhileOthersAreServed) {
   std::vector<RawClient> slow;
-  for (int i = 0; i < 50; ++i) {
+  for (int i = 0; i < 200; ++i) {
     slow.emplace_back(server_->port());
     ASSERT_TRUE(slow.back().send("GET / HTTP/1.1\r\nHost: loc"));
   }

@@ -178,7 +178,7 @@ TEST_F(WebSocketTest, AnswersBrokenFramesWithTheirCloseCodes) {
     std::string bytes;
     unsigned code;
   };
-  const std::vector<Case> cases{
+  std::vector<Case> cases{
       {"not masked", std::string("\x81\x02hi", 4), 1002},
       {"reserved bit", std::string("\xC1\x82\0\0\0\0hi", 8), 1002},
       {"reserved opcode", masked_frame(3, "hi"), 1002},
@@ -196,7 +196,43 @@ TEST_F(WebSocketTest, AnswersBrokenFramesWithTheirCloseCodes) {
       {"close with the largest code", masked_frame(8, std::string("\xff\xff", 2)), 1002},
       {"close with a code of one's own", masked_frame(8, std::string("\x13\x87", 2)), 4999},
       {"close as it should be", masked_frame(8, std::string("\x03\xe8", 2)), 1000},
+      {"continuation after the end", masked_frame(1, "h", false) + masked_frame(0, "i") + masked_frame(0, "!"), 1002},
+      {"binary inside a text", masked_frame(1, "h", false) + masked_frame(2, "i"), 1002},
+      {"ping inside a message, then a message in it",
+       masked_frame(1, "h", false) + masked_frame(9, "") + masked_frame(1, "i"), 1002},
+      {"pong in fragments", masked_frame(10, "hi", false), 1002},
+      {"close in fragments", masked_frame(8, std::string("\x03\xe8", 2), false), 1002},
+      {"pong too long", masked_frame(10, std::string(126, 'x')), 1002},
+      {"close too long", masked_frame(8, "\x03\xe8" + std::string(124, 'x')), 1002},
+      {"not masked and binary", std::string("\x82\x02hi", 4), 1002},
+      {"not masked and empty", std::string("\x81\0", 2), 1002},
+      {"ping that is not masked", std::string("\x89\0", 2), 1002},
+      {"close that is not masked", std::string("\x88\x02\x03\xe8", 4), 1002},
+      {"overlong UTF-8", masked_frame(1, "\xc0\xaf"), 1007},
+      {"a surrogate", masked_frame(1, "\xed\xa0\x80"), 1007},
+      {"beyond all characters", masked_frame(1, "\xf4\x90\x80\x80"), 1007},
+      {"a byte that begins no character", masked_frame(1, "\xf5"), 1007},
+      {"the middle of a character", masked_frame(1, "\x80"), 1007},
+      {"half a character, and the rest is none", masked_frame(1, "\xe2\x82", false) + masked_frame(0, "x"), 1007},
+      {"close with half a character", masked_frame(8, std::string("\x03\xe8\xe2\x82", 4)), 1002},
   };
+  for (const unsigned opcode : {4U, 5U, 6U, 7U, 12U, 13U, 14U, 15U}) {
+    cases.push_back({"another reserved opcode", masked_frame(opcode, ""), 1002});
+  }
+  for (const char first : {'\xA1', '\x91', '\xF1', '\xC2', '\xC9', '\xC8'}) {
+    cases.push_back({"another reserved bit", std::string({first, '\x80', 0, 0, 0, 0}), 1002});
+  }
+  const auto close_frame = [](unsigned code) {
+    return masked_frame(8, std::string({static_cast<char>(code >> 8U), static_cast<char>(code & 255U)}));
+  };
+  // RFC 6455, 7.4, and the registry of IANA.
+  for (const unsigned code : {0U, 999U, 1004U, 1006U, 1015U, 1016U, 1100U, 2000U, 2999U, 6000U}) {
+    cases.push_back({"close with a code that may not be sent", close_frame(code), 1002});
+  }
+  for (const unsigned code : {1001U, 1003U, 1007U, 1008U, 1009U, 1010U, 1011U, 3000U, 3999U, 4000U}) {
+    cases.push_back({"close with a code that may", close_frame(code), code});
+  }
+  EXPECT_GE(cases.size(), 60U);
   for (const auto& [what, bytes, code] : cases) {
     RawWebSocket viewer(port());
     ASSERT_EQ(viewer.receive_text(), "hello");

@@ -1,8 +1,9 @@
 // What attacks cost viewers who are well:
-//   node tests/soak/attacks.mjs [--seconds 10] [--turns 3] [--viewers 8] [--direct] [--only ATTACK]
+//   node tests/soak/attacks.mjs [--seconds 10] [--turns 3] [--viewers 8] [--direct] [--only ATTACK] [--scene FILE.ply]
 // Viewers behind an emulated radio link (20 Mbit/s, 60 ms) change a setting once a second each and wait for their whole picture. Turns
 // without and with each attack alternate; the growth is that of the median, of all viewers and turns. With --direct there is no link.
-// Attackers are processes of their own and come over loopback. The status is 1 when a growth is over 20 % or somebody was cut.
+// Attackers are processes of their own and come over loopback;
+// "--only stalled" has 20 viewers who read nothing. The status is 1 when a growth is over 20 % or somebody was cut.
 import { spawn } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
@@ -18,12 +19,13 @@ const { values } = parseArgs({
     viewers: { type: "string", default: "8" },
     direct: { type: "boolean", default: false },
     only: { type: "string" },
+    scene: { type: "string" },
   },
 });
 const BAR = 1.2;
 const FIVE = ["connections", "slow_headers", "upload", "deep_json", "requests"];
 const seconds = Number(values.seconds);
-const server = await serve(["--demo", "--limit", "cache-bytes=16MB"]);
+const server = await serve([values.scene ?? "--demo", "--limit", "cache-bytes=16MB"]);
 const link = values.direct ? null : await linkProxy(server.url, { rate_bytes_per_s: 20e6 / 8, delay_ms: 30, queue_bytes: 65_536 });
 const resident_mb = () => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${server.process.pid}/status`, "utf8"))[1]) / 1024;
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));

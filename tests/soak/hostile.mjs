@@ -179,6 +179,18 @@ export const ATTACKS = {
     }
     for (const socket of sockets) socket?.destroy();
   },
+  /** 20 viewers who ask for everything and read nothing. */
+  async stalled(aim) {
+    const sockets = await Promise.all(Array.from({ length: 20 }, () => viewer(aim, { reads: false })));
+    for (const socket of sockets) socket?.write(text("scene.subscribe", { channels: ["fused"] }));
+    for (let i = 0; aim.goesOn; i += 1) {
+      for (const socket of sockets) {
+        if (socket && !socket.destroyed && socket.writableLength < 1000) socket.write(text("fusion.set", { params: { alpha: (i % 97) / 97 } }, i));
+      }
+      await sleep(1000);
+    }
+    for (const socket of sockets) socket?.destroy();
+  },
   /** Noise before and after the upgrade. */
   async garbage(aim) {
     while (aim.goesOn) {
