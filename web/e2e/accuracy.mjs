@@ -1,7 +1,7 @@
 // What the status bar says of the picture, against the picture: on a link of 1 Mbit/s at random moments, and at rest.
 //   SPECTRA_MOMENTS=50 SPECTRA_E2E='What the bar says' node e2e/run.mjs      (the suite itself looks at a few moments)
 import assert from 'node:assert/strict';
-import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { drawn, keep, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 
 const MOMENTS = Number(process.env.SPECTRA_MOMENTS ?? 6);
@@ -155,7 +155,14 @@ export function addAccuracyTests(browser) {
         page.evaluate(() => {
           const { store, viewport } = globalThis.spectra;
           const text = document.querySelector('[data-status="accuracy"]')?.textContent ?? null;
-          return { error: store.accuracy, pose: viewport.pose, tiles: store.shown.tiles, text };
+          return {
+            error: store.accuracy,
+            pose: viewport.pose,
+            tiles: store.shown.tiles,
+            text,
+            method: store.fusion?.method,
+            palette: store.fusion?.palette,
+          };
         });
       let [before, said, image] = [null, null, null];
       do {
@@ -180,7 +187,10 @@ export function addAccuracyTests(browser) {
       const words = `moment ${moment}: ${figures} off over ${pixels} pixels, ${said.tiles} tiles; said: ${said.text}`;
       console.log(`        ${words}`);
       if (colour_levels > 0) coarse += 1;
-      if (!isTrue) untrue.push(words);
+      if (!isTrue) {
+        untrue.push(`${words}; in force: ${said.method}, ${said.palette}`);
+        for (const picture of ['shown', 'full']) keep(`truth-${moment}-${picture}`, `untrue-${moment}-${picture}`);
+      }
     }
     assert.deepEqual(untrue, []);
     assert.ok(coarse >= MOMENTS / 3, `${coarse} moments with coarse tiles`);

@@ -1,7 +1,7 @@
 // What the end-to-end tests share: the server program, Chromium, and pixels of screenshots.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
-import { existsSync, mkdirSync } from 'node:fs';
+import { copyFileSync, existsSync, mkdirSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { inflateSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
@@ -113,6 +113,11 @@ export function assertGpuObjects(before, after) {
   const { geometries, ...others } = after;
   assert.deepEqual(others, { textures: before.textures, programs: before.programs, tiles: before.tiles });
   assert.ok(geometries >= before.geometries && geometries <= after.tiles, `${geometries} geometries for ${after.tiles} tiles`);
+}
+
+/** A screenshot under another name, so that the next of its own name does not replace it. */
+export function keep(name, as) {
+  copyFileSync(`${SHOTS}${name}.png`, `${SHOTS}${as}.png`);
 }
 
 export async function screenshot(page, name) {
