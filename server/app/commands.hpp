@@ -115,6 +115,8 @@ struct MapOptions {
   std::string to;                ///< A server to send it to while it grows; empty: none.
   std::optional<std::filesystem::path> token_file;
   std::optional<std::filesystem::path> poses;  ///< Absent: the folder's.
+  bool is_tracking = false;                    ///< Poses are found from the frames; only the first is taken as given.
+  std::optional<std::filesystem::path> found_poses;  ///< Where to write the poses that were found.
   std::optional<std::filesystem::path> vignetting;
   double voxel_m = 0.01;
   unsigned thread_count = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <future>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -12,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "fusion/files/output_file.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
 #include "server/app/frame_faults.hpp"
@@ -64,12 +66,23 @@ double quantile(std::vector<double> values, double share) {
   return values[at];
 }
 
+base::Result<void> save_poses(const std::filesystem::path& file, const mapping::Trajectory& poses) {
+  const std::string text = poses.to_text();
+  BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
+  BOOST_OUTCOME_TRYV(out.write(std::as_bytes(std::span(text))));
+  return out.commit();
+}
+
 void print_figures(const mapping::Mapper& mapper, const mapping::UnitMesh& mesh, const std::vector<double>& frame_ms,
                    double seconds) {
   const mapping::MapperFigures& figures = mapper.figures();
   fmt::print("frames       {} of depth, {} of colour, {} of temperature", figures.depth_frames, figures.colour_frames,
              figures.thermal_frames);
   if (figures.frozen_frames > 0) fmt::print(", {} of a closed shutter left out", figures.frozen_frames);
+  if (figures.tracked_frames + figures.lost_frames > 0) {
+    fmt::print("\ntracking     {} poses found, {:.1f} mm off the map; {} lost", figures.tracked_frames,
+               1000 * figures.tracking_residual_m, figures.lost_frames);
+  }
   fmt::print("\nmap          {} blocks of 8 x 8 x 8 voxels, {:.1f} MB, {:.1f} bytes a voxel\n",
              mapper.map().block_count(), static_cast<double>(mapper.map().size_bytes()) / 1e6,
              static_cast<double>(mapper.map().size_bytes()) /
@@ -107,12 +120,13 @@ int run_map(const MapOptions& options) {
     sender.emplace(std::get<UnitSender>(std::move(opened)));
   }
   const auto begin = Clock::now();
-  auto folder = mapping::FrameFolder::open(options.frames, options.poses);
+  auto folder = mapping::FrameFolder::open(options.frames, options.poses, !options.is_tracking);
   if (!folder) return fail(folder.error());
   const unsigned threads = options.thread_count > 0 ? options.thread_count : std::thread::hardware_concurrency();
   jobs::WorkerPool pool(std::max(2U, threads) - 1);  // this one works as well
   mapping::MapperSettings settings;
   settings.voxel_m = options.voxel_m;
+  settings.is_tracking = options.is_tracking;
   mapping::Mapper mapper(folder.value().calibration(), settings, pool);
   if (options.vignetting) {
     auto picture = mapping::read_pfm(*options.vignetting);
@@ -135,8 +149,8 @@ int run_map(const MapOptions& options) {
     mapper.fuse(loaded.frame, folder.value().trajectory(), faults);
     frame_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - before).count());
     if (sender) {
-      const auto problem =
-          sender->send_changes(mapper, folder.value().trajectory().at(loaded.frame.time_s), row + 1 == count, pool);
+      const mapping::Trajectory& poses = options.is_tracking ? mapper.tracked() : folder.value().trajectory();
+      const auto problem = sender->send_changes(mapper, poses.at(loaded.frame.time_s), row + 1 == count, pool);
       if (problem) return fail(kJobFailed, *problem);
     }
     base::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
@@ -153,6 +167,10 @@ int run_map(const MapOptions& options) {
   line.end();
   print_faults(faults);
   if (!written) return fail(written.error());
+  if (options.found_poses) {
+    const auto saved = save_poses(*options.found_poses, mapper.tracked());
+    if (!saved) return fail(saved.error());
+  }
   if (sender) {
     fmt::print("sent         {} units, {} of them again, {} refused\n", sender->sent_count(), sender->again_count(),
                sender->refused_count());

@@ -282,6 +282,11 @@ void add_map(CLI::App& app, MapOptions& options, Run& run) {
       ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str();
   command->add_option("--poses", options.poses, "A file of poses in place of the folder's (TUM)");
+  auto* track = command->add_flag("--track", options.is_tracking,
+                                  "Find the poses from the frames; of those that are given only the first counts");
+  command
+      ->add_option("--save-poses", options.found_poses, "With --track: a file for the poses of the depth camera (TUM)")
+      ->needs(track);
   command->add_option("--vignetting", options.vignetting, "A PFM picture: kelvin to subtract from each thermal pixel");
   command->add_option("--threads", options.thread_count, "Threads that map; 0 = one a processor")
       ->check(CLI::Range(0, 1024));

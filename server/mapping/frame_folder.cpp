@@ -36,7 +36,7 @@ void FaultLog::add(const FaultLog& other) {
   }
 }
 
-Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optional<fs::path>& poses) {
+Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optional<fs::path>& poses, bool needs_poses) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     return base::failure(ErrorCode::FileNotFound,
@@ -44,7 +44,11 @@ Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optiona
   }
   BOOST_OUTCOME_TRY(auto calibration, read_calibration(folder / "calibration.json"));
   const fs::path pose_file = poses.value_or(folder / "poses.txt");
-  BOOST_OUTCOME_TRY(auto trajectory, Trajectory::read(pose_file));
+  Trajectory trajectory;
+  if (needs_poses || poses || fs::exists(pose_file, error)) {
+    BOOST_OUTCOME_TRY(auto read, Trajectory::read(pose_file));
+    trajectory = std::move(read);
+  }
   std::ifstream in(folder / "frames.txt", std::ios::binary);
   if (!in) return base::failure(ErrorCode::FileNotFound, (folder / "frames.txt").string() + ": cannot be read");
   const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());

@@ -37,6 +37,7 @@ enum class FaultKind {
   NoPose,
   JumpingPose,
   UnfittingPose,  ///< The picture contradicts the map where the pose puts it.
+  LostTrack,      ///< Tracking does not find where the picture was taken.
   MissingFile,
   DamagedFile,
   WrongSize,
@@ -44,7 +45,7 @@ enum class FaultKind {
   UnreadablePose,
   BackwardPose,
 };
-inline constexpr std::size_t kFaultKinds = 11;
+inline constexpr std::size_t kFaultKinds = 12;
 
 /// The account of what was wrong.
 class FaultLog {
@@ -73,9 +74,10 @@ struct FrameParts {
 class FrameFolder {
  public:
   /// Fails when the folder, its calibration or its poses cannot be read, or no line of frames.txt can; single lines that are wrong are in
-  /// faults(). `poses`: another file than the folder's.
+  /// faults(). `poses`: another file than the folder's. Unless poses are needed, a folder may have no poses.txt.
   static base::Result<FrameFolder> open(const std::filesystem::path& folder,
-                                        const std::optional<std::filesystem::path>& poses = std::nullopt);
+                                        const std::optional<std::filesystem::path>& poses = std::nullopt,
+                                        bool needs_poses = true);
 
   const Calibration& calibration() const { return calibration_; }
   /// Of the depth camera, whatever camera the poses were given for.

@@ -62,15 +62,6 @@ std::string calibration_text(const Calibration& calibration) {
   return all.dump(1) + "\n";
 }
 
-std::string pose_line(double time_s, const Eigen::Isometry3d& pose) {
-  const Eigen::Quaterniond q(pose.linear());
-  const Eigen::Vector3d& t = pose.translation();
-  char line[200];
-  std::snprintf(line, sizeof line, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", time_s, t.x(), t.y(), t.z(), q.x(),
-                q.y(), q.z(), q.w());
-  return line;
-}
-
 std::string name_of(const char* folder, std::size_t index, const char* ending) {
   char name[40];
   std::snprintf(name, sizeof name, "%s/%06zu.%s", folder, index, ending);
@@ -120,16 +111,15 @@ Result<void> write_drive(const fs::path& folder, const SimulatedDrive& drive, jo
     if (error) return base::failure(base::ErrorCode::FileUnwritable, (folder / part).string() + ": " + error.message());
   }
   BOOST_OUTCOME_TRYV(write_text(folder / "calibration.json", calibration_text(drive.calibration())));
-  const std::string head = "# timestamp tx ty tz qx qy qz qw  (depth camera to world, Hamilton, w last)\n";
-  std::string told = head, truth = head;
   const std::string rows = "# timestamp depth color thermal\n";
+  Trajectory told, truth;
   for (double time = drive.trajectory().begin_s(); time <= drive.trajectory().end_s(); time += 0.02) {
-    if (drive.trajectory().at(time).state == PoseState::Known)
-      told += pose_line(time, drive.trajectory().at(time).pose);
-    truth += pose_line(time, drive.true_pose(time));
+    const PoseAnswer answer = drive.trajectory().at(time);
+    if (answer.state == PoseState::Known) told.add(time, answer.pose);
+    truth.add(time, drive.true_pose(time));
   }
-  BOOST_OUTCOME_TRYV(write_text(folder / "poses.txt", told));
-  BOOST_OUTCOME_TRYV(write_text(folder / "true_poses.txt", truth));
+  BOOST_OUTCOME_TRYV(write_text(folder / "poses.txt", told.to_text()));
+  BOOST_OUTCOME_TRYV(write_text(folder / "true_poses.txt", truth.to_text()));
   BOOST_OUTCOME_TRYV(
       files::write_ply(folder / "truth.ply", drive.truth(), drive.truth().visible(), "up y; positions in metres"));
 

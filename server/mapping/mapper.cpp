@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -13,6 +14,7 @@ namespace {
 constexpr std::size_t kLeastEvidence = 200;   ///< Pixels of fit_of that match.
 constexpr double kLeastFit = 0.5;             ///< Of those where both have something.
 constexpr double kFarthestVoxels = 1 << 29;   ///< A place is counted in 32 bits; what a camera sees is added to it.
+constexpr double kLongestWaitSeconds = 1;     ///< Of a thermal picture, for the pose after it.
 constexpr std::size_t kEnoughSpreads = 4096;  ///< For their median to stand.
 
 std::string seconds_text(double seconds) {
@@ -36,6 +38,7 @@ Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, j
       pool_(pool),
       rays_(calibration.depth.camera),
       map_(settings.voxel_m) {
+  if (settings.is_tracking) tracker_.emplace(calibration_, rays_, settings.tracker);
   if (!calibration.thermal || !settings.use_thermal) return;
   heat_.emplace(*calibration.thermal, settings.heat);
   heat_->set_vignetting(calibration.thermal->vignetting);
@@ -47,6 +50,7 @@ base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
     return base::failure(base::ErrorCode::Inconsistent,
                          "the vignetting picture is not of the size of the thermal camera in calibration.json");
   }
+  calibration_.thermal->vignetting = picture;
   if (heat_) heat_->set_vignetting(std::move(picture));
   return base::success();
 }
@@ -54,6 +58,7 @@ base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
 void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   if (!begin_s_) begin_s_ = frame.time_s;
   newest_s_ = frame.time_s;
+  if (tracker_) return fuse_tracked(frame, trajectory, faults);
   if (!frame.depth.empty() && !fuse_surface(frame, trajectory, faults)) return;
   if (!frame.thermal.empty() && heat_) fuse_heat(frame, trajectory, faults);
 }
@@ -94,6 +99,11 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
     }
     is_doubtful_ = false;
   }
+  fuse_prepared(frame, look, trajectory);
+  return true;
+}
+
+void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory) {
   std::optional<ColourLook> colour;
   if (!frame.colour.empty() && settings_.use_colour) {
     const PoseAnswer at = trajectory.at(frame.colour_time_s.value_or(frame.time_s) + calibration_.colour->delay_s);
@@ -105,7 +115,67 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
   }
   fuse_depth(map_, look, colour ? &*colour : nullptr, pool_);
   ++figures_.depth_frames;
-  return true;
+}
+
+std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFrame& depth,
+                                               const Trajectory& trajectory, FaultLog& faults) {
+  TrackedMoment moment;
+  moment.time_s = frame.time_s + calibration_.depth.delay_s;
+  if (!tracker_->has_begun()) {
+    PoseAnswer first;
+    if (trajectory.size() > 0 && !find_pose(trajectory, moment.time_s, first, faults)) return std::nullopt;
+    tracker_->begin(moment.time_s, first.pose);
+    return first.pose;
+  }
+  moment.depth = &depth;
+  if (!frame.colour.empty() && calibration_.colour) {
+    moment.colour = &frame.colour;
+    moment.colour_s = frame.time_s + calibration_.colour->delay_s;
+  }
+  if (newest_thermal_s_) {
+    moment.thermal = &newest_thermal_;
+    moment.thermal_s = *newest_thermal_s_;
+  }
+  const std::optional<Eigen::Isometry3d> pose = tracker_->find(map_, moment, pool_);
+  if (!pose) {
+    ++figures_.lost_frames;
+    faults.add(FaultKind::LostTrack,
+               "at " + seconds_text(frame.time_s) +
+                   " what is seen no longer tells where it is seen from; nothing is fused until it "
+                   "fits the map again");
+    return std::nullopt;
+  }
+  ++figures_.tracked_frames;
+  residual_squares_ += tracker_->last().residual_m * tracker_->last().residual_m;
+  figures_.tracking_residual_m = std::sqrt(residual_squares_ / static_cast<double>(figures_.tracked_frames));
+  return pose;
+}
+
+void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+  if (!frame.thermal.empty() && heat_) {
+    held_.push_back({frame.time_s, {}, {}, frame.thermal});
+    if (frame.thermal.pixels != newest_thermal_.pixels) {
+      newest_thermal_ = frame.thermal;
+      newest_thermal_s_ = frame.time_s + calibration_.thermal->delay_s;
+    }
+  }
+  if (!frame.depth.empty()) {
+    const DepthFrame depth =
+        prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
+    if (const auto pose = track(frame, depth, trajectory, faults)) {
+      tracked_.add(frame.time_s + calibration_.depth.delay_s, *pose);
+      fuse_prepared(frame, {depth, calibration_.depth.camera, rays_, calibration_.depth.noise, *pose}, tracked_);
+    }
+  }
+  // What was taken before the last pose that is known has one, or will never have one.
+  const double known_s = tracked_.size() > 0 ? tracked_.end_s() : -std::numeric_limits<double>::infinity();
+  const auto waits = [&](const Frame& held) {
+    return held.time_s + calibration_.thermal->delay_s > known_s && frame.time_s - held.time_s < kLongestWaitSeconds;
+  };
+  for (const Frame& held : held_) {
+    if (!waits(held)) fuse_heat(held, tracked_, faults);
+  }
+  std::erase_if(held_, [&](const Frame& held) { return !waits(held); });
 }
 
 void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {

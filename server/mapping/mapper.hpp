@@ -8,9 +8,11 @@
 #include "fusion/base/progress.hpp"
 #include "server/mapping/calibration.hpp"
 #include "server/mapping/depth_frame.hpp"
+#include "server/mapping/depth_fusion.hpp"
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/heat_fusion.hpp"
 #include "server/mapping/surface_mesh.hpp"
+#include "server/mapping/tracker.hpp"
 #include "server/mapping/unit_publisher.hpp"
 #include "server/mapping/voxel_map.hpp"
 
@@ -20,8 +22,10 @@ struct MapperSettings {
   double voxel_m = 0.01;
   bool use_colour = true;
   bool use_thermal = true;
+  bool is_tracking = false;  ///< Poses are found from what is seen; of those that are given only the first counts.
   HeatRules heat;
   MeshRules mesh;
+  TrackerRules tracker;
 };
 
 /// What a mapper has done so far.
@@ -30,17 +34,22 @@ struct MapperFigures {
   std::size_t frozen_frames = 0;                                        ///< Thermal pictures of a closed shutter.
   double spread_kelvin = 0;          ///< Median over the thermal pictures: what they differ from what was known.
   double largest_offset_kelvin = 0;  ///< Of a thermal picture, in amount.
+  std::size_t tracked_frames = 0, lost_frames = 0;  ///< Depth pictures whose pose was found, and was not.
+  double tracking_residual_m = 0;  ///< Root mean square over those that were found, of what they differ from the map.
 };
 
-/// Makes a map of frames whose poses are known. For one thread; uses a pool inside.
+/// Makes a map of frames whose poses are known, or are told from the map itself. For one thread; uses a pool inside.
 class Mapper {
  public:
   Mapper(const Calibration& calibration, const MapperSettings& settings, jobs::WorkerPool& pool);
+  Mapper(const Mapper&) = delete;
+  Mapper& operator=(const Mapper&) = delete;
 
   /// Kelvin to subtract from each thermal pixel, in place of the calibration's. Inconsistent when it is not of the camera's size.
   base::Result<void> set_vignetting(PictureFloat picture);
 
-  /// Fuses what of a frame has a pose; frames in order of their time. What cannot be fused is left out and stands in `faults`.
+  /// Fuses what of a frame has a pose (tracking: the trajectory may be empty, then the first pose is none at all; thermal pictures wait for the
+  /// depth picture after them); frames in order of their time. What cannot be fused is left out and stands in `faults`.
   void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
 
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
@@ -54,6 +63,10 @@ class Mapper {
                                            jobs::WorkerPool& pool);
 
   const VoxelMap& map() const { return map_; }
+  /// Poses of the depth camera that were found by tracking.
+  const Trajectory& tracked() const { return tracked_; }
+  /// How the last picture that was tracked fitted; all 0 without tracking.
+  Alignment last_alignment() const { return tracker_ ? tracker_->last() : Alignment{}; }
   const MapperFigures& figures() const { return figures_; }
   /// The time of the first frame, which seen_s counts from.
   double begin_s() const { return begin_s_.value_or(0); }
@@ -65,9 +78,14 @@ class Mapper {
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+  void fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory);
+  void fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+  /// The pose of the depth camera at a moment, by tracking.
+  std::optional<Eigen::Isometry3d> track(const Frame& frame, const DepthFrame& depth, const Trajectory& trajectory,
+                                         FaultLog& faults);
   void fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
 
-  const Calibration calibration_;
+  Calibration calibration_;
   const MapperSettings settings_;
   jobs::WorkerPool& pool_;
   const RayTable rays_;
@@ -78,6 +96,12 @@ class Mapper {
   std::vector<double> spreads_kelvin_;  ///< Of the thermal pictures about what was known.
   std::size_t jumps_seen_ = 0;
   bool is_doubtful_ = false;  ///< Poses have jumped, and none has been found to fit since.
+  std::optional<Tracker> tracker_;
+  Trajectory tracked_;
+  std::vector<Frame> held_;                 ///< Thermal pictures that wait for a pose after them.
+  Picture16 newest_thermal_;                ///< That differs from the one before.
+  std::optional<double> newest_thermal_s_;  ///< When it was taken.
+  double residual_squares_ = 0;
   MapperFigures figures_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -86,6 +87,19 @@ void Trajectory::forget_before(double time_s) {
   times_.erase(times_.begin(), times_.begin() + gone);
   poses_.erase(poses_.begin(), poses_.begin() + gone);
   jumps_.erase(jumps_.begin(), jumps_.begin() + gone);
+}
+
+std::string Trajectory::to_text() const {
+  std::string text = "# timestamp tx ty tz qx qy qz qw  (depth camera to world, Hamilton, w last)\n";
+  for (std::size_t i = 0; i < times_.size(); ++i) {
+    const Eigen::Quaterniond q(poses_[i].linear());
+    const Eigen::Vector3d& t = poses_[i].translation();
+    char line[200];
+    std::snprintf(line, sizeof line, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", times_[i], t.x(), t.y(), t.z(), q.x(),
+                  q.y(), q.z(), q.w());
+    text += line;
+  }
+  return text;
 }
 
 bool Trajectory::is_near(std::size_t first) const {

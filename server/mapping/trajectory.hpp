@@ -56,6 +56,9 @@ class Trajectory {
   /// Takes out what is earlier; the last one before stays, so that what is between can be told.
   void forget_before(double time_s);
 
+  /// The lines that read() reads, after a line that says what they are.
+  std::string to_text() const;
+
   std::size_t size() const { return times_.size(); }
   double begin_s() const { return times_.front(); }
   double end_s() const { return times_.back(); }

@@ -156,6 +156,20 @@ class Frames(unittest.TestCase):
         self.assertEqual(sum(block["triangle_count"] for block in blocks), mesh["triangle_count"])
         self.assertEqual(subprocess.run([SPECTRA, "map", self.folder], capture_output=True).returncode, 2)
 
+    def test_tracking_says_where_it_is_lost_and_needs_no_poses(self):
+        os.remove(self.path("poses.txt"))
+        poses = self.path("found.txt")
+        done = self.map("--track", "--save-poses", poses)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        # A bare wall does not tell where it is seen from.
+        self.assertIn("at 0.100 s what is seen no longer tells where it is seen from", done.stderr)
+        self.assertEqual(done.stderr.count("warning"), 2, done.stderr)  # the other: temperatures without a pose
+        self.assertIn("tracking     0 poses found", done.stdout)
+        self.assertIn("9 lost", done.stdout)
+        with open(poses) as file:
+            self.assertEqual([line.split()[0] for line in file if not line.startswith("#")], ["0.000000"])
+        self.assertEqual(self.map("--save-poses", poses).returncode, 2)
+
     def test_calibration_is_refused_where_it_cannot_be_told(self):
         done = subprocess.run([SPECTRA, "calibrate", "thermal-delay", self.folder], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)

@@ -43,6 +43,15 @@ TEST_F(FrameFolderTest, GivesWhatIsThereAndCountsWhatIsNot) {
   EXPECT_EQ(faults.of(FaultKind::NoCalibration).count, 1U);
 }
 
+TEST_F(FrameFolderTest, NeedsPosesUnlessTheyAreFoundByTracking) {
+  fs::remove(folder_ / "poses.txt");
+  EXPECT_FALSE(FrameFolder::open(folder_));
+  const auto opened = FrameFolder::open(folder_, std::nullopt, false);
+  ASSERT_TRUE(opened) << opened.error().message;
+  EXPECT_EQ(opened.value().trajectory().size(), 0U);
+  EXPECT_FALSE(FrameFolder::open(folder_, folder_ / "none.txt", false));
+}
+
 TEST_F(FrameFolderTest, SaysWhichLinesAreWrong) {
   write("frames.txt",
         "0 a.png - -\nx a.png - -\n0.02 a.png\n0.01 a.png - -\n0.005 a.png - -\nnan a.png - -\n0.03 ../../etc/passwd - "

@@ -50,6 +50,17 @@ TEST(Trajectory, LeavesOutLinesThatAreNoPoseAndCountsThem) {
   EXPECT_EQ(trajectory.notes().backwards, 1U);
 }
 
+TEST(Trajectory, IsReadAsItWasWritten) {
+  Trajectory trajectory;
+  trajectory.add(0.25, looking_ahead(1, -2, 3, 0.4));
+  trajectory.add(0.3, looking_ahead(1.5, 2, 3, -0.4));
+  const Trajectory read = Trajectory::from_text(trajectory.to_text());
+  ASSERT_EQ(read.size(), 2U);
+  EXPECT_EQ(read.notes().unreadable, 0U);
+  EXPECT_TRUE(read.at(0.25).pose.isApprox(trajectory.at(0.25).pose, 1e-8));
+  EXPECT_TRUE(read.at(0.3).pose.isApprox(trajectory.at(0.3).pose, 1e-8));
+}
+
 TEST(Trajectory, BecomesThatOfAnotherCamera) {
   Trajectory trajectory;
   const Eigen::Isometry3d colour_from_depth = looking_ahead(0.1, 0, 0, 0.3),
