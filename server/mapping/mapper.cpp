@@ -130,7 +130,7 @@ std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFr
   moment.depth = &depth;
   if (!frame.colour.empty() && calibration_.colour) {
     moment.colour = &frame.colour;
-    moment.colour_s = frame.time_s + calibration_.colour->delay_s;
+    moment.colour_s = frame.colour_time_s.value_or(frame.time_s) + calibration_.colour->delay_s;
   }
   if (newest_thermal_s_) {
     moment.thermal = &newest_thermal_;
@@ -153,7 +153,10 @@ std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFr
 
 void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   if (!frame.thermal.empty() && heat_) {
-    held_.push_back({frame.time_s, {}, {}, frame.thermal});
+    Frame held;
+    held.time_s = frame.time_s;
+    held.thermal = frame.thermal;
+    held_.push_back(std::move(held));
     if (frame.thermal.pixels != newest_thermal_.pixels) {
       newest_thermal_ = frame.thermal;
       newest_thermal_s_ = frame.time_s + calibration_.thermal->delay_s;
