@@ -108,13 +108,23 @@ export function addLinkTests(browser) {
       isBehind: globalThis.spectra.store.behindSince !== null,
       tiles: globalThis.spectra.store.shown.tiles,
     }));
-    await page.locator('[data-pending-method]').waitFor();
-    assert.match(await page.locator('[data-pending-method]').innerText(), /Thermal.*not yet in the picture[^]*Visible/);
+    const sign = page.locator('[data-pending-method]');
     const coarse = sample(await screenshot(page, 'slow-coarse'));
     assert.deepEqual(during, { isBehind: true, tiles: 1 }, 'the root alone is drawn while the rest is on its way');
+    await page.waitForTimeout(500);
+    assert.equal(await sign.count(), 0, 'what is drawn, though coarse, is what is named');
+
+    // Back before the rest has come: the picture is of the other method, whatever it was when it was last complete.
+    link.rate = 2_000;
+    await page.keyboard.press('2');
+    await sign.waitFor();
+    assert.match(await sign.innerText(), /Visible.*not yet in the picture[^]*Thermal/);
+    link.rate = 100_000;
+    await sign.waitFor({ state: 'detached' });
+    await page.keyboard.press('1');
 
     await settled(page);
-    assert.equal(await page.locator('[data-pending-method]').count(), 0);
+    assert.equal(await sign.count(), 0);
     assert.equal(await shownTiles(page), tiles);
     const fine = sample(await screenshot(page, 'slow-fine'));
     const changed = (a, b) => a.filter((pixel, index) => pixel !== b[index]).length / a.length;

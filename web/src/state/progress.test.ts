@@ -89,4 +89,19 @@ describe('the progress of a picture', () => {
     expect(store.rate_bytes_per_s).toBe(0);
     expect(store.behindSince).toBeNull();
   });
+
+  it('is nothing while the server has not said what the named method is', () => {
+    const { store, tiles, progress } = setUp();
+    store.complete = complete(1);
+    store.pictureMethod = 'blend';
+    store.shownMethods = ['blend'];
+    store.link = { phase: 'open' };
+    [tiles.current, tiles.total] = [4, 4];
+    progress.begin();
+    progress.tick();
+    expect([store.progress, store.otherMethods]).toEqual([1, []]);
+    store.wanted = { method: 'threshold' };
+    progress.tick();
+    expect([store.progress, store.otherMethods]).toEqual([0, ['blend']]);
+  });
 });

@@ -65,6 +65,8 @@ export class Progress {
 
   #share(): number {
     const { store } = this;
+    // The server has not said yet which generation shows the method that is named.
+    if (store.fusion?.method !== store.fusionInForce?.method) return 0;
     // Before the first picture is complete nobody can say which tiles it takes; at most it is all of them.
     if (store.complete === null) return this.tiles.size / Math.max(1, this.tiles.size, store.scene?.tile_count ?? 0);
     const { current, total } = this.tiles.progress(store.generation);

@@ -51,6 +51,8 @@ export class Session {
   readonly #catalogue: CatalogueLoader;
   readonly #subscription: Subscription;
   readonly #progress: Progress;
+  /** How often somebody has said where the camera is to be. */
+  #moves = 0;
   readonly #cameraSender: Coalescer<CameraPose>;
   readonly #ticker: ReturnType<typeof setInterval>;
 
@@ -268,6 +270,7 @@ export class Session {
   /** `fit` keeps the direction of the camera, `reset` goes back to the first view. */
   fitView(mode: 'fit' | 'reset'): void {
     this.followRobot(false);
+    this.#moves += 1;
     if (mode === 'fit') this.#look.fit();
     else this.#look.reset();
   }
@@ -285,7 +288,10 @@ export class Session {
     if (!scene || target === undefined) return;
     const step_m = (quality?.position_step_mm ?? 1) / 1000;
     const wish = flightTo(target, this.viewport.pose.eye, scene.core_bounds ?? scene.bounds, step_m);
+    const move = ++this.#moves;
     const found = await this.viewport.sightOf(wish);
+    // The user has gone somewhere else meanwhile.
+    if (move !== this.#moves) return;
     if (found === null) {
       this.#say(new Error(`The ${kind} place lies between surfaces that touch each other: it cannot be seen from anywhere.`));
       return;
@@ -324,6 +330,7 @@ export class Session {
   }
 
   #userMoved(): void {
+    this.#moves += 1;
     this.store.followsRobot = false;
     this.#look.userMoved();
   }
@@ -444,6 +451,19 @@ export class Session {
       error?.rounding_levels === before?.rounding_levels &&
       error?.temperature_celsius === before?.temperature_celsius;
     if (!isSame) this.store.drawnError = error;
+    this.#sayMethods();
+  }
+
+  /** Which methods the picture shows; a tile of which that is not known shows what all of it showed when it was last complete. */
+  #sayMethods(): void {
+    const { store } = this;
+    const methods = new Set<string>();
+    for (const generation of this.tiles.drawnGenerations(this.viewport.visibility())) {
+      const method = generation === null ? store.pictureMethod : (this.settings.methodOf(generation) ?? store.pictureMethod);
+      if (method !== null) methods.add(method);
+    }
+    const isSame = methods.size === store.shownMethods.length && store.shownMethods.every((method) => methods.has(method));
+    if (!isSame) store.shownMethods = [...methods];
   }
 
   #say(error: unknown): void {

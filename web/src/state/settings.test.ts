@@ -161,9 +161,19 @@ describe('Settings', () => {
   it('hands anything but a refusal on', async () => {
     const { store, settings, asked, problems } = setUp();
     settings.setPalette('grey');
-    await asked[0]?.refuse(new ConnectionLost());
+    await asked[0]?.refuse(new Error('out of order'));
     expect(problems).toHaveLength(1);
     expect(store.refusals).toEqual({});
+  });
+
+  it('keeps what was on its way when the connection went, and asks for it on the next', async () => {
+    const { store, settings, asked, problems } = setUp();
+    settings.setPalette('grey');
+    await asked[0]?.refuse(new ConnectionLost());
+    expect(problems).toEqual([]);
+    expect(store.wanted).toMatchObject({ palette: 'grey' });
+    expect(store.fusion?.palette).toBe('grey');
+    expect(settings.greeted(fusionWith(0.5), true)).toMatchObject({ palette: 'grey' });
   });
 
   it('keeps what the user wants while there is no connection, and asks for all of it on the next', () => {

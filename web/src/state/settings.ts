@@ -7,7 +7,7 @@ import {
   type RangeChange,
 } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
-import { BUSY, RpcError } from '../transport/connection';
+import { BUSY, ConnectionLost, RpcError } from '../transport/connection';
 import { FusionRefusal } from '../fusion/fusion_refusal';
 import { mergedChange, rangeChange, wholeChange } from './fusion_change';
 import { unmeasuredColour } from './unmeasured';
@@ -50,6 +50,10 @@ export class Settings {
   #percentiles: RangeChange = FIRST_PERCENTILES;
   /** The user has chosen settings; those of a first view are the server's, which knows the scene. */
   #hasChosen = false;
+  /** By generation, of this connection. */
+  readonly #methodOf = new Map<number, string>();
+  /** A change went under with its connection: it is still wanted, and is sent with the rest when there is another one. */
+  #hasUnanswered = false;
 
   constructor(
     private readonly store: Store,
@@ -61,7 +65,7 @@ export class Settings {
       interval_ms: CHANGE_INTERVAL_MS,
       max_in_flight: 3,
       onIdle: () => {
-        store.wanted = null;
+        if (!this.#hasUnanswered) store.wanted = null;
       },
     });
     this.#teller = new Coalescer({
@@ -75,6 +79,11 @@ export class Settings {
   /** True while a change waits or is unanswered. */
   get busy(): boolean {
     return this.#sender.busy || this.#teller.busy;
+  }
+
+  /** The method of a generation of this connection, where that is known. */
+  methodOf(generation: number): string | undefined {
+    return this.#methodOf.get(generation);
   }
 
   // Actions of the interface
@@ -160,10 +169,13 @@ export class Settings {
     const before = chosen === null ? null : wholeChange(chosen);
     this.#sender.reset();
     this.#teller.reset();
+    this.#hasUnanswered = false;
     store.fusionInForce = fusion;
     store.wanted = before;
     store.refusals = {};
     store.generation = 0;
+    this.#methodOf.clear();
+    this.#methodOf.set(0, fusion.method);
     this.#rememberFused(fusion);
     return before;
   }
@@ -187,6 +199,7 @@ export class Settings {
         await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
         if (this.store.connected) this.#sender.push(this.store.wanted ?? change);
       } else if (error instanceof RpcError) this.refused(error);
+      else if (error instanceof ConnectionLost) this.#hasUnanswered = true;
       else this.session.onProblem(error);
     }
   }
@@ -194,6 +207,7 @@ export class Settings {
   /** The server says what is in force; an older generation than the one known is news of yesterday. */
   inForce(generation: number, fusion: Fusion): void {
     const { store } = this;
+    this.#methodOf.set(generation, fusion.method);
     if (generation < store.generation) return;
     const isNew = generation !== store.generation;
     store.generation = generation;
@@ -246,7 +260,8 @@ export class Settings {
   /** The server keeps up with what is shown here; what it answers is known already. */
   async #tell(change: FusionChange): Promise<void> {
     try {
-      const { generation } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      const { generation, fusion } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      this.#methodOf.set(generation, fusion.method);
       this.store.generation = Math.max(this.store.generation, generation);
     } catch (error) {
       if (error instanceof RpcError && error.code === BUSY) this.#teller.push(change);

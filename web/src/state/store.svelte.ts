@@ -124,8 +124,10 @@ export class Store {
   behindSince = $state<number | null>(null);
   /** Share of the tiles that show the newest settings. */
   progress = $state(1);
-  /** Method that all of the picture shows; null before the first picture is complete. */
+  /** Method that all of the picture showed when it was last complete; null before the first time. */
   pictureMethod = $state<string | null>(null);
+  /** Methods that parts of the picture show now. */
+  shownMethods = $state.raw<readonly string[]>([]);
   /** What the last finished change cost: bytes received and time until all of it was on the screen. */
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
   /** How what is on the screen may differ from the full mesh; null = there is nothing. */
@@ -199,15 +201,16 @@ export class Store {
       ? this.wanted
       : null,
   );
+  /** What parts of the picture show instead of the method that is named. */
+  readonly otherMethods = $derived(this.shownMethods.filter((method) => method !== this.fusion?.method));
   /** The picture does not show the method that is named, or not everywhere, and that for longer than a moment. */
   readonly methodIsPending = $derived(
     this.pictureMethod !== null &&
-      this.fusion !== null &&
-      this.pictureMethod !== this.fusion.method &&
+      this.otherMethods.length > 0 &&
       (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS)),
   );
-  /** How exact the picture is; nobody can say that of the picture of a lost link. */
-  readonly accuracy = $derived(this.connected ? this.drawnError : null);
+  /** How exact the picture is; nobody can say that of the picture of a lost link, or where there is none. */
+  readonly accuracy = $derived(this.connected && this.graphicsLostAt === null ? this.drawnError : null);
   readonly graphicsLostFor_s = $derived(this.graphicsLostAt === null ? 0 : Math.max(0, (this.now - this.graphicsLostAt) / 1000));
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
 }

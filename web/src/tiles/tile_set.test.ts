@@ -259,6 +259,18 @@ describe('TileSet', () => {
     expect(tiles.drawnError(() => false)).toBeNull();
   });
 
+  it('tells which generations are drawn, of what is visible', () => {
+    const child = childTile(root, 0);
+    add(root, { child_mask: 0b1, generation: 3 });
+    const all = () => true;
+    expect([...tiles.drawnGenerations(all)]).toEqual([3]);
+    add(child, { generation: 4 });
+    expect([...tiles.drawnGenerations(all)]).toEqual([4]);
+    expect(tiles.drawnGenerations(() => false).size).toBe(0);
+    tiles.beginConnection();
+    expect([...tiles.drawnGenerations(all)]).toEqual([null]);
+  });
+
   it('tells from the colours how they have been rounded', () => {
     add(root, {}, 0b10101000);
     expect(tiles.drawnError(() => true)).toMatchObject({ colour_levels: 0, rounding_levels: 4 });

@@ -361,6 +361,17 @@ export class TileSet {
     return largest;
   }
 
+  /** The generations that are drawn, of the tiles that `isVisible`; null: one of an earlier connection. What is fused here has none. */
+  drawnGenerations(isVisible: (centre: Vec3, radius: number) => boolean): Set<number | null> {
+    const generations = new Set<number | null>();
+    for (const { shown } of this.#drawn) {
+      if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
+      if (this.#isHere && shown.hasRaw) continue;
+      generations.add(this.#isStale(shown) ? null : shown.answer - this.#rank(0));
+    }
+    return generations;
+  }
+
   /**
    * How much of the picture shows this generation, in tiles. The picture is what was drawn when all had been sent the last time, and
    * where finer tiles have come since, the finest of them. Others do not count: they may keep older colours.

@@ -1,5 +1,21 @@
 import type { Session } from '../state/session';
-import { celsius } from './format';
+import { celsius, duration } from './format';
+
+/** What is in the picture, and of when: a picture that is sent on must not be taken for what it is not. */
+function captions({ store }: Session): string[] {
+  const { connected, lostFor_s, methodIsPending, otherMethods, methods, method, scene } = store;
+  const shown = otherMethods.map((id) => methods.find((one) => one.id === id)?.label ?? id);
+  const seen = new Date(Date.now() - (connected ? 0 : lostFor_s * 1000)).toISOString().replace('T', ' ').slice(0, 19);
+  return [
+    scene?.name ?? '',
+    `${method?.label ?? ''}${methodIsPending ? `, in parts still ${shown.join(' and ')}` : ''}`,
+    `${seen} UTC`,
+    ...(connected ? [] : [`Link lost: ${duration(lostFor_s)} old when saved`]),
+    ...(scene?.temperature.missing_count && store.fusion?.missing !== 'visible'
+      ? [`No temperature: ${store.fusion?.missing ?? ''}`]
+      : []),
+  ];
+}
 
 /** The picture as it is on the screen with its scale beside it, so that it can be read without the program. */
 function composed(session: Session, picture: ImageBitmap): HTMLCanvasElement {
@@ -13,11 +29,7 @@ function composed(session: Session, picture: ImageBitmap): HTMLCanvasElement {
   const unit = picture.width / session.viewport.size[0];
   context.scale(unit, unit);
   const height = picture.height / unit;
-  const lines = [
-    store.scene?.name ?? '',
-    store.method?.label ?? '',
-    new Date().toISOString().replace('T', ' ').slice(0, 19) + ' UTC',
-  ];
+  const lines = captions(session);
   context.font = '13px system-ui, sans-serif';
   const { palette, fusion } = store;
   const scaled = palette !== null && fusion?.range.min != null && store.method?.uses_palette !== false;
