@@ -96,7 +96,7 @@ def completion(program):
     valued = sorted({o for c in commands for o in c.options() if c.takes_value(o)})
     inner = sorted({c.words[0] for c in commands if len(c.words) == 2})
     frame = (HERE / "completion.in").read_text()
-    return frame.replace("@ROWS@", "\n".join(rows)).replace("@VALUED@", "|".join(valued)).replace("@INNER@", "|".join(inner))
+    return frame.replace("@ROWS@", "\n".join(rows)).replace("@VALUED@", "|".join(valued)).replace("@INNER@", "|".join(inner)).replace("@INNER_WORDS@", " ".join(inner))
 
 
 if __name__ == "__main__":

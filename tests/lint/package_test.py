@@ -117,6 +117,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.completed("spectra", "che"), ["check-config"])
         self.assertEqual(self.completed("spectra", "serve", "--lis"), ["--listen"])
         self.assertEqual(self.completed("spectra", "store", "sa"), ["salvage"])
+        self.assertEqual(self.completed("spectra", "calibrate", "thermal"), ["thermal-delay"])
         self.assertEqual(self.completed("spectra", "token", "--role", "vi"), ["viewer"])
         self.assertEqual(self.completed("spectra", "fuse", "--method", "thermal_visible_b"), ["thermal_visible_blend"])
         self.assertEqual(self.completed("spectra", "check-config", "sp"), ["spectra"])

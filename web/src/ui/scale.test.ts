@@ -20,6 +20,7 @@ describe('sharesBeyond', () => {
     expect(sharesBeyond(histogram, 15, 25).below).toBeCloseTo(0.4, 12);
     expect(sharesBeyond(histogram, 15, 25).above).toBeCloseTo(0.2, 12);
     expect(sharesBeyond(histogram, 50, 60)).toEqual({ below: 1, above: 0 });
+    expect(sharesBeyond(histogram, 15, 25, { below: 0.005, above: 0 })).toEqual({ below: 0.005, above: 0 });
     expect(sharesBeyond(histogram, -9, -5)).toEqual({ below: 0, above: 1 });
   });
   it('counts nobody in the sliver between an end and the hottest', () => {

@@ -69,11 +69,15 @@ export function valueAt(travel: Travel, position: number): number {
   return Math.min(max, Math.max(min, Number(rounded.toPrecision(12))));
 }
 
-/** Which share of counted values lies below and above a range; a bin that the end of the range cuts counts in part. */
+/**
+ * Which share of counted values lies below and above a range; a bin that the end of the range cuts counts in part, but never for more
+ * than `most`: that readings are spread over a bin is a guess, and sensors give steps.
+ */
 export function sharesBeyond(
   { edges, counts }: { edges: readonly number[]; counts: readonly number[] },
   lo: number,
   hi: number,
+  most = { below: 1, above: 1 },
 ): { below: number; above: number } {
   let below = 0;
   let above = 0;
@@ -88,7 +92,8 @@ export function sharesBeyond(
     below += Math.floor(count * part(lo));
     above += Math.floor(count * (1 - (to > from ? part(hi) : hi >= from ? 1 : 0)));
   });
-  return all > 0 ? { below: below / all, above: above / all } : { below: 0, above: 0 };
+  if (all === 0) return { below: 0, above: 0 };
+  return { below: Math.min(below / all, most.below), above: Math.min(above / all, most.above) };
 }
 
 /** Moves labels apart so that none stands closer than `gap` to the next; keeps their order and stays inside lo..hi where it can. */
