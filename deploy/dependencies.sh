@@ -152,6 +152,13 @@ if [ ${#module_missing[@]} -gt 0 ]; then
 fi
 
 if [ ${#conflicting[@]} -gt 0 ]; then
+  for package in "${conflicting[@]}"; do
+    case $package in
+      nodejs|npm)
+        # Programs beside the build are on nobody's PATH.
+        stop "$package cannot be installed here (${harm_by[$package]}), and the Node.js that is here ($(node --version 2>/dev/null || echo "does not run")) lacks npm or is older than 18; put a newer one on the PATH" ;;
+    esac
+  done
   mkdir -p "$beside"
   new=$(mktemp -d "$beside.new-XXXX")
   trap 'rm -rf "$new"' EXIT
@@ -169,3 +176,4 @@ if [ ${#conflicting[@]} -gt 0 ]; then
   rm -r "$beside"
   mv "$new" "$beside"
 fi
+node_is_usable || { say "node on the PATH ($(command -v node || echo none)) lacks npm or is older than 18, and comes before what is installed; put a newer one before it"; exit 1; }

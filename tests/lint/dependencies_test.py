@@ -248,16 +248,22 @@ class Dependencies(unittest.TestCase):
         self.assertIn("apt-get install --no-remove wasi-libc", self.told)
 
     def test_keeps_a_node_that_is_new_enough_and_adds_one_where_there_is_none(self):
-        self.fake("node", "#!/bin/sh\necho false\n")
+        self.fake("node", '#!/bin/sh\ngrep -qx nodejs "$MACHINE/installed" && echo true || echo false\n')
         self.assertEqual(self.run_script(), 0, self.told)
         self.assertEqual(self.changes, ["install nodejs npm --no-remove"])
 
     def test_does_not_replace_a_node_whose_owner_would_lose_it(self):
         self.fake("node", "#!/bin/sh\necho false\n")
         self.conflict("npm", "Remv nodejs [16.20.2-1nodesource1]\nInst npm (9.2 Debian:12 [all])\n")
-        (self.machine / "failing" / "download").write_text("E: no such package\n")
         self.assertEqual(self.run_script(), 1)
         self.assert_stopped_unchanged("remove nodejs")
+        self.assertIn("older than 18", self.told)
+
+    def test_says_that_an_old_node_comes_before_the_one_it_has_installed(self):
+        self.fake("node", "#!/bin/sh\necho false\n")
+        self.assertEqual(self.run_script(), 1)
+        self.assertEqual(self.changes, ["install nodejs npm --no-remove"])
+        self.assertIn("comes before what is installed", self.told)
 
 
 if __name__ == "__main__":
