@@ -135,6 +135,13 @@ export function addAccuracyTests(browser) {
         await setTo(page, fusion);
         await setScale(page);
         await hideInterface(page);
+        // The first view has another method, and is the picture until the colours of this one have come.
+        await page.waitForFunction((method) => {
+          const { store } = globalThis.spectra;
+          return (
+            store.pictureStands && store.wanted === null && store.fusion.method === method && store.otherMethods.length === 0
+          );
+        }, fusion.method);
       } else if (random() < 0.3) {
         fusion = fusion === VISIBLE ? THERMAL : VISIBLE;
         await setTo(page, fusion);
