@@ -172,6 +172,8 @@ export function addLayoutTests(browser) {
       assert.deepEqual(problems, []);
       await server.stop();
       await page.getByText('Reconnecting').waitFor();
+      // The panel has just come back and the banner with it: their places are known a frame later.
+      await drawn(page);
       await look('without a link');
       await context.close();
     });
