@@ -30,6 +30,7 @@ FramesSession::FramesSession(Transport stream, ServerContext& context, FrameRece
       receiver_(receiver),
       who_(std::move(who)),
       writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
+      reader_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
       minder_timer_(ws_.get_executor()) {}
 
 asio::awaitable<void> FramesSession::run(UpgradeRequest request) {
@@ -57,6 +58,11 @@ asio::awaitable<void> FramesSession::run(UpgradeRequest request) {
 
 asio::awaitable<void> FramesSession::read_messages() {
   while (!is_ended_ && !closing_) {
+    if (answers_.size() >= kMostAnswers) {
+      reader_signal_.expires_at(Clock::time_point::max());
+      co_await reader_signal_.async_wait(kAwait);
+      continue;
+    }
     const auto [error, size] = co_await ws_.async_read(buffer_, kAwait);
     if (error) {
       end(false, error.message());
@@ -123,6 +129,7 @@ asio::awaitable<void> FramesSession::write_answers() {
     if (!answers_.empty()) {
       const Answer next = std::move(answers_.front());
       answers_.pop_front();
+      reader_signal_.cancel();
       if (!co_await write(text_of(next))) co_return;
       continue;
     }
@@ -187,6 +194,7 @@ void FramesSession::close(std::uint16_t code, std::string_view reason) {
   closing_.emplace(static_cast<websocket::close_code>(code), beast::string_view(reason.data(), reason.size()));
   close_deadline_ = Clock::now() + context_.options.limits.close_timeout;
   writer_signal_.cancel();
+  reader_signal_.cancel();
 }
 
 void FramesSession::end(bool is_cut, std::string_view why) {
@@ -200,6 +208,7 @@ void FramesSession::end(bool is_cut, std::string_view why) {
   receiver_.end();
   beast::get_lowest_layer(ws_).close();
   writer_signal_.cancel();
+  reader_signal_.cancel();
   minder_timer_.cancel();
 }
 

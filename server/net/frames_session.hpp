@@ -21,7 +21,7 @@ namespace spectra::net {
 
 /// The WebSocket of a robot that sends frames (docs/protocol.md, "A stream of frames"): a reader, a writer and a minder of deadlines as
 /// coroutines on one strand. Every message is answered; what is wrong with one ends nothing. What is in memory is bounded by the credit:
-/// what goes beyond it is dropped and refused.
+/// what goes beyond it is dropped and refused, and who takes no answers is not listened to.
 class FramesSession final : public Stoppable, public std::enable_shared_from_this<FramesSession> {
  public:
   using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
@@ -38,6 +38,8 @@ class FramesSession final : public Stoppable, public std::enable_shared_from_thi
   static constexpr std::size_t kLargestMessage = std::size_t{64} << 20;
   static constexpr std::uint64_t kCreditMessages = 128;
   static constexpr std::uint64_t kCreditBytes = std::uint64_t{64} << 20;
+  /// With more answers waiting nothing is read: whoever keeps to the credit never has so many.
+  static constexpr std::size_t kMostAnswers = 2 * kCreditMessages;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -65,6 +67,7 @@ class FramesSession final : public Stoppable, public std::enable_shared_from_thi
   FrameReceiver& receiver_;
   const access::AccessControl::Identity who_;
   boost::asio::steady_timer writer_signal_;
+  boost::asio::steady_timer reader_signal_;  ///< Of answers that have been written.
   boost::asio::steady_timer minder_timer_;
   boost::beast::flat_buffer buffer_;
   std::deque<Answer> answers_;

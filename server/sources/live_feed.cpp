@@ -319,6 +319,8 @@ void LiveFeed::work() {
       }
       for (const auto& [time_s, pose] : new_poses_) trajectory_.add(time_s, pose);
       new_poses_.clear();
+      // Of pictures that wait the oldest may be as far from the newest pose as one may come, and wait as long.
+      if (pose_end_s_ && trajectory_.size() > kManyPoses) trajectory_.forget_before(*pose_end_s_ - 2 * kFarthestStampS);
       pose_end_s = pose_end_s_;
       newest_s = newest_s_;
       if (is_ready()) {
@@ -393,7 +395,6 @@ net::FrameOutcome LiveFeed::map_picture(const Key& key, const net::IncomingFrame
     mapper_->fuse(frame, trajectory_, faults);
     has_changed_ = true;
   }
-  if (trajectory_.size() > kManyPoses) trajectory_.forget_before(key.first - kFarthestStampS);
   const auto wrong = std::find_if(faults.all().begin(), faults.all().end(),
                                   [](const mapping::FrameFault& fault) { return fault.count > 0; });
   if (wrong == faults.all().end()) return net::FrameTaken{};

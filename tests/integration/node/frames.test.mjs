@@ -209,6 +209,24 @@ test("who sends ten times what can be mapped is asked for less, and what is skip
   await server.stop();
 });
 
+test("who sends on beyond the credit and takes no answers is not listened to: what waits for him stays little", async () => {
+  const server = await live();
+  const sender = await FrameSender.connect(server.url);
+  sender.socket.pause();
+  const garbage = Buffer.alloc(1000);
+  const count = 60_000;
+  for (let i = 0; i < count; i += 1) sender.socket.send(garbage);
+  // What the system holds on the way is a few megabytes; the rest stays here.
+  await new Promise((resolve) => setTimeout(resolve, 3000));
+  const held = sender.socket.bufferedAmount;
+  assert.ok(held > (count * garbage.length) / 2, `${held} bytes have not been taken`);
+  sender.socket.resume();
+  await sender.until(() => sender.credit.messages > count);
+  assert.ok(sender.answers.size > 0);
+  sender.socket.terminate();
+  await server.stop();
+});
+
 test("there are frames for a map that is made of them alone, of one subprotocol, from whoever may change it", async () => {
   const plain = await serve(["--live"]);
   await assert.rejects(FrameSender.connect(plain.url), /404/);

@@ -101,8 +101,10 @@ TEST_F(LiveFeedTest, WaitsForThePoseOfAPictureAndMapsInTheOrderOfTime) {
     EXPECT_EQ(code_of(depth(10 + 0.1 * i)), "taken");
   }
   for (int i = 0; i < 100; ++i) {
-    const std::lock_guard lock(mutex_);
-    if (unit_count_ > 0 && poses_.size() > 1) break;
+    {
+      const std::lock_guard lock(mutex_);
+      if (unit_count_ > 0 && poses_.size() > 1) break;
+    }
     std::this_thread::sleep_for(20ms);
   }
   const std::lock_guard lock(mutex_);
