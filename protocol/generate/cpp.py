@@ -39,7 +39,7 @@ class Writer:
             return "std::uint8_t"
         if low is None or low < 0:
             return "std::int64_t" if high is None else "int"
-        if high is None:
+        if high is None or high > LARGEST_U32:
             return "std::uint64_t"
         return "int" if high <= 65536 else "std::uint32_t"
 
@@ -172,7 +172,7 @@ class Writer:
             if condition:
                 if not field.is_plain:
                     condition = f"!message.{member(field.name)} || ({condition})"
-                lines.append(f'  fields.require("{field.name}", {condition}, {text(expected(self.protocol, field.schema))});\n')
+                lines.append(f'  fields.require("{field.name}", [&] {{ return {condition}; }}, {text(expected(self.protocol, field.schema))});\n')
         lines.append("  rules(fields, message);\n}\n\n")
         return "".join(lines)
 

@@ -202,9 +202,10 @@ class FieldReader {
     if (const nlohmann::json* found = find(key)) values_.read(*found, path_of(key), value);
   }
 
-  /// A condition on a field that has been read.
-  void require(const char* key, bool holds, const char* expected) {
-    if (holds || values_.error()) return;
+  /// A condition on a field that has been read; asked only if nothing was wrong before.
+  template <std::predicate Condition>
+  void require(const char* key, Condition holds, const char* expected) {
+    if (values_.error() || holds()) return;
     const nlohmann::json* found = find(key);
     if (found != nullptr)
       values_.refuse(path_of(key), expected, *found);
@@ -286,7 +287,7 @@ class FieldWriter {
   void unless_empty(const char* key, const Container& value) {
     if (!value.empty()) object_[key] = json_of(value);
   }
-  void require(const char*, bool, const char*) {}
+  void require(const char*, const auto&, const char*) {}
 
   nlohmann::json object() && { return std::move(object_); }
 

@@ -32,19 +32,23 @@ std::span<const EnumWord<FrameEncoding>> words_of() {
 static void describe(auto& fields, Is<FrameHead> auto& message) {
   fields.field("kind", message.kind);
   fields.field("sequence", message.sequence);
-  fields.require("sequence", message.sequence >= 1U, "an integer not below 1");
+  fields.require(
+      "sequence", [&] { return message.sequence >= 1U; }, "an integer not below 1");
   fields.optional("time", message.time);
   fields.optional("sensor", message.sensor);
   fields.optional("encoding", message.encoding);
   fields.optional("width", message.width);
-  fields.require("width", !message.width || (*message.width >= 1 && *message.width <= 8192),
-                 "an integer from 1 to 8192");
+  fields.require(
+      "width", [&] { return !message.width || (*message.width >= 1 && *message.width <= 8192); },
+      "an integer from 1 to 8192");
   fields.optional("height", message.height);
-  fields.require("height", !message.height || (*message.height >= 1 && *message.height <= 8192),
-                 "an integer from 1 to 8192");
+  fields.require(
+      "height", [&] { return !message.height || (*message.height >= 1 && *message.height <= 8192); },
+      "an integer from 1 to 8192");
   fields.unless_empty("poses", message.poses);
-  fields.require("poses", each(message.poses, [](const auto& item) { return item.size() == 8; }),
-                 "a list of poses of 8 numbers");
+  fields.require(
+      "poses", [&] { return each(message.poses, [](const auto& item) { return item.size() == 8; }); },
+      "a list of poses of 8 numbers");
   rules(fields, message);
 }
 
@@ -71,7 +75,8 @@ static void describe(auto& fields, Is<FramesTaken> auto& message) {
   fields.field("sequence", message.sequence);
   fields.optional("skipped", message.skipped);
   fields.optional("pictures_per_s", message.pictures_per_s);
-  fields.require("pictures_per_s", !message.pictures_per_s || (*message.pictures_per_s > 0), "a number above 0");
+  fields.require(
+      "pictures_per_s", [&] { return !message.pictures_per_s || (*message.pictures_per_s > 0); }, "a number above 0");
   fields.field("credit", message.credit);
   rules(fields, message);
 }

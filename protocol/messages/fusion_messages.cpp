@@ -39,7 +39,8 @@ static void describe(auto& fields, Is<ParameterDescription> auto& message) {
   fields.optional("max", message.max);
   fields.optional("exclusive_min", message.exclusive_min);
   fields.optional("step", message.step);
-  fields.require("step", !message.step || (*message.step > 0), "a number above 0");
+  fields.require(
+      "step", [&] { return !message.step || (*message.step > 0); }, "a number above 0");
   fields.unless_empty("unit", message.unit);
   fields.unless_empty("options", message.options);
   fields.optional("automatic", message.automatic);
@@ -67,9 +68,11 @@ static void describe(auto& fields, Is<PaletteDescription> auto& message) {
   fields.field("colours", message.colours);
   fields.require(
       "colours",
-      message.colours.size() == 256 &&
-          each(message.colours,
-               [](const auto& item) { return each(item, [](const auto& part) { return part >= 0 && part <= 255; }); }),
+      [&] {
+        return message.colours.size() == 256 && each(message.colours, [](const auto& item) {
+                 return each(item, [](const auto& part) { return part >= 0 && part <= 255; });
+               });
+      },
       "a list of 256");
   rules(fields, message);
 }
@@ -79,16 +82,19 @@ static void describe(auto& fields, Is<FusionRange> auto& message) {
   fields.nullable("min", message.min);
   fields.nullable("max", message.max);
   fields.optional("low", message.low);
-  fields.require("low", !message.low || (*message.low >= 0 && *message.low <= 100), "a number from 0 to 100");
+  fields.require(
+      "low", [&] { return !message.low || (*message.low >= 0 && *message.low <= 100); }, "a number from 0 to 100");
   fields.optional("high", message.high);
-  fields.require("high", !message.high || (*message.high >= 0 && *message.high <= 100), "a number from 0 to 100");
+  fields.require(
+      "high", [&] { return !message.high || (*message.high >= 0 && *message.high <= 100); }, "a number from 0 to 100");
   rules(fields, message);
 }
 
 static void describe(auto& fields, Is<FusionAge> auto& message) {
   fields.field("mode", message.mode);
   fields.field("half_life_s", message.half_life_s);
-  fields.require("half_life_s", message.half_life_s > 0, "a number above 0");
+  fields.require(
+      "half_life_s", [&] { return message.half_life_s > 0; }, "a number above 0");
   rules(fields, message);
 }
 
@@ -103,9 +109,11 @@ static void describe(auto& fields, Is<RangeChange> auto& message) {
   fields.optional_or_null("min", message.min);
   fields.optional_or_null("max", message.max);
   fields.optional("low", message.low);
-  fields.require("low", !message.low || (*message.low >= 0 && *message.low <= 100), "a number from 0 to 100");
+  fields.require(
+      "low", [&] { return !message.low || (*message.low >= 0 && *message.low <= 100); }, "a number from 0 to 100");
   fields.optional("high", message.high);
-  fields.require("high", !message.high || (*message.high >= 0 && *message.high <= 100), "a number from 0 to 100");
+  fields.require(
+      "high", [&] { return !message.high || (*message.high >= 0 && *message.high <= 100); }, "a number from 0 to 100");
   rules(fields, message);
 }
 
@@ -122,8 +130,9 @@ static void describe(auto& fields, Is<FusionState> auto& message) {
   fields.field("palette", message.palette);
   fields.field("range", message.range);
   fields.field("missing", message.missing);
-  fields.require("missing", matches(message.missing, "^(visible|#[0-9a-fA-F]{6})$"),
-                 "\"visible\" or a colour \"#rrggbb\"");
+  fields.require(
+      "missing", [&] { return matches(message.missing, "^(visible|#[0-9a-fA-F]{6})$"); },
+      "\"visible\" or a colour \"#rrggbb\"");
   fields.field("age", message.age);
   fields.optional("change_scale", message.change_scale);
   rules(fields, message);
@@ -135,8 +144,9 @@ static void describe(auto& fields, Is<FusionChange> auto& message) {
   fields.optional("palette", message.palette);
   fields.optional("range", message.range);
   fields.optional("missing", message.missing);
-  fields.require("missing", !message.missing || (matches(*message.missing, "^(visible|#[0-9a-fA-F]{6})$")),
-                 "\"visible\" or a colour \"#rrggbb\"");
+  fields.require(
+      "missing", [&] { return !message.missing || (matches(*message.missing, "^(visible|#[0-9a-fA-F]{6})$")); },
+      "\"visible\" or a colour \"#rrggbb\"");
   fields.optional("age", message.age);
   rules(fields, message);
 }

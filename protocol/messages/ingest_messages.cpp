@@ -27,7 +27,8 @@ static void describe(auto& fields, Is<IngestHello> auto& message) {
 
 static void describe(auto& fields, Is<IngestAcknowledged> auto& message) {
   fields.field("sequence", message.sequence);
-  fields.require("sequence", message.sequence >= 1U, "an integer not below 1");
+  fields.require(
+      "sequence", [&] { return message.sequence >= 1U; }, "an integer not below 1");
   fields.field("revision", message.revision);
   fields.unless_empty("notes", message.notes);
   fields.field("credit", message.credit);
@@ -36,7 +37,8 @@ static void describe(auto& fields, Is<IngestAcknowledged> auto& message) {
 
 static void describe(auto& fields, Is<IngestRefused> auto& message) {
   fields.field("sequence", message.sequence);
-  fields.require("sequence", message.sequence >= 1U, "an integer not below 1");
+  fields.require(
+      "sequence", [&] { return message.sequence >= 1U; }, "an integer not below 1");
   fields.field("code", message.code);
   fields.field("field", message.field);
   fields.field("reason", message.reason);

@@ -20,7 +20,8 @@ std::span<const EnumWord<BaselineAction>> words_of() {
 
 static void describe(auto& fields, Is<HistogramRequest> auto& message) {
   fields.field("bins", message.bins);
-  fields.require("bins", message.bins >= 1 && message.bins <= 4096, "an integer from 1 to 4096");
+  fields.require(
+      "bins", [&] { return message.bins >= 1 && message.bins <= 4096; }, "an integer from 1 to 4096");
   rules(fields, message);
 }
 
@@ -31,9 +32,12 @@ static void describe(auto& fields, Is<HistogramReply> auto& message) {
   fields.nullable("sigma", message.sigma);
   fields.field("highlighted", message.highlighted);
   fields.optional("highlighted_share", message.highlighted_share);
-  fields.require("highlighted_share",
-                 !message.highlighted_share || (*message.highlighted_share >= 0 && *message.highlighted_share <= 1),
-                 "a number from 0 to 1");
+  fields.require(
+      "highlighted_share",
+      [&] {
+        return !message.highlighted_share || (*message.highlighted_share >= 0 && *message.highlighted_share <= 1);
+      },
+      "a number from 0 to 1");
   rules(fields, message);
 }
 
@@ -41,8 +45,10 @@ static void describe(auto& fields, Is<ProbeRequest> auto& message) {
   fields.field("position", message.position);
   fields.require(
       "position",
-      each(message.position,
-           [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; }),
+      [&] {
+        return each(message.position,
+                    [](const auto& item) { return item >= -3.4028234663852886e+38 && item <= 3.4028234663852886e+38; });
+      },
       "a list of 3 numbers that fit a 32-bit float");
   rules(fields, message);
 }
@@ -55,13 +61,15 @@ static void describe(auto& fields, Is<ProbeReply> auto& message) {
   fields.field("visible", message.visible);
   fields.field("fused", message.fused);
   fields.field("distance", message.distance);
-  fields.require("distance", message.distance >= 0, "a number not below 0");
+  fields.require(
+      "distance", [&] { return message.distance >= 0; }, "a number not below 0");
   fields.nullable("observed_at", message.observed_at);
   fields.nullable("baseline", message.baseline);
   fields.nullable("baseline_at", message.baseline_at);
   fields.optional("temperature_sigma", message.temperature_sigma);
-  fields.require("temperature_sigma", !message.temperature_sigma || (*message.temperature_sigma >= 0),
-                 "a number not below 0");
+  fields.require(
+      "temperature_sigma", [&] { return !message.temperature_sigma || (*message.temperature_sigma >= 0); },
+      "a number not below 0");
   fields.optional("temperature_at", message.temperature_at);
   rules(fields, message);
 }
@@ -86,9 +94,12 @@ static void describe(auto& fields, Is<Extreme> auto& message) {
 static void describe(auto& fields, Is<ExtremesRequest> auto& message) {
   fields.optional("camera", message.camera);
   fields.optional("window", message.window);
-  fields.require("window",
-                 !message.window || (each(*message.window, [](const auto& item) { return item >= 0 && item <= 1; })),
-                 "a list of 4 numbers from 0 to 1");
+  fields.require(
+      "window",
+      [&] {
+        return !message.window || (each(*message.window, [](const auto& item) { return item >= 0 && item <= 1; }));
+      },
+      "a list of 4 numbers from 0 to 1");
   rules(fields, message);
 }
 
@@ -102,7 +113,9 @@ static void describe(auto& fields, Is<ExtremesReply> auto& message) {
 
 static void describe(auto& fields, Is<FactsRequest> auto& message) {
   fields.optional("bins", message.bins);
-  fields.require("bins", !message.bins || (*message.bins >= 1 && *message.bins <= 4096), "an integer from 1 to 4096");
+  fields.require(
+      "bins", [&] { return !message.bins || (*message.bins >= 1 && *message.bins <= 4096); },
+      "an integer from 1 to 4096");
   fields.optional("hues", message.hues);
   rules(fields, message);
 }

@@ -67,7 +67,8 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.field("tile_count", message.tile_count);
   fields.field("levels", message.levels);
   fields.field("position_step_m", message.position_step_m);
-  fields.require("position_step_m", message.position_step_m > 0, "a number above 0");
+  fields.require(
+      "position_step_m", [&] { return message.position_step_m > 0; }, "a number above 0");
   fields.field("up", message.up);
   fields.optional("metric", message.metric);
   fields.optional("live", message.live);
@@ -90,17 +91,21 @@ static void describe(auto& fields, Is<ServerInfo> auto& message) {
 
 static void describe(auto& fields, Is<Limits> auto& message) {
   fields.field("max_message_bytes", message.max_message_bytes);
-  fields.require("max_message_bytes", message.max_message_bytes >= 1U, "an integer not below 1");
+  fields.require(
+      "max_message_bytes", [&] { return message.max_message_bytes >= 1U; }, "an integer not below 1");
   fields.field("max_depth", message.max_depth);
-  fields.require("max_depth", message.max_depth >= 1U, "an integer from 1 to 4294967295");
+  fields.require(
+      "max_depth", [&] { return message.max_depth >= 1U; }, "an integer from 1 to 4294967295");
   fields.field("max_requests_per_s", message.max_requests_per_s);
-  fields.require("max_requests_per_s", message.max_requests_per_s > 0, "a number above 0");
+  fields.require(
+      "max_requests_per_s", [&] { return message.max_requests_per_s > 0; }, "a number above 0");
   rules(fields, message);
 }
 
 static void describe(auto& fields, Is<Hello> auto& message) {
   fields.field("protocol", message.protocol);
-  fields.require("protocol", message.protocol == "spectra.v1", "\"spectra.v1\"");
+  fields.require(
+      "protocol", [&] { return message.protocol == "spectra.v1"; }, "\"spectra.v1\"");
   fields.field("server", message.server);
   fields.field("session_id", message.session_id);
   fields.field("role", message.role);
