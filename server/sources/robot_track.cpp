@@ -51,7 +51,6 @@ void RobotTrack::moved(const RobotPose& pose, bool is_last) {
   std::vector<std::shared_ptr<const Listener>> listening;
   {
     const std::lock_guard lock(mutex_);
-    std::erase_if(listeners_, [](const auto& listener) { return listener.expired(); });
     for (const auto& listener : listeners_) {
       if (auto held = listener.lock()) listening.push_back(std::move(held));
     }
@@ -71,6 +70,8 @@ std::optional<RobotTrack::News> RobotTrack::news(Told& told) const {
 std::shared_ptr<const RobotTrack::Listener> RobotTrack::subscribe(Listener listener) {
   auto held = std::make_shared<const Listener>(std::move(listener));
   const std::lock_guard lock(mutex_);
+  // Without a robot nobody else ever looks through them.
+  std::erase_if(listeners_, [](const auto& other) { return other.expired(); });
   listeners_.push_back(held);
   return held;
 }

@@ -52,6 +52,12 @@ class RobotTrack {
   /// `listener` is called, from the thread of moved(), while the returned pointer is held; it should only post to its own thread.
   [[nodiscard]] std::shared_ptr<const Listener> subscribe(Listener listener);
 
+  /// With those that have gone since the last subscribe().
+  std::size_t listener_count() const {
+    const std::lock_guard lock(mutex_);
+    return listeners_.size();
+  }
+
  private:
   bool take(const RobotPose& pose, bool is_last);
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <vector>
 
 namespace spectra::sources {
@@ -78,6 +79,13 @@ TEST(RobotTrack, WakesListenersFiveTimesASecondAndWhenTheRobotIsLost) {
   subscription.reset();
   track.moved(at(9, 9));
   EXPECT_EQ(count, 8);
+}
+
+TEST(RobotTrack, ForgetsWhoHasGoneThoughNoRobotMoves) {
+  RobotTrack track;
+  const auto stays = track.subscribe([] {});
+  for (int i = 0; i < 100; ++i) std::ignore = track.subscribe([] {});
+  EXPECT_LE(track.listener_count(), 2U);
 }
 
 }  // namespace
