@@ -58,6 +58,7 @@ void ViewerTiles::clear() {
   for (const auto& slot : slots_) slot->is_gone = true;
   slots_.clear();
   removals_.clear();
+  prepared_bytes_ = 0;
   tree_ = {};
 }
 
@@ -67,19 +68,18 @@ void ViewerTiles::make_ready(TileSlot& slot, std::shared_ptr<const EncodedTile> 
   slot.prepared.geometry = std::move(geometry);
   slot.prepared.colours = std::move(colours);
   slot.prepared.colour_bits = colour_bits;
-  prepared_bytes_ += prepared_size(slot);
+  count_prepared(slot);
 }
 
 void ViewerTiles::put_down(TileSlot& slot) {
   if (slot.work != TileSlot::Work::Ready) return;
-  prepared_bytes_ -= prepared_size(slot);
   slot.work = TileSlot::Work::Idle;
   slot.prepared.geometry = nullptr;
   slot.prepared.colours = nullptr;
+  count_prepared(slot);
 }
 
 void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch) {
-  prepared_bytes_ -= slot.prepared.geometry->payload->size();
   slot.held.wire_revision = name;
   slot.held.revision = slot.prepared.geometry->revision;
   slot.held.child_mask = slot.tile->child_mask;
@@ -87,6 +87,7 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   slot.held.geometry_epoch = geometry_epoch;
   slot.held.colour_epoch = 0;
   slot.forget_raw();
+  count_prepared(slot);
 }
 
 void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
@@ -109,9 +110,13 @@ std::size_t ViewerTiles::set_looks(const LookRules& rules) {
   return changed_count;
 }
 
-std::size_t ViewerTiles::prepared_size(const TileSlot& slot) {
-  return (slot.prepared.colours ? slot.prepared.colours->size() : 0) +
-         (slot.held.revision == slot.prepared.geometry->revision ? 0 : slot.prepared.geometry->payload->size());
+void ViewerTiles::count_prepared(TileSlot& slot) {
+  prepared_bytes_ -= std::exchange(slot.prepared.counted_bytes, 0);
+  if (slot.work != TileSlot::Work::Ready) return;
+  const bool is_geometry_due = slot.held.revision != slot.prepared.geometry->revision;
+  slot.prepared.counted_bytes = (slot.prepared.colours ? slot.prepared.colours->size() : 0) +
+                                (is_geometry_due ? slot.prepared.geometry->payload->size() : 0);
+  prepared_bytes_ += slot.prepared.counted_bytes;
 }
 
 bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const {
@@ -201,6 +206,7 @@ void ViewerTiles::push_removal(TileId tile, std::uint32_t revision) {
 void ViewerTiles::remove_from_viewer(TileSlot& slot) {
   if (slot.held.wire_revision != 0) push_removal(slot.tile->id, slot.held.wire_revision);
   slot.forget_held();
+  count_prepared(slot);
 }
 
 void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {

@@ -40,7 +40,8 @@ struct TileSlot {
   struct Prepared {
     std::shared_ptr<const EncodedTile> geometry;
     Payload colours;
-    int colour_bits = 0;  ///< Of `colours`.
+    int colour_bits = 0;            ///< Of `colours`.
+    std::size_t counted_bytes = 0;  ///< Its share of ViewerTiles::prepared_bytes().
   };
   /// What was given out last; 0 = nothing.
   struct Held {
@@ -157,7 +158,8 @@ class ViewerTiles {
   protocol::TileFrameHeader take_removal();
 
  private:
-  static std::size_t prepared_size(const TileSlot& slot);
+  /// Whenever what is prepared of a slot or held of it has changed.
+  void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;
   /// All of it is drawn by tiles beneath that have the newest colours.
   bool is_covered(const TileSlot& slot, const Demand& demand) const;

@@ -223,6 +223,23 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
   expect_picture(viewer, *next, 0.3);
 }
 
+TEST_F(ViewerStreamTest, ATileThatGoesWhileItsColoursAreReadyLeavesNothingQueued) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  show(viewer, 0.6);
+  wait_until_idle(pool_);
+  ASSERT_GT(viewer.stream().stats().queued_bytes, 0U) << "else this shows nothing";
+
+  std::vector<std::shared_ptr<const map::Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
+  tiles.erase(tiles.begin() + 2);
+  viewer.stream().set_scene(scene_of(tiles, 2));
+  viewer.complete();
+  viewer.acknowledge();
+  EXPECT_EQ(viewer.stream().stats().queued_bytes, 0U);
+}
+
 TEST_F(ViewerStreamTest, ACoarseTileThatNobodySeesIsNotSentAgain) {
   std::vector<std::shared_ptr<const map::Tile>> tiles = testing::quadtree_tiles(3, 12);
   const auto first = scene_of(tiles);
