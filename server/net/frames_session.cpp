@@ -1,66 +1,27 @@
 #include "server/net/frames_session.hpp"
 
-#include <spdlog/spdlog.h>
-
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
-#include <boost/beast/websocket/rfc6455.hpp>
-#include <exception>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "protocol/frame_message.hpp"
 #include "protocol/jsonrpc.hpp"
-#include "server/net/request_right.hpp"
-#include "server/net/websocket_setup.hpp"
 
 namespace spectra::net {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
-namespace websocket = boost::beast::websocket;
-using boost::system::error_code;
 
 FramesSession::FramesSession(Transport stream, ServerContext& context, FrameReceiver& receiver,
                              access::AccessControl::Identity who)
-    : ws_(std::move(stream)),
-      context_(context),
-      receiver_(receiver),
-      who_(std::move(who)),
-      writer_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
-      reader_signal_(ws_.get_executor(), asio::steady_timer::time_point::max()),
-      minder_timer_(ws_.get_executor()) {}
-
-asio::awaitable<void> FramesSession::run(UpgradeRequest request) {
-  using namespace asio::experimental::awaitable_operators;
-  const auto self = shared_from_this();
-  beast::get_lowest_layer(ws_).expires_never();
-  set_up_websocket(ws_, context_.options.limits.header_timeout, protocol::kFramesProtocol, kLargestMessage);
-  ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
-    if (kind == websocket::frame_type::pong) pings_.answered({payload.data(), payload.size()}, Clock::now());
-  });
-  const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
-  if (accept_error || !context_.add(self)) {
-    end(false, "the upgrade was not finished");
-    co_return;
-  }
-  spdlog::info("a robot sends frames");
-  try {
-    co_await (read_messages() && write_answers() && mind_deadlines());
-  } catch (const std::exception& error) {
-    spdlog::error("a session of frames failed: {}", error.what());
-  }
-  end(false, "");
-  context_.remove(this);
-}
+    : SenderSession(std::move(stream), context, std::move(who),
+                    {"a robot that sends frames", protocol::kFramesProtocol, kLargestMessage}),
+      receiver_(receiver) {}
 
 asio::awaitable<void> FramesSession::read_messages() {
-  while (!is_ended_ && !closing_) {
+  while (!is_over()) {
     if (answers_.size() >= kMostAnswers) {
-      reader_signal_.expires_at(Clock::time_point::max());
-      co_await reader_signal_.async_wait(kAwait);
+      co_await pause_reading(Clock::time_point::max());
       continue;
     }
     const auto [error, size] = co_await ws_.async_read(buffer_, kAwait);
@@ -68,7 +29,7 @@ asio::awaitable<void> FramesSession::read_messages() {
       end(false, error.message());
       co_return;
     }
-    if (closing_) co_return;
+    if (is_over()) co_return;
     std::string message = beast::buffers_to_string(buffer_.data());
     buffer_.consume(buffer_.size());
     receive(std::move(message));
@@ -90,7 +51,7 @@ void FramesSession::receive(std::string message) {
   auto& [head, body_begin] = decoded.value();
   const std::uint64_t sequence = head.sequence;
   if (is_beyond) return refuse(sequence, "credit", "", "more was sent than the credit; it is left out");
-  receiver_.take({std::move(head), std::move(message), body_begin}, [self = shared_from_this(), sequence,
+  receiver_.take({std::move(head), std::move(message), body_begin}, [self = shared_as<FramesSession>(), sequence,
                                                                      size_bytes](FrameOutcome outcome) mutable {
     asio::post(self->ws_.get_executor(), [self, sequence, size_bytes, outcome = std::move(outcome)]() mutable {
       self->answer(sequence, size_bytes, std::move(outcome));
@@ -99,9 +60,8 @@ void FramesSession::receive(std::string message) {
 }
 
 void FramesSession::answer(std::uint64_t sequence, std::uint64_t size_bytes, FrameOutcome outcome) {
-  if (is_ended_) return;
   answers_.push_back({sequence, size_bytes, std::move(outcome)});
-  writer_signal_.cancel();
+  notify_writer();
 }
 
 protocol::FramesCredit FramesSession::credit() const {
@@ -122,105 +82,17 @@ std::string FramesSession::text_of(const Answer& answer) {
   return protocol::notification_text("frames.taken", protocol::to_json(message));
 }
 
-asio::awaitable<void> FramesSession::write_answers() {
+std::string FramesSession::hello_text() {
   const protocol::FramesHello hello{protocol::kFramesProtocol, {kLargestMessage, protocol::kFrameHeadSize}, credit()};
-  if (!co_await write(protocol::notification_text("frames.hello", protocol::to_json(hello)))) co_return;
-  while (!is_ended_) {
-    if (!answers_.empty()) {
-      const Answer next = std::move(answers_.front());
-      answers_.pop_front();
-      reader_signal_.cancel();
-      if (!co_await write(text_of(next))) co_return;
-      continue;
-    }
-    if (is_stopping_) close(websocket::close_code::going_away, "the server stops");
-    if (closing_) {
-      co_await ws_.async_close(*closing_, kAwait);
-      end(false, "closed by the server");
-      co_return;
-    }
-    writer_signal_.expires_at(Clock::time_point::max());
-    co_await writer_signal_.async_wait(kAwait);
-  }
+  return protocol::notification_text("frames.hello", protocol::to_json(hello));
 }
 
-asio::awaitable<bool> FramesSession::write(std::string text) {
-  ws_.text(true);
-  is_writing_ = true;
-  const auto [error, size] = co_await ws_.async_write(asio::buffer(text), kAwait);
-  is_writing_ = false;
-  if (error) end(false, error.message());
-  co_return !error;
-}
-
-asio::awaitable<void> FramesSession::mind_deadlines() {
-  const NetLimits& limits = context_.options.limits;
-  const auto& counted = beast::get_lowest_layer(ws_).rate_policy();
-  std::uint64_t written_bytes = 0, read_bytes = 0;
-  auto last_write_progress = Clock::now(), last_reading = Clock::now();
-  while (!is_ended_) {
-    minder_timer_.expires_after(limits.tick);
-    co_await minder_timer_.async_wait(kAwait);
-    if (is_ended_) co_return;
-    const auto now = Clock::now();
-    if (!is_writing_ || counted.written_bytes() != written_bytes) last_write_progress = now;
-    written_bytes = counted.written_bytes();
-    if (counted.read_bytes() != read_bytes) last_reading = now;
-    read_bytes = counted.read_bytes();
-    if (now - last_write_progress >= limits.write_timeout) {
-      end(true, "it takes no answers");
-    } else if (now - last_reading >= limits.ping_interval + limits.pong_timeout) {
-      end(true, "it is silent");
-    } else if (now >= close_deadline_) {
-      end(false, "the close was not finished in time");
-    } else if (closing_) {
-      continue;
-    } else if (!context_.options.access->is_good(who_)) {
-      close(kAccessWithdrawn, "access was withdrawn");
-    } else if (auto payload = pings_.next(now, limits.ping_interval)) {
-      asio::co_spawn(ws_.get_executor(), ping(std::move(*payload)), asio::detached);
-    }
-  }
-}
-
-asio::awaitable<void> FramesSession::ping(std::string payload) {
-  const auto self = shared_from_this();
-  co_await ws_.async_ping(websocket::ping_data(payload), kAwait);
-  pings_.written();
-}
-
-void FramesSession::close(std::uint16_t code, std::string_view reason) {
-  if (closing_ || is_ended_) return;
-  closing_.emplace(static_cast<websocket::close_code>(code), beast::string_view(reason.data(), reason.size()));
-  close_deadline_ = Clock::now() + context_.options.limits.close_timeout;
-  writer_signal_.cancel();
-  reader_signal_.cancel();
-}
-
-void FramesSession::end(bool is_cut, std::string_view why) {
-  if (is_ended_) return;
-  is_ended_ = true;
-  if (is_cut) {
-    spdlog::info("a robot that sends frames is cut: {}", why);
-  } else {
-    spdlog::info("a robot sends no more frames: {}", why);
-  }
-  receiver_.end();
-  beast::get_lowest_layer(ws_).close();
-  writer_signal_.cancel();
-  reader_signal_.cancel();
-  minder_timer_.cancel();
-}
-
-void FramesSession::begin_stop() {
-  asio::post(ws_.get_executor(), [self = shared_from_this()] {
-    self->is_stopping_ = true;
-    self->writer_signal_.cancel();
-  });
-}
-
-void FramesSession::cut() {
-  asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end(true, "the server stops"); });
+std::optional<std::string> FramesSession::next_answer() {
+  if (answers_.empty()) return std::nullopt;
+  const Answer next = std::move(answers_.front());
+  answers_.pop_front();
+  resume_reading();
+  return text_of(next);
 }
 
 }  // namespace spectra::net

@@ -2,10 +2,10 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { existsSync } from "node:fs";
-import net from "node:net";
 import path from "node:path";
 import { after, before, test } from "node:test";
 import WebSocket from "ws";
+import { closeCodeAfter, closeFrame as close, rawFrame as frame } from "./raw_websocket.mjs";
 import { binary } from "./spectra_server.mjs";
 
 const program = path.join(path.dirname(binary), "spectra-echo");
@@ -47,39 +47,8 @@ test("text and binary messages of every size come back as they were, in parts to
   assert.equal(await new Promise((resolve) => socket.on("close", resolve)), 3000);
 });
 
-/** Sends bytes behind a good upgrade; the code of the close frame that comes back. */
-function closeCode(...frames) {
-  const { hostname, port } = new URL(url);
-  return new Promise((resolve) => {
-    const socket = net.connect(port, hostname, () =>
-      socket.write(
-        "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
-      ),
-    );
-    let received = Buffer.alloc(0);
-    let isOpen = false;
-    socket.on("data", (chunk) => {
-      received = Buffer.concat([received, chunk]);
-      const end = received.indexOf("\r\n\r\n");
-      if (!isOpen && end >= 0) {
-        isOpen = true;
-        received = received.subarray(end + 4);
-        for (const frame of frames) socket.write(frame);
-      }
-      if (isOpen && received.length >= 4 && received[0] === 0x88) {
-        resolve(received.readUInt16BE(2));
-        socket.destroy();
-      }
-    });
-    socket.on("close", () => resolve(null));
-  });
-}
-/** A masked frame of a client; the mask is zero. */
-const frame = (first, payload = Buffer.alloc(0)) =>
-  Buffer.concat([Buffer.from([first, 0x80 | payload.length, 0, 0, 0, 0]), payload]);
-
 test("what the standard forbids ends with its code", async () => {
-  const close = (code) => frame(0x88, Buffer.from([code >> 8, code & 255]));
+  const closeCode = (bytes) => closeCodeAfter(url, [bytes]);
   assert.equal(await closeCode(frame(0x81, Buffer.from([0xff, 0xfe]))), 1007);
   assert.equal(await closeCode(frame(0xc1, Buffer.from("x"))), 1002, "a reserved bit");
   assert.equal(await closeCode(frame(0x83)), 1002, "a reserved opcode");

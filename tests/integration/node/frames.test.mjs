@@ -7,6 +7,7 @@ import path from "node:path";
 import { after, test } from "node:test";
 import { deflateSync, crc32 } from "node:zlib";
 import { FrameSender, frameMessage, messagesOf } from "./frames_sender.mjs";
+import { closeCodeAfter, closeFrame } from "./raw_websocket.mjs";
 import { SpectraClient } from "./spectra_client.mjs";
 import { binary, serve } from "./spectra_server.mjs";
 
@@ -224,6 +225,17 @@ test("who sends on beyond the credit and takes no answers is not listened to: wh
   await sender.until(() => sender.credit.messages > count);
   assert.ok(sender.answers.size > 0);
   sender.socket.terminate();
+  await server.stop();
+});
+
+test("a close with a code that the standard gives to nobody is answered with 1002, by senders' sockets too", async () => {
+  const server = await live();
+  for (const [target, subprotocol] of [["/frames", "spectra.frames.v1"], ["/ingest", "spectra.ingest.v1"], ["/ws", "spectra.v1"]]) {
+    for (const [code, expected] of [[5000, 1002], [65_535, 1002], [1000, 1000]]) {
+      const url = new URL(target, server.url);
+      assert.equal(await closeCodeAfter(url, [closeFrame(code)], { subprotocol }), expected, `${target} ${code}`);
+    }
+  }
   await server.stop();
 });
 
