@@ -60,11 +60,11 @@ HWY_INLINE Doubles power(Doubles t, double k, bool lift) {
 }
 
 void fuse_inverse(const Ramp& normalised, double k, bool lift, bool substitute, const VertexSpan& span) {
-  const auto intensity = [&](Doubles temperature) HWY_ATTR {
+  const auto intensity = [&](Doubles temperature) SPECTRA_IN_LOOP {
     const Doubles t = on_ramp(normalised, temperature);
     return k == 1 ? t : power(t, k, lift);
   };
-  fuse_shaded(span, intensity, [&](const Vertices& vertices, Floats scale) HWY_ATTR {
+  fuse_shaded(span, intensity, [&](const Vertices& vertices, Floats scale) SPECTRA_IN_LOOP {
     const Colours& v = vertices.visible;
     Floats grey = all(0);
     if (substitute) {

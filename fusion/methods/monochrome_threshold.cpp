@@ -19,12 +19,13 @@ namespace spectra::fusion::HWY_NAMESPACE {
 
 void fuse_monochrome(const Ramp& intensity, const float* pure_hue, float threshold, bool invert, float alpha,
                      const VertexSpan& span) {
-  const auto on_intensity = [&](Doubles temperature) HWY_ATTR { return on_ramp(intensity, temperature); };
+  const auto on_intensity = [&](Doubles temperature) SPECTRA_IN_LOOP { return on_ramp(intensity, temperature); };
   const Floats limit = all(threshold);
-  fuse_shaded(span, on_intensity, [&](const Vertices& vertices, Floats t) HWY_ATTR {
+  fuse_shaded(span, on_intensity, [&](const Vertices& vertices, Floats t) SPECTRA_IN_LOOP {
     const Floats squared = hn::Mul(t, t);
     const Floats pale = hn::Sub(t, squared);
-    const auto lit = [&](float pure) HWY_ATTR { return hn::Mul(all(255), hn::Add(pale, hn::Mul(squared, all(pure)))); };
+    const auto lit = [&](float pure)
+                         SPECTRA_IN_LOOP { return hn::Mul(all(255), hn::Add(pale, hn::Mul(squared, all(pure)))); };
     const auto passes = invert ? hn::Lt(vertices.temperature, limit) : hn::Gt(vertices.temperature, limit);
     const Floats weight = hn::IfThenElseZero(passes, all(alpha));
     return mixed(weight, {lit(pure_hue[0]), lit(pure_hue[1]), lit(pure_hue[2])}, vertices.visible);

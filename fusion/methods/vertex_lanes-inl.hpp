@@ -31,6 +31,9 @@ using DoubleTag = hn::ScalableTag<double>;
 using Doubles = hn::Vec<DoubleTag>;
 using ByteTag = hn::ScalableTag<std::uint8_t>;
 
+/// Of a lambda for one register: part of the loop around it, also where a compiler that saves bytes would call it.
+#define SPECTRA_IN_LOOP HWY_ATTR __attribute__((always_inline))
+
 /// Adding it makes a float of small magnitude a whole number, rounded half to even, in the low bits.
 constexpr float kWholeFloat = 12582912.0F;           // 1.5 * 2^23
 constexpr double kWholeDouble = 6755399441055744.0;  // 1.5 * 2^52
@@ -291,7 +294,7 @@ HWY_INLINE void fuse_block(const Block& block, Stage& stage, const Shade& shade)
   stage.prepare(temperature, count);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto plane = [&](const std::uint8_t* from)
-                           HWY_ATTR { return hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(quarter, from + i))); };
+                           SPECTRA_IN_LOOP { return hn::ConvertTo(d, hn::PromoteTo(di, hn::Load(quarter, from + i))); };
     const Vertices vertices{hn::LoadU(d, temperature + i), {plane(r), plane(g), plane(b)}};
     const Colours shaded = shade(vertices, stage.values(i));
     Colours without = vertices.visible;
@@ -452,7 +455,7 @@ HWY_INLINE void combine_block(const ThermalColours& thermal, const Weight& weigh
     if constexpr (kSomeMissing) present = hn::IfThenZeroElse(hn::IsNaN(hn::LoadU(d, temperature + i)), present);
     Floats fresh = all(1);
     if constexpr (kFade) fresh = hn::Load(d, freshness + i);
-    const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) HWY_ATTR {
+    const auto level = [&]<int kRegister>(std::integral_constant<int, kRegister>) SPECTRA_IN_LOOP {
       const Floats v = padded.template channels<kRegister>(loaded);
       Floats f = combine(spread<kRegister>(weights), thermal.template colours<kRegister>(i), v);
       if constexpr (kSomeMissing) {

@@ -3,6 +3,12 @@ import type { Plugin } from 'vite';
 /** What WebGLRenderer asks of the parts that are never used here: as they answer when they are switched off. */
 const HOLLOW: Record<string, string> = {
   'extras/PMREMGenerator.js': 'export class PMREMGenerator {}',
+  'renderers/webgl/WebGLCubeMaps.js': 'export function WebGLCubeMaps() { return { get: (texture) => texture, dispose() {} }; }',
+  'renderers/webgl/WebGLCubeUVMaps.js':
+    'export function WebGLCubeUVMaps() { return { get: (texture) => texture, dispose() {} }; }',
+  'renderers/webgl/WebGLMorphtargets.js': 'export function WebGLMorphtargets() { return { update() {} }; }',
+  'renderers/webgl/WebGLUniformsGroups.js':
+    'export function WebGLUniformsGroups() { return { bind() {}, update() {}, dispose() {} }; }',
   'renderers/webgl/WebGLShadowMap.js': 'export class WebGLShadowMap { enabled = false; render() {} }',
   'renderers/webxr/WebXRManager.js': `export class WebXRManager {
     enabled = false; isPresenting = false; cameraAutoUpdate = false;
