@@ -19,6 +19,8 @@ class BlockApi {
   /// A block that is given back takes a slot of the exports.
   BlockApi(session::ServedScene& served, sources::MapKeeper& map, exports::ExportShelf& exports);
 
+  const sources::MapKeeper& map() const { return map_; }
+
   /// The path is kBlocksPath or begins with it and a slash.
   void handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply);
 

@@ -120,8 +120,8 @@ void HttpApi::handle(const net::HttpRequest& request, const std::function<void(n
     return reply(net::text_reply(503, served_.progress.message().value_or("no scene") + "\n"));
   }
   if (path == "/metrics") {
-    return reply(
-        net::text_reply(200, metrics_text(served_, *net_metrics_), "text/plain; version=0.0.4; charset=utf-8"));
+    return reply(net::text_reply(200, metrics_text(served_, blocks_.map(), *net_metrics_),
+                                 "text/plain; version=0.0.4; charset=utf-8"));
   }
   if (path == "/api/v1/scene") {
     const auto scene = served_.scenes.current();

@@ -78,7 +78,8 @@ double cpu_seconds() {
 
 }  // namespace
 
-std::string metrics_text(const session::ServedScene& served, const net::NetMetrics& net) {
+std::string metrics_text(const session::ServedScene& served, const sources::MapKeeper& map,
+                         const net::NetMetrics& net) {
   Metrics out;
   out.info("spectra_build_info", "The version that runs.", "version", std::string(session::kVersion));
   out.gauge("spectra_viewers", "Viewers connected now.", static_cast<double>(net.viewers));
@@ -107,6 +108,8 @@ std::string metrics_text(const session::ServedScene& served, const net::NetMetri
               as_double(net.block_bytes_received));
   out.counter("spectra_blocks_refused_total", "Block messages over /ingest that were refused.",
               as_double(net.blocks_refused));
+  out.counter("spectra_store_failures_total", "Changes of the map that the store did not take: a full or failing disk.",
+              as_double(map.store_failure_count()));
   out.gauge("spectra_frame_cache_bytes", "Encoded frames held for sharing.", as_double(served.cache.size_bytes()));
   out.counter("spectra_frame_cache_hits_total", "Frames that were encoded already.",
               as_double(served.cache.hit_count()));

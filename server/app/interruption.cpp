@@ -26,7 +26,6 @@ constexpr int kWakeUp = SIGURG;
 }  // namespace
 
 Interruption::Interruption() {
-  std::signal(SIGXFSZ, SIG_IGN);
   sigemptyset(&signals_);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action {};

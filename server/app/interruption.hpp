@@ -7,9 +7,8 @@
 namespace spectra::app {
 
 /// While it lives, SIGINT, SIGTERM and SIGHUP end the process as they do by default (a shell sees 130, 143, 129), but
-/// files that are not finished are removed first; the ones that the process was started to ignore stay ignored. A file
-/// that grows beyond the limit of the process is a write error instead of its end. Make it before any other thread, so
-/// that all of them leave the signals to it.
+/// files that are not finished are removed first; the ones that the process was started to ignore stay ignored. Make
+/// it before any other thread, so that all of them leave the signals to it.
 class Interruption {
  public:
   Interruption();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -154,6 +155,8 @@ class SceneLoader {
 }  // namespace
 
 int run_serve(const ServeOptions& options) {
+  // Whoever read what it says may go; the server stays.
+  std::signal(SIGPIPE, SIG_IGN);
   if (const auto problem = set_up_log(options.log)) return fail(kJobFailed, *problem);
   auto looked = serve_setup(options);
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);
@@ -202,6 +205,7 @@ int run_serve(const ServeOptions& options) {
     store = std::move(opened).value();
   }
   sources::MapKeeper map(served->scenes, served->pool, std::move(store), options.at, options.limits.scene_bytes);
+  map.on_store_trouble = [&served](std::optional<std::string> what) { served->store_trouble.set(std::move(what)); };
   served->mark_baseline = [&map](sources::BaselineDone done) { map.mark_baseline(std::move(done)); };
   api::HttpApi api(*served, map, options.limits);
   std::unique_ptr<net::HttpServer> server;

@@ -4,7 +4,7 @@
 
 namespace spectra::session {
 
-void LoadingProgress::set(std::optional<std::string> message) {
+void SharedMessage::set(std::optional<std::string> message) {
   std::vector<std::shared_ptr<const Listener>> alive;
   {
     const std::lock_guard lock(mutex_);
@@ -19,12 +19,12 @@ void LoadingProgress::set(std::optional<std::string> message) {
   for (const auto& listener : alive) (*listener)(message);
 }
 
-std::optional<std::string> LoadingProgress::message() const {
+std::optional<std::string> SharedMessage::message() const {
   const std::lock_guard lock(mutex_);
   return message_;
 }
 
-std::shared_ptr<const LoadingProgress::Listener> LoadingProgress::subscribe(Listener listener) {
+std::shared_ptr<const SharedMessage::Listener> SharedMessage::subscribe(Listener listener) {
   auto held = std::make_shared<const Listener>(std::move(listener));
   const std::lock_guard lock(mutex_);
   std::erase_if(listeners_, [](const auto& weak) { return weak.expired(); });

@@ -19,8 +19,8 @@
 
 namespace spectra::session {
 
-/// What is being done about the scene, in words; nothing when it is served. Thread-safe.
-class LoadingProgress {
+/// Something that whoever watches is to know, in words; nothing when there is nothing to say. Thread-safe.
+class SharedMessage {
  public:
   using Listener = std::function<void(const std::optional<std::string>& message)>;
 
@@ -43,8 +43,9 @@ struct ServedScene {
       : cache(cache_capacity_bytes), pool(worker_count) {}
 
   map::SceneStore scenes;
-  LoadingProgress progress;
-  sources::RobotTrack robot;  ///< Of the robot that maps the scene, if one does.
+  SharedMessage progress;       ///< What is being done about the scene; nothing when it is served.
+  SharedMessage store_trouble;  ///< Why the store takes nothing; for operators, for it may name the file.
+  sources::RobotTrack robot;    ///< Of the robot that maps the scene, if one does.
   const SessionIds session_ids;
   const Catalogue catalogue;
   /// MapKeeper::mark_baseline() of the map; whoever makes the keeper sets it before there are sessions.

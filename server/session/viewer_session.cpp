@@ -73,7 +73,12 @@ void ViewerSession::opened() {
   progress_subscription_ = served_.progress.subscribe([post](const std::optional<std::string>& message) {
     post([message](ViewerSession& self) { self.statuses_.set("scene_loading", protocol::StatusLevel::Info, message); });
   });
-
+  const bool may_operate = access::may(peer_.role(), access::Right::Operate);
+  if (may_operate) {
+    store_subscription_ = served_.store_trouble.subscribe([post](const std::optional<std::string>& message) {
+      post([message](ViewerSession& self) { self.tell_store_trouble(message); });
+    });
+  }
   robot_subscription_ = served_.robot.subscribe([post] { post([](ViewerSession& self) { self.tell_robot(); }); });
 
   scene_ = served_.scenes.current();
@@ -85,7 +90,7 @@ void ViewerSession::opened() {
   protocol::Hello hello;
   hello.server = {"Spectra", std::string(kVersion)};
   hello.session_id = served_.session_ids.next();
-  hello.role = access::may(peer_.role(), access::Right::Operate) ? protocol::Role::Operator : protocol::Role::Viewer;
+  hello.role = may_operate ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
                         "cache_bytes", "marks", "age",      "baseline",         "robot"};
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
@@ -99,13 +104,19 @@ void ViewerSession::opened() {
   if (const auto message = served_.progress.message()) {
     statuses_.set("scene_loading", protocol::StatusLevel::Info, message);
   }
+  if (may_operate) tell_store_trouble(served_.store_trouble.message());
   tell_robot();
+}
+
+void ViewerSession::tell_store_trouble(const std::optional<std::string>& message) {
+  statuses_.set("map_not_stored", protocol::StatusLevel::Error, message);
 }
 
 void ViewerSession::closed() {
   if (stream_) stream_->close();
   scene_subscription_ = {};
   progress_subscription_.reset();
+  store_subscription_.reset();
   robot_subscription_.reset();
   served_.viewer_count -= 1;
 }

@@ -146,6 +146,12 @@ net::BlockRefusal refusal_of(const store::StoreError& error) {
   }
 }
 
+/// What a change is answered that the store did not take, whatever is wrong with the disk.
+net::BlockRefusal refusal_to_store(const store::StoreError& error) {
+  const auto refusal = refusal_of(error);
+  return refusal.status == 500 ? net::BlockRefusal{507, "not_stored", "", error.message, ""} : refusal;
+}
+
 std::string text_of(const map::MapConstants& constants) {
   char text[256];
   const auto& corner = constants.grid.corner_m();
@@ -510,17 +516,40 @@ void MapKeeper::take(std::vector<Change> batch) {
     put->baseline = scenes_.handed_on(put->block.id, put->scene.mesh, put->block.observed_at);
   }
   const auto outcomes = stored(batch);
+  if (store_) note_store(outcomes);
   std::vector<Change> taken;
   std::vector<store::Revision> revisions;
   for (std::size_t i = 0; i < batch.size(); ++i) {
     if (!outcomes[i]) {
-      refuse(batch[i], refusal_of(outcomes[i].error()));
+      refuse(batch[i], refusal_to_store(outcomes[i].error()));
       continue;
     }
     taken.push_back(std::move(batch[i]));
     revisions.push_back(outcomes[i].value());
   }
   if (!taken.empty()) publish(std::move(taken), revisions);
+}
+
+void MapKeeper::note_store(const std::vector<store::StoreResult<store::Revision>>& outcomes) {
+  const store::StoreError* failure = nullptr;
+  bool is_any_stored = false;
+  for (const auto& outcome : outcomes) {
+    is_any_stored = is_any_stored || outcome;
+    if (outcome || refusal_to_store(outcome.error()).status != 507) continue;
+    ++store_failure_count_;
+    failure = &outcome.error();
+  }
+  if ((failure != nullptr) == is_store_failing_ || (failure == nullptr && !is_any_stored)) return;
+  is_store_failing_ = failure != nullptr;
+  std::optional<std::string> trouble;
+  if (failure != nullptr) {
+    spdlog::error("the store takes nothing, and what mappers send is refused: {}", failure->message);
+    trouble = "The map is not stored, and what mappers send is refused: " + failure->message +
+              ". What was taken before is safe.";
+  } else {
+    spdlog::info("the store takes what is sent again");
+  }
+  if (on_store_trouble) on_store_trouble(std::move(trouble));
 }
 
 std::vector<store::StoreResult<store::Revision>> MapKeeper::stored(const std::vector<Change>& batch) {
@@ -602,7 +631,7 @@ void MapKeeper::mark(const Mark& wanted) {
     auto outcome = promise.get_future();
     store_->set_constant(kBaselineKey, text_of(next),
                          [&promise](store::StoreResult<void> done) { promise.set_value(std::move(done)); });
-    if (const auto done = outcome.get(); !done) return wanted.done(refusal_of(done.error()));
+    if (const auto done = outcome.get(); !done) return wanted.done(refusal_to_store(done.error()));
   }
   const auto marked = scenes_.mark_baseline(now);
   if (!marked) return wanted.done(busy("there is no map yet"));

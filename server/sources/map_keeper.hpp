@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -70,6 +71,12 @@ class MapKeeper {
   ~MapKeeper();  ///< As end().
   MapKeeper(const MapKeeper&) = delete;
   MapKeeper& operator=(const MapKeeper&) = delete;
+
+  /// Called when the store begins to take nothing, with a sentence for operators, and with nothing when it does again; from the thread of
+  /// the keeper. To be set before there are changes.
+  std::function<void(std::optional<std::string>)> on_store_trouble;
+  /// Changes that the store did not take.
+  std::uint64_t store_failure_count() const { return store_failure_count_; }
 
   /// Opens the map: everything that the store holds, or an empty one. Error: what is wrong, in a sentence.
   std::optional<std::string> restore();
@@ -162,6 +169,8 @@ class MapKeeper {
   /// Why the map may not have a batch; nothing when it may.
   std::optional<net::BlockRefusal> why_not(const Shapes& shapes) const;
   std::vector<store::StoreResult<store::Revision>> stored(const std::vector<Change>& batch);
+  /// Tells of a store that begins or ceases to fail.
+  void note_store(const std::vector<store::StoreResult<store::Revision>>& outcomes);
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
   /// Publishes the map with a change; its coarse tiles follow.
   void change_map(map::MapChange change);
@@ -176,6 +185,8 @@ class MapKeeper {
   const std::unique_ptr<store::BlockStore> store_;
   const std::optional<store::StoreTime> at_;
   const std::uint64_t most_bytes_;
+  bool is_store_failing_ = false;  ///< Of the keeper's thread.
+  std::atomic<std::uint64_t> store_failure_count_{0};
 
   mutable std::mutex mutex_;
   std::condition_variable has_work_;

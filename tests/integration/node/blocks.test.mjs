@@ -1,8 +1,9 @@
 // A mapper puts blocks into the map with plain HTTP while a viewer watches: what has changed is sent, nothing else; what cannot be
 // taken is refused with a reason and changes nothing; and with a store the map is there again after the server was killed.
 import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
 import { once } from "node:events";
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
@@ -199,6 +200,46 @@ test("with a store the map is there again after the server was killed", async ()
   assert.deepEqual(await list(server), before.blocks);
   const { revision } = await put(server, "b9", patch(9, 0, { side: 21 }));
   assert.ok(revision > Math.max(...before.blocks.blocks.map((block) => block.revision)), "revisions rise");
+  await server.stop();
+});
+
+test("on a disk that is full the picture goes on, operators are told, mappers are refused, and what was taken is there", async () => {
+  const store = path.join(scratch, "full.sqlite");
+  let server = await serve(["--live", "--store", store]);
+  const counted = async () => Number(/^spectra_store_failures_total (\d+)/m.exec(await (await fetch(`${server.url}/metrics`)).text())[1]);
+  await put(server, "a", patch(0, 0));
+  const client = await SpectraClient.connect(server.url);
+  await client.request("scene.subscribe", { channels: ["fused"] });
+  await client.complete((await client.request("fusion.get")).generation);
+
+  // No file of the server may grow beyond what the store has now.
+  const limit = (bytes) => assert.equal(spawnSync("prlimit", ["--pid", `${server.process.pid}`, `--fsize=${bytes}:`]).status, 0);
+  limit(Math.max(statSync(store).size, statSync(`${store}-wal`).size));
+  const told = client.notification("status", 60_000, ({ id, message }) => id === "map_not_stored" && message);
+  const taken = ["a"];
+  for (let i = 0; i < 4; i += 1) {
+    const { status, answer } = await ask(server, "PUT", `b${i}`, { body: patch(1 + i, 0) });
+    if (status === 200) taken.push(`b${i}`); // The log may begin anew in the room that it has.
+    else assert.deepEqual([status, answer.error.code], [507, "not_stored"]);
+  }
+  assert.ok(taken.length < 5);
+  const { level, message } = await told;
+  assert.equal(level, "error");
+  assert.match(message, /no room to grow/);
+  assert.equal(await counted(), 5 - taken.length);
+  const { generation } = await client.request("fusion.set", { method: "thermal_visible_blend", params: { alpha: 0.31 } });
+  await client.complete(generation);
+  assert.equal((await fetch(`${server.url}/readyz`)).status, 200);
+
+  const cleared = client.notification("status", 60_000, (status) => status.id === "map_not_stored" && status.message === null);
+  limit("unlimited");
+  await put(server, "c", patch(0, 1));
+  taken.push("c");
+  await cleared;
+  server.process.kill("SIGKILL");
+  await once(server.process, "exit");
+  server = await serve(["--live", "--store", store]);
+  assert.deepEqual((await list(server)).blocks.map(({ id }) => id), taken);
   await server.stop();
 });
 

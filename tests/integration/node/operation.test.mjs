@@ -36,6 +36,19 @@ test("what is less than asked for is left out", async () => {
   assert.equal(server.errors(), "");
 });
 
+test("whoever reads the log may go: the server stays, and ends when it is told to", async () => {
+  const server = await serve(["--live", "--log-level", "debug"]);
+  server.process.stderr.destroy();
+  server.process.stdout.destroy();
+  for (let i = 0; i < 3; i += 1) {
+    const refused = await fetch(`${server.url}/api/v1/session`, { method: "POST", body: '{"token":"x"}' }); // Says so in the log.
+    assert.equal(refused.status, 409);
+  }
+  assert.equal((await fetch(`${server.url}/healthz`)).status, 200);
+  await server.stop();
+  assert.equal(server.process.signalCode, null);
+});
+
 test("a file takes the log, and goes on where it ended", async () => {
   const file = path.join(scratch, "spectra.log");
   for (let run = 1; run <= 2; run += 1) {
