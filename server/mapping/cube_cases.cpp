@@ -105,13 +105,13 @@ const std::array<CubeEdge, 12>& cube_edges() {
   return kEdges;
 }
 
-const std::vector<std::array<std::uint8_t, 3>>& cube_triangles(std::uint8_t inside) {
-  static const auto table = [] {
-    std::array<Triangles, 256> all;
+const CubeCases& cube_cases() {
+  static const CubeCases cases = [] {
+    CubeCases all;
     for (int i = 0; i < 256; ++i) all[static_cast<std::size_t>(i)] = made_triangles(i);
     return all;
   }();
-  return table[inside];
+  return cases;
 }
 
 }  // namespace spectra::mapping

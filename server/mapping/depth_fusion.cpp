@@ -3,174 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
-#include "server/mapping/block_view.hpp"
+#include "server/mapping/block_kernels.hpp"
 #include "server/mapping/surface_view.hpp"
 
 namespace spectra::mapping {
 namespace {
 
-constexpr int kLanes = kBlockEdge;
 constexpr double kBehindSigmas = 2.5;  ///< Of the noise; so far behind a surface it is looked at, or kBehindVoxels.
 constexpr float kNearest = 0.05F;      ///< Metres before the camera.
-using Row = std::array<float, kLanes>;
-
-/// What the kernel needs of a camera and its picture.
-struct KernelCamera {
-  BlockView view;
-  Lens lens;
-  bool is_distorted;
-  int width, height;
-
-  KernelCamera(const CameraModel& camera, const Eigen::Isometry3d& world_from_camera, double voxel_m)
-      : view(world_from_camera, voxel_m),
-        lens(camera),
-        is_distorted(camera.has_distortion()),
-        width(camera.width),
-        height(camera.height) {}
-};
-
-/// z of eight voxels in a row and the pixels that they fall into; `outside` where there is none.
-[[gnu::always_inline]] inline void project_row(const KernelCamera& camera, const std::array<float, 3>& first, Row& z,
-                                               std::array<std::int32_t, kLanes>& pixel) {
-  const auto& step = camera.view.step(0);
-  const std::int32_t outside = camera.width * camera.height;
-  const auto across = static_cast<float>(camera.width), down = static_cast<float>(camera.height);
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    const auto n = static_cast<float>(i);
-    z[i] = first[2] + n * step[2];
-    const float inverse = 1 / std::max(z[i], kNearest);
-    const float x = (first[0] + n * step[0]) * inverse, y = (first[1] + n * step[1]) * inverse;
-    float u = 0, v = 0;
-    if (camera.is_distorted) {
-      camera.lens.project(x, y, u, v);
-    } else {
-      u = camera.lens.fx * x + camera.lens.cx;
-      v = camera.lens.fy * y + camera.lens.cy;
-    }
-    // Half a pixel more, so that cutting off the fraction rounds; what is outside is brought to the border first.
-    u = std::min(std::max(u + 0.5F, -1.0F), across);
-    v = std::min(std::max(v + 0.5F, -1.0F), down);
-    const bool is_inside = z[i] > kNearest && u >= 0 && v >= 0 && u < across && v < down;
-    const std::int32_t at = static_cast<std::int32_t>(v) * camera.width + static_cast<std::int32_t>(u);
-    pixel[i] = is_inside ? at : outside;
-  }
-}
-
-/// The mean after one more value: rounded, at least one step of 1 towards it.
-[[gnu::always_inline]] inline float mean_after(float mean, float value, float share) {
-  const float step = (value - mean) * share;
-  const float rounded = static_cast<float>(static_cast<std::int32_t>(step + (step < 0 ? -0.5F : 0.5F)));
-  const float least = value > mean ? std::min(1.0F, value - mean) : std::max(-1.0F, value - mean);
-  return mean + (rounded == 0 ? static_cast<float>(static_cast<std::int32_t>(least)) : rounded);
-}
-
-/// What has changed in a block, at most.
-struct BlockChange {
-  float moved = 0;  ///< Of kDistanceOne.
-  float recoloured = 0;
-  bool has_surface = false;
-  bool is_free = false;
-};
-
-struct Kernel {
-  KernelCamera depth;
-  const float* depth_m;
-  const float* weight;
-  DepthNoise noise;
-  float truncation_m, behind_m, voxel_m;
-};
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define SPECTRA_VECTOR_CLONES [[gnu::target_clones("default", "avx2")]]
-#else
-#define SPECTRA_VECTOR_CLONES
-#endif
-
-/// Distances and weights of a block; `near` gets, per voxel, the pixel of those that are near what was seen, or -1.
-SPECTRA_VECTOR_CLONES
-BlockChange fuse_distances(const Kernel& kernel, GridPlace at, VoxelBlock& block,
-                           std::array<std::int32_t, kBlockVoxels>& near) {
-  const float per_m = kDistanceOne / kernel.truncation_m;
-  const auto base = static_cast<float>(kBehindSigmas * kernel.noise.base_m),
-             growth = static_cast<float>(kBehindSigmas * kernel.noise.growth_per_m),
-             from = static_cast<float>(kernel.noise.from_m);
-  float moved = 0;
-  std::int32_t surfaces = 0, filled = 0;
-  const auto corner = kernel.depth.view.corner(at);
-  for (int row = 0; row < kBlockEdge * kBlockEdge; ++row) {
-    const auto first = kernel.depth.view.row(corner, row);
-    Row z;
-    std::array<std::int32_t, kLanes> pixel;
-    project_row(kernel.depth, first, z, pixel);
-    std::int16_t* distances = &block.distance[static_cast<std::size_t>(row) * kLanes];
-    std::uint16_t* weights = &block.weight[static_cast<std::size_t>(row) * kLanes];
-    std::int32_t* nears = &near[static_cast<std::size_t>(row) * kLanes];
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      const auto p = static_cast<std::size_t>(pixel[i]);
-      const float metres = kernel.depth_m[p] - z[i];
-      // The same weight for all that may err, whether towards the camera or away: else the surface would move one way.
-      const float beyond = std::max(0.0F, kernel.depth_m[p] - from);
-      const float behind = std::max(kernel.behind_m, base + growth * beyond * beyond);
-      const float w = metres > -behind ? kernel.weight[p] : 0.0F;
-      const float old_weight = weights[i], old = distances[i];
-      const float target = std::min(kDistanceOne, std::max(-kDistanceOne, metres * per_m));
-      const float next = w > 0 ? mean_after(old, target, w / std::max(1.0F, old_weight + w)) : old;
-      distances[i] = static_cast<std::int16_t>(static_cast<std::int32_t>(next));
-      weights[i] = static_cast<std::uint16_t>(static_cast<std::int32_t>(std::min(kWeightMost, old_weight + w)));
-      const bool is_surface = std::min(std::abs(next), std::abs(old)) < 0.5F * kDistanceOne;
-      moved = std::max(moved, is_surface ? std::abs(next - old) : 0.0F);
-      surfaces |= is_surface ? 1 : 0;
-      filled |= next < 0.5F * kDistanceOne ? 1 : 0;
-      nears[i] = w > 0 && std::abs(metres) < 2 * kernel.voxel_m ? pixel[i] : -1;
-    }
-  }
-  return {moved, 0, surfaces != 0, filled == 0};
-}
-
-float fuse_channel(std::uint16_t& channel, std::uint8_t level, float share) {
-  const float old = channel;
-  const float next = mean_after(old, 256.0F * static_cast<float>(level), share);
-  channel = static_cast<std::uint16_t>(static_cast<std::int32_t>(next));
-  return std::abs(next - old) / 256;
-}
-
-/// Colours of the voxels near what was seen; the largest change in levels.
-float fuse_colours(const ColourLook& look, const KernelCamera& camera, bool is_depth_camera, const Kernel& kernel,
-                   GridPlace at, VoxelBlock& block, const std::array<std::int32_t, kBlockVoxels>& near) {
-  constexpr float kMostColourWeight = 255;
-  float recoloured = 0;
-  const auto corner = camera.view.corner(at);
-  const std::int32_t outside = camera.width * camera.height;
-  for (int row = 0; row < kBlockEdge * kBlockEdge; ++row) {
-    const std::int32_t* nears = &near[static_cast<std::size_t>(row) * kLanes];
-    if (std::all_of(nears, nears + kLanes, [](std::int32_t pixel) { return pixel < 0; })) continue;
-    Row z{};
-    std::array<std::int32_t, kLanes> pixel;
-    if (is_depth_camera) {
-      std::copy_n(nears, kLanes, pixel.begin());
-    } else {
-      project_row(camera, camera.view.row(corner, row), z, pixel);
-    }
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      if (nears[i] < 0 || pixel[i] == outside) continue;
-      const std::size_t voxel = static_cast<std::size_t>(row) * kLanes + i;
-      // The nearer and the less askew, the more: the weight of the distance, of which little is left beyond 3 m, by its root.
-      const float trust = std::sqrt(kernel.weight[static_cast<std::size_t>(nears[i])] / kWeightOne);
-      const float w = std::max(1.0F, std::round(16 * trust));
-      const float old_weight = block.colour_weight[voxel];
-      const float share = w / (old_weight + w);
-      const base::Rgb8& seen = look.picture.pixels[static_cast<std::size_t>(pixel[i])];
-      recoloured =
-          std::max({recoloured, fuse_channel(block.red[voxel], seen.r, share),
-                    fuse_channel(block.green[voxel], seen.g, share), fuse_channel(block.blue[voxel], seen.b, share)});
-      block.colour_weight[voxel] = static_cast<std::uint8_t>(std::min(kMostColourWeight, old_weight + w));
-    }
-  }
-  return recoloured;
-}
-
 /// The blocks that lie within the truncation of what is seen, in the order of their places.
 std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m, jobs::WorkerPool& pool) {
   constexpr int kBand = 32, kStride = 2;
@@ -225,6 +67,19 @@ std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m
   return all;
 }
 
+/// One number a pixel, 0xBBGGRR.
+std::vector<std::uint32_t> packed(const PictureRgb& picture, jobs::WorkerPool& pool) {
+  std::vector<std::uint32_t> pixels(picture.pixels.size());
+  const auto width = static_cast<std::size_t>(picture.width);
+  pool.for_each(static_cast<std::size_t>(picture.height), [&](std::size_t y) {
+    for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
+      const base::Rgb8& c = picture.pixels[i];
+      pixels[i] = static_cast<std::uint32_t>(c.r | c.g << 8 | c.b << 16);
+    }
+  });
+  return pixels;
+}
+
 /// Whether any pixel over a block sees it or something behind it.
 bool may_be_seen(const DepthLook& look, const KernelCamera& camera, GridPlace at, float radius_m, float behind_m) {
   const auto centre = camera.view.centre(at);
@@ -258,13 +113,15 @@ bool may_be_seen(const DepthLook& look, const KernelCamera& camera, GridPlace at
 
 void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool) {
   const double voxel_m = map.voxel_m();
-  const Kernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
-                      depth.frame.depth_m.data(),
-                      depth.frame.weight.data(),
-                      depth.noise,
-                      static_cast<float>(kTruncationVoxels * voxel_m),
-                      static_cast<float>(kBehindVoxels * voxel_m),
-                      static_cast<float>(voxel_m)};
+  const DistanceKernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
+                              depth.frame.depth_m.data(),
+                              depth.frame.weight.data(),
+                              static_cast<float>(kTruncationVoxels * voxel_m),
+                              static_cast<float>(voxel_m),
+                              static_cast<float>(kBehindVoxels * voxel_m),
+                              static_cast<float>(kBehindSigmas * depth.noise.base_m),
+                              static_cast<float>(kBehindSigmas * depth.noise.growth_per_m),
+                              static_cast<float>(depth.noise.from_m)};
   std::vector<std::uint8_t> is_near;
   for (const GridPlace& place : blocks_near_surface(depth, voxel_m, pool)) {
     const auto block = static_cast<std::size_t>(map.ensure(place));
@@ -286,9 +143,9 @@ void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
       const MapUnit& unit = map.units()[u];
       const GridPlace middle{unit.at.x * kUnitBlocks + 2, unit.at.y * kUnitBlocks + 2, unit.at.z * kUnitBlocks + 2};
       // The corner of the third block is the middle of the unit.
-      if (!kernel.depth.view.is_before(middle, 5 * radius_m, kernel.depth.lens, depth.camera)) continue;
+      if (!kernel.camera.view.is_before(middle, 5 * radius_m, kernel.camera.lens, depth.camera)) continue;
       for (const std::int32_t block : unit.blocks) {
-        if (block >= 0 && may_be_seen(depth, kernel.depth, map.head(block).at, radius_m, behind_m)) {
+        if (block >= 0 && may_be_seen(depth, kernel.camera, map.head(block).at, radius_m, behind_m)) {
           seen_in[group].push_back(block);
         }
       }
@@ -298,23 +155,30 @@ void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
   for (const auto& part : seen_in) blocks.insert(blocks.end(), part.begin(), part.end());
   std::sort(blocks.begin(), blocks.end());
 
-  const bool is_depth_camera = colour != nullptr && colour->camera == depth.camera &&
-                               colour->world_from_camera.matrix() == depth.world_from_camera.matrix();
-  const KernelCamera colour_camera(colour != nullptr ? colour->camera : depth.camera,
-                                   colour != nullptr ? colour->world_from_camera : depth.world_from_camera, voxel_m);
+  std::optional<ColourKernel> colours;
+  std::vector<std::uint32_t> pixels;
+  if (colour != nullptr) {
+    pixels = packed(colour->picture, pool);
+    const bool is_depth_camera =
+        colour->camera == depth.camera && colour->world_from_camera.matrix() == depth.world_from_camera.matrix();
+    colours.emplace(ColourKernel{KernelCamera(colour->camera, colour->world_from_camera, voxel_m), is_depth_camera,
+                                 pixels.data(), depth.frame.weight.data()});
+  }
   constexpr std::size_t kChunk = 64;
   pool.for_each((blocks.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    std::array<std::int32_t, kBlockVoxels> near;
+    NearPixels near;
     const std::size_t end = std::min(blocks.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
       BlockHead& head = map.head(blocks[i]);
       VoxelBlock& voxels = map.voxels(blocks[i]);
-      const BlockChange change = fuse_distances(kernel, head.at, voxels, near);
+      const BlockChange change = fuse_distances(kernel, kernel.camera.view.corner(head.at), voxels, near);
       head.has_surface = change.has_surface;
       head.is_free = change.is_free;
+      head.has_inside = change.has_inside;
+      head.has_outside = change.has_outside;
       head.moved += change.moved / kDistanceOne * static_cast<float>(kTruncationVoxels);
-      if (colour != nullptr && change.has_surface) {
-        head.recoloured += fuse_colours(*colour, colour_camera, is_depth_camera, kernel, head.at, voxels, near);
+      if (colours && change.has_surface) {
+        head.recoloured += fuse_colours(*colours, colours->camera.view.corner(head.at), voxels, near);
       }
     }
   });

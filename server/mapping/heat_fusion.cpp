@@ -256,15 +256,18 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
   pool.for_each(looks.size(), [&](std::size_t chunk) {
     // The looks of a block follow each other.
     std::int32_t block = -1;
-    float warmest = 0;
+    float warmest = 0, hottest = -1000;
     const auto note = [&] {
-      if (block >= 0) map.head(block).warmed += warmest;
+      if (block < 0) return;
+      map.head(block).warmed += warmest;
+      map.head(block).hottest = std::max(map.head(block).hottest, hottest);
     };
     for (const Look& look : looks[chunk]) {
       if (look.block != block) {
         note();
         block = look.block;
         warmest = 0;
+        hottest = -1000;
       }
       HeatBlock& heat = map.heat(look.block);
       float& celsius = heat.celsius[look.voxel];
@@ -287,6 +290,7 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
         variance = (1 - gain) * predicted;
         warmest = std::max(warmest, std::abs(celsius - before));
       }
+      hottest = std::max(hottest, celsius);
       heat.seen_s[look.voxel] = now;
     }
     note();

@@ -204,8 +204,8 @@ MeshRules Mapper::mesh_rules() const {
 }
 
 std::vector<PublishedUnit> Mapper::changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
-                                                 jobs::WorkerPool& pool) {
-  return publisher.take(map_, mesh_rules(), eye, pool);
+                                                 jobs::WorkerPool& pool, std::size_t most) {
+  return publisher.take(map_, mesh_rules(), eye, pool, most);
 }
 
 UnitMesh Mapper::whole_mesh(const base::Progress& progress) const {

@@ -58,9 +58,9 @@ class Mapper {
   static constexpr double kSystematic = 0.5;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
-  /// What has changed since the last call with this publisher.
-  std::vector<PublishedUnit> changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
-                                           jobs::WorkerPool& pool);
+  /// What has changed since the last call with this publisher; of at most about `most` units (UnitPublisher::take).
+  std::vector<PublishedUnit> changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye, jobs::WorkerPool& pool,
+                                           std::size_t most = UnitPublisher::kAll);
 
   const VoxelMap& map() const { return map_; }
   /// Poses of the depth camera that were found by tracking.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cmath>
 
@@ -11,122 +12,193 @@ namespace spectra::mapping {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr int kEdge = kBlockEdge + 1;  ///< Voxels that the cells of a block need, each way.
-constexpr std::size_t kCells = std::size_t{kEdge} * kEdge * kEdge;
+constexpr int kEdge = kBlockEdge + 1;        ///< Voxels that the cells of a block need, each way.
+constexpr int kUnitCorners = kUnitEdge + 1;  ///< The same of a unit.
 constexpr base::Rgb8 kNoColour{128, 128, 128};
+constexpr std::uint32_t kNoVertex = 0xffffffff;
 
-/// The voxels of a block and those of its neighbours that its cells need.
+/// The vertices of a unit by the edge of the grid that they lie on: of every voxel those along x, y and z. Kept from unit to unit, as it is
+/// large, mostly empty, and emptied by going through what was put in.
+struct VertexTable {
+  std::vector<std::uint32_t> index =
+      std::vector<std::uint32_t>(std::size_t{3} * kUnitCorners * kUnitCorners * kUnitCorners, kNoVertex);
+  std::vector<std::uint32_t> used;  ///< Places in `index` that hold a vertex.
+
+  std::uint32_t& of(std::size_t place, std::uint32_t next) {
+    if (index[place] == kNoVertex) {
+      index[place] = next;
+      used.push_back(static_cast<std::uint32_t>(place));
+    }
+    return index[place];
+  }
+  void clear() {
+    for (const std::uint32_t place : used) index[place] = kNoVertex;
+    used.clear();
+  }
+};
+
+/// 0 or 1 for each voxel of a row.
+using RowFlags = std::array<std::uint16_t, kBlockEdge>;
+
+/// The flags as bits: a product brings those of four voxels beside each other.
+unsigned bits_of(const RowFlags& flags) {
+  static_assert(std::endian::native == std::endian::little);
+  constexpr std::uint64_t kBeside = 1ULL << 48 | 1ULL << 33 | 1ULL << 18 | 1ULL << 3;
+  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(flags);
+  return static_cast<unsigned>((halves[0] * kBeside >> 48 & 0xf) | (halves[1] * kBeside >> 48 & 0xf) << 4);
+}
+
+/// Which voxels of a block, and of its neighbours as far as its cells need them, are known and which are inside: bits along x.
 struct Neighbourhood {
-  std::array<std::int32_t, 8> blocks;  ///< The block and those beyond, by bits of x, y, z; -1: none.
-  std::array<float, kCells> distance;
-  std::array<bool, kCells> is_known;
+  std::array<const VoxelBlock*, 8> voxels{};  ///< The block and those beyond, by bits of x, y, z; null: none.
+  std::array<const HeatBlock*, 8> heat{};
+  std::array<std::uint16_t, kEdge * kEdge> known{}, inside{};
 
-  static std::size_t at(int x, int y, int z) {
-    return static_cast<std::size_t>(x) +
-           static_cast<std::size_t>(kEdge) *
-               (static_cast<std::size_t>(y) + static_cast<std::size_t>(kEdge) * static_cast<std::size_t>(z));
+  /// The block, by its number in the eight, and the index within it of a voxel at 0..8 each.
+  static std::pair<std::size_t, std::size_t> voxel(int x, int y, int z) {
+    return {static_cast<std::size_t>(x >> 3 | (y >> 3) << 1 | (z >> 3) << 2), index_within({x, y, z}, 3)};
   }
 
-  /// The block and the index within it of a voxel at 0..8 each.
-  std::pair<std::int32_t, std::size_t> voxel(int x, int y, int z) const {
-    const std::size_t which = static_cast<std::size_t>(x >> 3 | (y >> 3) << 1 | (z >> 3) << 2);
-    return {blocks[which], index_within({x, y, z}, 3)};
-  }
-
-  bool gather(const VoxelMap& map, std::int32_t block, float least_weight) {
-    const GridPlace at_block = map.head(block).at;
-    for (int i = 0; i < 8; ++i) {
-      blocks[static_cast<std::size_t>(i)] =
-          i == 0 ? block : map.find({at_block.x + (i & 1), at_block.y + (i >> 1 & 1), at_block.z + (i >> 2)});
-    }
-    bool has_inside = false, has_outside = false;
-    for (int z = 0; z < kEdge; ++z) {
-      for (int y = 0; y < kEdge; ++y) {
-        for (int x = 0; x < kEdge; ++x) {
-          const auto [from, index] = voxel(x, y, z);
-          const std::size_t to = at(x, y, z);
-          is_known[to] = from >= 0 && static_cast<float>(map.voxels(from).weight[index]) >= least_weight;
-          distance[to] = is_known[to] ? static_cast<float>(map.voxels(from).distance[index]) : 0;
-          (distance[to] < 0 ? has_inside : has_outside) = true;
+  /// False: no surface can be in it.
+  bool gather(std::uint16_t least_weight) {
+    unsigned any = 0, all = 0x1ff;
+    for (int row = 0; row < kEdge * kEdge; ++row) {
+      const auto [which, first] = voxel(0, row % kEdge, row / kEdge);
+      const VoxelBlock *block = voxels[which], *next = voxels[which | 1];
+      unsigned is_known = 0, is_inside = 0;
+      if (block != nullptr) {
+        RowFlags are_inside, are_known;
+        for (std::size_t x = 0; x < kBlockEdge; ++x) {
+          are_inside[x] = block->distance[first + x] < 0 ? 1 : 0;
+          are_known[x] = block->weight[first + x] >= least_weight ? 1 : 0;
         }
+        is_inside = bits_of(are_inside);
+        is_known = bits_of(are_known);
       }
+      if (next != nullptr) {
+        is_inside |= next->distance[first] < 0 ? 1U << kBlockEdge : 0;
+        is_known |= next->weight[first] >= least_weight ? 1U << kBlockEdge : 0;
+      }
+      is_inside &= is_known;
+      any |= is_inside;
+      all &= is_inside;
+      known[static_cast<std::size_t>(row)] = static_cast<std::uint16_t>(is_known);
+      inside[static_cast<std::size_t>(row)] = static_cast<std::uint16_t>(is_inside);
     }
-    return has_inside && has_outside;
+    return any != 0 && all != 0x1ff;
   }
 };
 
 class Mesher {
  public:
-  Mesher(const VoxelMap& map, const MeshRules& rules) : map_(map), rules_(rules) {}
+  Mesher(const VoxelMap& map, const MeshRules& rules, VertexTable& vertices)
+      : map_(map),
+        rules_(rules),
+        least_weight_(static_cast<std::uint16_t>(std::clamp(std::ceil(rules.least_weight), 0.0F, kWeightMost))),
+        vertices_(vertices) {}
 
-  void add_block(std::int32_t block) {
-    if (!around_.gather(map_, block, rules_.least_weight)) return;
-    base_ = map_.head(block).at;
-    for (int z = 0; z < kBlockEdge; ++z) {
-      for (int y = 0; y < kBlockEdge; ++y) {
-        for (int x = 0; x < kBlockEdge; ++x) add_cell(x, y, z);
-      }
+  void add_unit(const MapUnit& unit) {
+    for (int i = 0; i < 8; ++i) {
+      const std::int32_t beyond = map_.find_unit({unit.at.x + (i & 1), unit.at.y + (i >> 1 & 1), unit.at.z + (i >> 2)});
+      units_[static_cast<std::size_t>(i)] = beyond < 0 ? nullptr : &map_.units()[static_cast<std::size_t>(beyond)];
+    }
+    vertices_.clear();
+    for (const std::int32_t block : unit.blocks) {
+      if (block >= 0) add_block(block);
     }
   }
 
   UnitMesh take() { return std::move(mesh_); }
+  /// Some vertices may be in no triangle.
+  bool has_left_out() const { return has_left_out_; }
 
  private:
-  void add_cell(int x, int y, int z) {
-    unsigned inside = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const std::size_t at = Neighbourhood::at(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2));
-      if (!around_.is_known[at]) return;
-      inside |= around_.distance[at] < 0 ? 1U << corner : 0U;
+  void add_block(std::int32_t block) {
+    base_ = map_.head(block).at;
+    const GridPlace in_unit{base_.x & 3, base_.y & 3, base_.z & 3};
+    bool may_be_inside = false, may_be_outside = false;
+    for (int i = 0; i < 8; ++i) {
+      const GridPlace at{in_unit.x + (i & 1), in_unit.y + (i >> 1 & 1), in_unit.z + (i >> 2)};
+      const MapUnit* unit = units_[static_cast<std::size_t>(at.x >> 2 | (at.y >> 2) << 1 | (at.z >> 2) << 2)];
+      const std::int32_t found = unit == nullptr ? -1 : unit->blocks[index_within(at, 2)];
+      around_.voxels[static_cast<std::size_t>(i)] = found < 0 ? nullptr : &map_.voxels(found);
+      around_.heat[static_cast<std::size_t>(i)] = found < 0 || map_.head(found).heat < 0 ? nullptr : &map_.heat(found);
+      may_be_inside = may_be_inside || (found >= 0 && map_.head(found).has_inside);
+      may_be_outside = may_be_outside || (found >= 0 && map_.head(found).has_outside);
     }
-    for (const auto& triangle : cube_triangles(static_cast<std::uint8_t>(inside))) {
-      base::Triangle corners{};
-      for (std::size_t i = 0; i < 3; ++i) corners[i] = vertex(x, y, z, cube_edges()[triangle[i]]);
-      // A surface through a voxel itself draws edges together.
-      if (mesh_.positions[corners[0]] == mesh_.positions[corners[1]] ||
-          mesh_.positions[corners[1]] == mesh_.positions[corners[2]] ||
-          mesh_.positions[corners[2]] == mesh_.positions[corners[0]]) {
-        continue;
-      }
-      mesh_.triangles.push_back(corners);
+    if (!may_be_inside || !may_be_outside || !around_.gather(least_weight_)) return;
+    origin_ = {in_unit.x * kBlockEdge, in_unit.y * kBlockEdge, in_unit.z * kBlockEdge};
+    for (int z = 0; z < kBlockEdge; ++z) {
+      for (int y = 0; y < kBlockEdge; ++y) add_cells(y, z);
     }
+  }
+
+  /// The cells of a row that the surface crosses.
+  void add_cells(int y, int z) {
+    const std::size_t row = static_cast<std::size_t>(y + kEdge * z);
+    const std::array<std::size_t, 4> rows{row, row + 1, row + kEdge, row + kEdge + 1};
+    unsigned known = 0x1ff, any = 0, all = 0x1ff;
+    for (const std::size_t r : rows) {
+      known &= around_.known[r];
+      any |= around_.inside[r];
+      all &= around_.inside[r];
+    }
+    unsigned crossed = (known & known >> 1) & (any | any >> 1) & ~(all & all >> 1) & 0xff;
+    for (; crossed != 0; crossed &= crossed - 1) {
+      const int x = std::countr_zero(crossed);
+      unsigned corners = 0;
+      for (std::size_t k = 0; k < 4; ++k) corners |= (around_.inside[rows[k]] >> x & 3U) << 2 * k;
+      for (const auto& triangle : cases_[corners]) add_triangle(x, y, z, triangle);
+    }
+  }
+
+  void add_triangle(int x, int y, int z, const std::array<std::uint8_t, 3>& edges) {
+    base::Triangle corners{};
+    for (std::size_t i = 0; i < 3; ++i) corners[i] = vertex(x, y, z, edges_[edges[i]]);
+    // A surface through a voxel itself draws edges together.
+    if (mesh_.positions[corners[0]] == mesh_.positions[corners[1]] ||
+        mesh_.positions[corners[1]] == mesh_.positions[corners[2]] ||
+        mesh_.positions[corners[2]] == mesh_.positions[corners[0]]) {
+      has_left_out_ = true;
+      return;
+    }
+    mesh_.triangles.push_back(corners);
   }
 
   /// The vertex on an edge of a cell.
   std::uint32_t vertex(int x, int y, int z, const CubeEdge& edge) {
-    const int fx = x + (edge.from & 1), fy = y + (edge.from >> 1 & 1), fz = z + (edge.from >> 2);
+    const GridPlace from{x + (edge.from & 1), y + (edge.from >> 1 & 1), z + (edge.from >> 2)};
+    const int place = ((origin_.z + from.z) * kUnitCorners + origin_.y + from.y) * kUnitCorners + origin_.x + from.x;
+    const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
+    const std::uint32_t index = vertices_.of(static_cast<std::size_t>(3 * place + edge.axis), next);
+    if (index == next) make_vertex(from, edge);
+    return index;
+  }
+
+  void make_vertex(GridPlace from, const CubeEdge& edge) {
     const auto place = [](std::int32_t block, int within) {
       return static_cast<std::uint64_t>(block * kBlockEdge + within) & 0x1fffff;
     };
     // Places that are 2^21 voxels apart never meet in a unit or beside it.
-    const std::uint64_t key = static_cast<std::uint64_t>(edge.axis) << 62 ^
-                              (place(base_.x, fx) << 42 | place(base_.y, fy) << 21 | place(base_.z, fz));
-    const auto [entry, is_new] = vertices_.try_emplace(key, static_cast<std::uint32_t>(mesh_.positions.size()));
-    if (is_new) make_vertex({fx, fy, fz}, edge, key);
-    return entry->second;
-  }
-
-  void make_vertex(GridPlace from, const CubeEdge& edge, std::uint64_t key) {
-    const GridPlace to{from.x + (edge.axis == 0 ? 1 : 0), from.y + (edge.axis == 1 ? 1 : 0),
-                       from.z + (edge.axis == 2 ? 1 : 0)};
-    const float a = around_.distance[Neighbourhood::at(from.x, from.y, from.z)],
-                b = around_.distance[Neighbourhood::at(to.x, to.y, to.z)];
-    const double share = static_cast<double>(a) / (static_cast<double>(a) - static_cast<double>(b));
+    mesh_.edges.push_back(static_cast<std::uint64_t>(edge.axis) << 62 ^
+                          (place(base_.x, from.x) << 42 | place(base_.y, from.y) << 21 | place(base_.z, from.z)));
+    const auto [block_a, voxel_a] = Neighbourhood::voxel(from.x, from.y, from.z);
+    const auto [block_b, voxel_b] = Neighbourhood::voxel(
+        from.x + (edge.axis == 0 ? 1 : 0), from.y + (edge.axis == 1 ? 1 : 0), from.z + (edge.axis == 2 ? 1 : 0));
+    const VoxelBlock &a = *around_.voxels[block_a], &b = *around_.voxels[block_b];
+    const double of_a = a.distance[voxel_a], of_b = b.distance[voxel_b];
+    const double share = of_a / (of_a - of_b);
     const auto metres = [&](std::int32_t block, int within, bool is_along) {
       return static_cast<float>((static_cast<double>(block) * kBlockEdge + within + (is_along ? share : 0)) *
                                 map_.voxel_m());
     };
     mesh_.positions.push_back({metres(base_.x, from.x, edge.axis == 0), metres(base_.y, from.y, edge.axis == 1),
                                metres(base_.z, from.z, edge.axis == 2)});
-    mesh_.edges.push_back(key);
-    const auto [block_a, voxel_a] = around_.voxel(from.x, from.y, from.z);
-    const auto [block_b, voxel_b] = around_.voxel(to.x, to.y, to.z);
-    add_colour(block_a, voxel_a, block_b, voxel_b, share);
-    add_temperature(block_a, voxel_a, block_b, voxel_b, static_cast<float>(share));
+    add_colour(a, voxel_a, b, voxel_b, share);
+    add_temperature(around_.heat[block_a], voxel_a, around_.heat[block_b], voxel_b, static_cast<float>(share));
   }
 
-  void add_colour(std::int32_t block_a, std::size_t voxel_a, std::int32_t block_b, std::size_t voxel_b, double share) {
-    const VoxelBlock &a = map_.voxels(block_a), &b = map_.voxels(block_b);
+  void add_colour(const VoxelBlock& a, std::size_t voxel_a, const VoxelBlock& b, std::size_t voxel_b, double share) {
     const bool has_a = a.colour_weight[voxel_a] > 0, has_b = b.colour_weight[voxel_b] > 0;
     if (!has_a && !has_b) {
       mesh_.colours.push_back(kNoColour);
@@ -144,13 +216,12 @@ class Mesher {
   struct Heat {
     float celsius = 0, variance = std::numeric_limits<float>::infinity(), seen_s = 0;
   };
-  Heat heat_of(std::int32_t block, std::size_t voxel) const {
-    if (map_.head(block).heat < 0) return {};
-    const HeatBlock& heat = map_.heat(block);
-    return {heat.celsius[voxel], heat.variance[voxel], heat.seen_s[voxel]};
+  static Heat heat_of(const HeatBlock* heat, std::size_t voxel) {
+    if (heat == nullptr) return {};
+    return {heat->celsius[voxel], heat->variance[voxel], heat->seen_s[voxel]};
   }
 
-  void add_temperature(std::int32_t block_a, std::size_t voxel_a, std::int32_t block_b, std::size_t voxel_b,
+  void add_temperature(const HeatBlock* block_a, std::size_t voxel_a, const HeatBlock* block_b, std::size_t voxel_b,
                        float share) {
     const Heat a = heat_of(block_a, voxel_a), b = heat_of(block_b, voxel_b);
     // Never quite 0, so that a voxel that knows nothing leaves it to the other, however far that is.
@@ -175,10 +246,16 @@ class Mesher {
 
   const VoxelMap& map_;
   const MeshRules& rules_;
+  const std::uint16_t least_weight_;
+  const std::array<CubeEdge, 12>& edges_ = cube_edges();
+  const CubeCases& cases_ = cube_cases();
+  VertexTable& vertices_;
+  std::array<const MapUnit*, 8> units_{};  ///< The unit and those beyond, by bits of x, y, z; null: none.
   Neighbourhood around_;
-  GridPlace base_;
+  GridPlace base_;    ///< Of the block, in blocks.
+  GridPlace origin_;  ///< Of the block within its unit, in voxels.
   UnitMesh mesh_;
-  boost::unordered_flat_map<std::uint64_t, std::uint32_t> vertices_;
+  bool has_left_out_ = false;
 };
 
 }  // namespace
@@ -216,12 +293,11 @@ void drop_unused(UnitMesh& mesh) {
 }  // namespace
 
 UnitMesh mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules) {
-  Mesher mesher(map, rules);
-  for (const std::int32_t block : map.units()[static_cast<std::size_t>(unit)].blocks) {
-    if (block >= 0) mesher.add_block(block);
-  }
+  thread_local VertexTable vertices;
+  Mesher mesher(map, rules, vertices);
+  mesher.add_unit(map.units()[static_cast<std::size_t>(unit)]);
   UnitMesh mesh = mesher.take();
-  drop_unused(mesh);
+  if (mesher.has_left_out()) drop_unused(mesh);
   return mesh;
 }
 

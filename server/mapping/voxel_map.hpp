@@ -53,9 +53,12 @@ struct BlockHead {
   std::int32_t unit = -1;    ///< Whose it is; -1: not in use.
   std::int32_t heat = -1;    ///< Its temperatures; -1: none.
   bool has_surface = false;  ///< Some voxel is near a surface.
-  bool is_free = true;       ///< Nothing but unseen space and what is well before surfaces.
+  /// Some voxel may be behind a surface; some may not.
+  bool has_inside = true, has_outside = true;
+  bool is_free = true;  ///< Nothing but unseen space and what is well before surfaces.
   /// At most so much has changed since the unit was meshed: distance in voxels, temperature in kelvin, colour in levels.
   float moved = 0, warmed = 0, recoloured = 0;
+  float hottest = -1000;  ///< Of the temperatures that were told since; -1000: none was.
 };
 
 struct MapUnit {

@@ -21,7 +21,7 @@ Eigen::Vector3d middle(std::uint8_t edge) {
 /// Directed sides of triangles that no other triangle of the case has in the other direction.
 std::set<std::pair<std::uint8_t, std::uint8_t>> open_sides(std::uint8_t inside) {
   std::set<std::pair<std::uint8_t, std::uint8_t>> sides;
-  for (const auto& t : cube_triangles(inside)) {
+  for (const auto& t : cube_cases()[inside]) {
     for (std::size_t i = 0; i < 3; ++i) {
       if (sides.erase({t[(i + 1) % 3], t[i]}) == 0) sides.insert({t[i], t[(i + 1) % 3]});
     }
@@ -32,7 +32,7 @@ std::set<std::pair<std::uint8_t, std::uint8_t>> open_sides(std::uint8_t inside) 
 TEST(CubeCases, CutExactlyTheEdgesThatCross) {
   for (int inside = 0; inside < 256; ++inside) {
     std::set<std::uint8_t> used, crossing;
-    for (const auto& t : cube_triangles(static_cast<std::uint8_t>(inside))) used.insert(t.begin(), t.end());
+    for (const auto& t : cube_cases()[static_cast<std::uint8_t>(inside)]) used.insert(t.begin(), t.end());
     for (std::uint8_t e = 0; e < 12; ++e) {
       if ((inside >> cube_edges()[e].from & 1) != (inside >> cube_edges()[e].to & 1)) crossing.insert(e);
     }
@@ -80,7 +80,7 @@ TEST(CubeCases, MeetTheirNeighboursOnEveryFace) {
 
 TEST(CubeCases, LookOutwards) {
   for (int c = 0; c < 8; ++c) {
-    const auto& triangles = cube_triangles(static_cast<std::uint8_t>(1 << c));
+    const auto& triangles = cube_cases()[static_cast<std::uint8_t>(1 << c)];
     ASSERT_EQ(triangles.size(), 1U);
     const Eigen::Vector3d a = middle(triangles[0][0]), b = middle(triangles[0][1]), d = middle(triangles[0][2]);
     EXPECT_GT((b - a).cross(d - a).dot((a + b + d) / 3 - corner(c)), 0) << c;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "box_world.hpp"
 #include "server/mapping/mapper.hpp"
@@ -19,7 +20,7 @@ class UnitPublisherTest : public testing::Test {
     for (int i = 0; i < 400; ++i) trajectory_.add(0.05 * i, looking_ahead());
   }
   /// One more look at a world, and what is told after it.
-  std::vector<PublishedUnit> look(const BoxWorld& world) {
+  std::vector<PublishedUnit> look(const BoxWorld& world, std::size_t most = UnitPublisher::kAll) {
     Frame frame;
     frame.time_s = 0.05 * ++looks_;
     frame.depth = world.depth(calibration_.depth.camera, looking_ahead());
@@ -27,7 +28,7 @@ class UnitPublisherTest : public testing::Test {
     // The shutter is open: no picture repeats the one before.
     frame.thermal.pixels[0] = static_cast<std::uint16_t>(frame.thermal.pixels[0] + looks_ % 2);
     mapper_.fuse(frame, trajectory_, faults_);
-    auto units = mapper_.changed_units(publisher_, Eigen::Vector3d::Zero(), pool_);
+    auto units = mapper_.changed_units(publisher_, Eigen::Vector3d::Zero(), pool_, most);
     for (const PublishedUnit& unit : units) told_[unit.id] = unit.mesh;
     return units;
   }
@@ -94,6 +95,25 @@ TEST_F(UnitPublisherTest, MeetsBitForBitWhileSurfacesMove) {
         {{{-1, -1, 2 + shift}, {1, 1, 2.5}, [](const Eigen::Vector3d& p) { return 20 + p.x(); }}, hand(20 + 0.3 * i)}});
     expect_no_cracks();
   }
+}
+
+TEST_F(UnitPublisherTest, WhatIsTooMuchWaitsAndIsToldLater) {
+  const BoxWorld world{{wall(20), hand(34)}};
+  for (int i = 0; i < 4; ++i) look(world);
+  const std::map<std::string, UnitMesh> all = std::exchange(told_, {});
+  publisher_ = {};
+  // The new publisher has heard of no change: a look at something else tells it everywhere.
+  const BoxWorld nearer{{{{-1, -1, 1.9}, {1, 1, 2.5}, [](const Eigen::Vector3d&) { return 25.0; }}, hand(34)}};
+  EXPECT_LE(look(nearer, 3).size(), 3U);
+  EXPECT_GT(publisher_.waiting_count(), 0U);
+  for (std::uint32_t i = 0; i < UnitPublisher::kPatience + 5; ++i) {
+    look(nearer, 8);
+    if (i % 4 == 0) expect_no_cracks();
+  }
+  EXPECT_GE(told_.size(), all.size() / 2) << "those that are near have not kept the others out";
+  look(nearer);
+  EXPECT_EQ(publisher_.waiting_count(), 0U);
+  expect_no_cracks();
 }
 
 TEST_F(UnitPublisherTest, TellsThatAUnitIsEmpty) {

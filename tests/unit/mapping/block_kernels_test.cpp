@@ -1,0 +1,134 @@
+#include "server/mapping/block_kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "server/mapping/depth_fusion.hpp"
+#include "tests/property/instruction_sets.hpp"
+
+namespace spectra::mapping {
+namespace {
+
+constexpr double kVoxel = 0.01;
+
+float mean_after(float mean, float value, float share) {
+  const float step = (value - mean) * share;
+  const float rounded = std::trunc(step + std::copysign(0.5F, step));
+  return mean + (rounded == 0 ? std::trunc(std::clamp(value - mean, -1.0F, 1.0F)) : rounded);
+}
+
+/// A wall that is nearer on one side, with holes, seen by a camera whose lens bends; a block that has seen something else.
+class BlockKernels : public testing::TestWithParam<bool> {
+ protected:
+  BlockKernels() {
+    if (GetParam()) camera_.distortion = {0.05, -0.02, 0.003, -0.002};
+    const auto count = static_cast<std::size_t>(camera_.width * camera_.height);
+    std::mt19937 random(7);
+    depth_.assign(count + 1, 0);
+    weight_.assign(count + 1, 0);
+    pixels_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      pixels_[i] = random() & 0xffffff;
+      if (random() % 9 == 0) continue;
+      depth_[i] = 0.97F + 0.001F * static_cast<float>(i % static_cast<std::size_t>(camera_.width)) +
+                  1e-5F * static_cast<float>(random() % 1000);
+      weight_[i] = static_cast<float>(1 + random() % 1024);
+    }
+    for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+      before_->distance[i] = static_cast<std::int16_t>(static_cast<int>(random() % 65535) - 32767);
+      before_->weight[i] = static_cast<std::uint16_t>(random() % 65536);
+      for (auto* channel : {&before_->red, &before_->green, &before_->blue})
+        (*channel)[i] = static_cast<std::uint16_t>(random() % 65281);
+      before_->colour_weight[i] = static_cast<std::uint8_t>(random() % 256);
+    }
+    pose_.linear() = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  }
+
+  std::unique_ptr<VoxelBlock> copy() const { return std::make_unique<VoxelBlock>(*before_); }
+  static bool are_same(const VoxelBlock& a, const VoxelBlock& b) {
+    return a.distance == b.distance && a.weight == b.weight && a.red == b.red && a.green == b.green &&
+           a.blue == b.blue && a.colour_weight == b.colour_weight;
+  }
+
+  CameraModel camera_{64, 48, 70, 72, 31, 24, {}};
+  Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
+  std::vector<float> depth_, weight_;
+  std::vector<std::uint32_t> pixels_;
+  const std::array<float, 3> corner_{-0.03F, -0.02F, 0.95F};
+  const std::unique_ptr<VoxelBlock> before_ = std::make_unique<VoxelBlock>();
+};
+
+TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
+  const DistanceKernel kernel{
+      KernelCamera(camera_, pose_, kVoxel), depth_.data(), weight_.data(), 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
+  const ColourKernel colours{kernel.camera, false, pixels_.data(), weight_.data()};
+  const auto wanted = copy();
+  NearPixels wanted_near{};
+  float recoloured = 0;
+  const std::int32_t outside = camera_.width * camera_.height;
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    const KernelCamera& c = kernel.camera;
+    const float z = corner_[2] + c.z[i], inverse = 1 / std::max(z, 0.05F);
+    float x = (corner_[0] + c.x[i]) * inverse, y = (corner_[1] + c.y[i]) * inverse;
+    if (c.is_distorted) {
+      const float xx = x * x, yy = y * y, xy2 = 2 * (x * y), rr = xx + yy;
+      const float radial = 1 + rr * (c.lens.k1 + rr * c.lens.k2);
+      const float bent_x = c.lens.p1 * xy2 + c.lens.p2 * (rr + (xx + xx));
+      const float bent_y = c.lens.p1 * (rr + (yy + yy)) + c.lens.p2 * xy2;
+      x = x * radial + bent_x;
+      y = y * radial + bent_y;
+    }
+    const float u = c.lens.fx * x + (c.lens.cx + 0.5F), v = c.lens.fy * y + (c.lens.cy + 0.5F);
+    const bool is_inside = u >= 0 && v >= 0 && u < static_cast<float>(c.width) && v < static_cast<float>(c.height);
+    const std::int32_t pixel =
+        is_inside ? static_cast<std::int32_t>(v) * c.width + static_cast<std::int32_t>(u) : outside;
+    const float seen = depth_[static_cast<std::size_t>(pixel)], metres = seen - z;
+    const float beyond = std::max(0.0F, seen - kernel.from_m);
+    const float behind = std::max(kernel.behind_m, kernel.base_m + kernel.growth_per_m * (beyond * beyond));
+    const float trust = weight_[static_cast<std::size_t>(pixel)], w = metres > -behind ? trust : 0;
+    wanted_near[i] = -1;
+    if (w == 0) continue;
+    const float old = wanted->distance[i], sum = wanted->weight[i] + w;
+    const float target = std::clamp(metres * (kDistanceOne / kernel.truncation_m), -kDistanceOne, kDistanceOne);
+    wanted->distance[i] = static_cast<std::int16_t>(mean_after(old, target, w / std::max(1.0F, sum)));
+    wanted->weight[i] = static_cast<std::uint16_t>(std::min(kWeightMost, sum));
+    if (std::abs(metres) >= 2 * kernel.voxel_m) continue;
+    wanted_near[i] = pixel;
+    const float own = std::max(1.0F, std::trunc(16 * std::sqrt(trust * (1 / kWeightOne)) + 0.5F));
+    const float all = wanted->colour_weight[i] + own;
+    int shift = 0;
+    for (auto* channel : {&wanted->red, &wanted->green, &wanted->blue}) {
+      const float level = static_cast<float>(pixels_[static_cast<std::size_t>(pixel)] >> shift & 0xff);
+      const float before = (*channel)[i], next = mean_after(before, 256 * level, own / all);
+      (*channel)[i] = static_cast<std::uint16_t>(next);
+      recoloured = std::max(recoloured, std::abs(next - before) / 256);
+      shift += 8;
+    }
+    wanted->colour_weight[i] = static_cast<std::uint8_t>(std::min(255.0F, all));
+  }
+  ASSERT_GT(std::count_if(wanted_near.begin(), wanted_near.end(), [](std::int32_t p) { return p >= 0; }), 50);
+  for (const std::int64_t target : fusion::test::instruction_sets()) {
+    const fusion::test::UsingInstructionSet using_it(target);
+    const std::string name = fusion::test::name_of(target);
+    const auto block = copy();
+    NearPixels near;
+    const BlockChange change = fuse_distances(kernel, corner_, *block, near);
+    EXPECT_EQ(near, wanted_near) << name;
+    EXPECT_EQ(change.has_inside, std::any_of(block->distance.begin(), block->distance.end(),
+                                             [](std::int16_t distance) { return distance < 0; }));
+    EXPECT_EQ(fuse_colours(colours, corner_, *block, near), recoloured) << name;
+    EXPECT_TRUE(are_same(*block, *wanted)) << name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Lenses, BlockKernels, testing::Bool());
+
+}  // namespace
+}  // namespace spectra::mapping
