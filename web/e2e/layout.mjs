@@ -97,6 +97,13 @@ function boxes(page) {
         const height = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
         if (width > 1 && height > 1) problems.push(`${name(a)} lies over ${name(b)}`);
       }
+    const card = document.querySelector('.card');
+    const inner = card?.getBoundingClientRect();
+    for (const part of card?.children ?? []) {
+      const box = part.getBoundingClientRect();
+      if (box.left < inner.left - 0.5 || box.right > inner.right + 0.5 || box.bottom > inner.bottom + 0.5)
+        problems.push(`${name(part)} bursts out of the card`);
+    }
     // The frame of a lost link is drawn over the scene, and over no number beside it.
     const frame = document.querySelector('.stale')?.getBoundingClientRect();
     for (const part of frame === undefined ? [] : document.querySelectorAll('.axis, .panel, footer')) {
@@ -175,6 +182,22 @@ export function addLayoutTests(browser) {
       // The panel has just come back and the banner with it: their places are known a frame later.
       await drawn(page);
       await look('without a link');
+      // With all that a banner may have to say, and a reading beside it.
+      await page.evaluate(() => {
+        const { settings } = globalThis.spectra;
+        settings.setMethod('intensity_hue');
+        settings.setParameter('k', 0.7, true);
+        settings.setRange(15, 30, true);
+      });
+      await page.locator('[data-waiting]').waitFor();
+      assert.equal(await page.locator('.card').count(), 1);
+      await drawn(page);
+      await look('without a link, with wishes that wait');
+      const share = await page.evaluate(() => {
+        const heightOf = (selector) => document.querySelector(selector).getBoundingClientRect().height;
+        return heightOf('.banner.strong') / heightOf('canvas');
+      });
+      assert.ok(share < (height < 400 ? 0.35 : 0.25), `the banner covers ${share.toFixed(2)} of the height of the scene`);
       await context.close();
     });
   }

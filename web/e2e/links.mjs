@@ -336,6 +336,42 @@ export function addLinkTests(browser) {
     await server.stop();
   });
 
+  test('A link that brings nothing any more is not "up to date" for longer than a moment, and is left after three seconds', async () => {
+    const server = await startServer(['--demo']);
+    const link = await startLink(server.port);
+    const { page } = await openClient(browser, link.url);
+    await settled(page);
+    const footer = page.locator('footer');
+    assert.match(await footer.innerText(), /up to date/);
+    link.rate = 0;
+    const { unsaid_ms, lost_ms, words } = await page.evaluate(async () => {
+      const { store } = globalThis.spectra;
+      const from = store.heardAt;
+      let unsaid_ms = null;
+      let words = '';
+      while (store.connected && performance.now() - from < 10_000) {
+        const text = document.querySelector('footer').innerText;
+        if (unsaid_ms === null && !text.includes('up to date')) {
+          unsaid_ms = performance.now() - Math.max(from, store.heardAt);
+          words = text;
+        }
+        await new Promise((resolve) => setTimeout(resolve, 20));
+      }
+      return { unsaid_ms, words, lost_ms: performance.now() - store.lostAt };
+    });
+    assert.match(words, /not heard for 1\su?s/);
+    assert.doesNotMatch(words, /colours exact|levels|viewer/, 'nor does it say how exact the picture is');
+    assert.ok(unsaid_ms >= 1_450 && unsaid_ms < 1_900, `"up to date" for ${unsaid_ms} ms`);
+    assert.ok(lost_ms < 3_900, `left after ${lost_ms} ms`);
+    await page.getByText('Reconnecting').waitFor();
+    link.rate = Infinity;
+    await settled(page);
+    assert.match(await footer.innerText(), /up to date/);
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+
   test('After a cut the picture goes on without its geometry being sent again', async () => {
     const server = await startServer(['--demo']);
     const link = await startLink(server.port);

@@ -208,6 +208,7 @@ export function addViewTests(browser, scratch) {
     const scenes = {
       'one temperature': { text: sheet([21.5, 21.5, 21.5, 21.5]), says: /low 21\.5.*high 21\.5/, axis: /all 21\.5/ },
       'all missing': { text: sheet(['nan', 'nan', 'nan', 'nan']), says: /no thermal data/ },
+      'fill values': { text: sheet([20, '1e36', 30, 25]), says: /low 20\.0.*high 1e36/, axis: /hottest 1e36/ },
       'some missing': { text: sheet([20, 'nan', 30, 'nan']), says: /low 20\.0.*high 30\.0/, axis: /hottest 30\.0/, isGrey: true },
       'one vertex': { text: `${header(1, 0)}1 2 3 200 180 140 25\n`, says: /1 of 1 vertices/, axis: /all 25\.0/ },
       'two vertices': {
@@ -261,6 +262,21 @@ export function addViewTests(browser, scratch) {
       }
       assert.equal((await page.locator('footer').innerText()).trim(), 'up to date');
       await look('in a tiny window');
+      if (name === 'two vertices') {
+        // What a banner says there is room for: its heading, whole and over nothing.
+        await page.evaluate(() => {
+          const { store, tiles } = globalThis.spectra;
+          tiles.drawnGenerations = () => [null];
+          Object.assign(store, { pictureMethod: 'visible_only', behindSince: performance.now() - 3000 });
+        });
+        const heading = page.locator('[data-pending-method] strong');
+        await heading.waitFor();
+        const box = await page.locator('[data-pending-method]').boundingBox();
+        assert.ok(box.x >= 0 && box.x + box.width <= 200 && box.y >= 0 && box.y + box.height <= 120, JSON.stringify(box));
+        assert.match(await heading.innerText(), /not yet in the picture/);
+        await screenshot(page, 'tiny-pending');
+        await page.evaluate(() => (globalThis.spectra.store.behindSince = null));
+      }
       await page.setViewportSize({ width: 1440, height: 720 });
       await page.locator('.panel').waitFor();
       await page.close();
@@ -295,6 +311,20 @@ export function addViewTests(browser, scratch) {
       globalThis.spectra.store.graphicsLostAt -= 60_000;
     });
     await page.getByText('The graphics do not come back').waitFor();
+    // A picture that cannot be saved says why, and does so without a link, too.
+    await page.keyboard.press('s');
+    await page.getByText('Nothing was saved. There is no picture while the graphics restart.').waitFor();
+    await page.locator('[data-failure]').getByRole('button', { name: 'Close' }).click();
+    await page.evaluate(() => {
+      globalThis.link = globalThis.spectra.store.link;
+      globalThis.spectra.store.link = { phase: 'waiting', attempt: 1, retry_at: performance.now() + 60_000 };
+    });
+    await page.keyboard.press('s');
+    await page.getByText('Nothing was saved. There is no picture while the graphics restart.').waitFor();
+    await page.locator('[data-failure]').getByRole('button', { name: 'Close' }).click();
+    await page.evaluate(() => {
+      globalThis.spectra.store.link = globalThis.link;
+    });
     assert.equal(await page.getByRole('button', { name: 'Load the page again' }).count(), 1);
     await worker.evaluate(() => self.losing.restoreContext());
     await page.waitForFunction(() => globalThis.spectra.store.graphicsLostAt === null);

@@ -569,8 +569,8 @@ export class PictureRenderer {
     }
     // The canvas holds the picture only until the task that drew it ends.
     this.#drawWhole();
-    const picture = await createImageBitmap(this.canvas);
-    this.reply({ kind: 'copied', id, picture }, [picture]);
+    const picture = await createImageBitmap(this.canvas).catch(() => null);
+    this.reply({ kind: 'copied', id, picture }, picture === null ? [] : [picture]);
   }
 
   get #gpuObjects(): GpuObjects {

@@ -151,6 +151,7 @@ export class Session {
           // A refused upgrade looks like a broken link to a page.
           if (state.phase === 'waiting') void mustLogIn().then((must) => must && location.replace('./login'));
         },
+        expectsMuch: () => !store.settled || store.fusingPlace === 'coming' || store.methods.length === 0,
         onProtocolError: (error) => console.warn('left out:', error.message),
         onRoundTrip: (round_trip_ms) => {
           const before = store.round_trip_ms;
@@ -436,6 +437,7 @@ export class Session {
 
   #tick(): void {
     this.store.now = performance.now();
+    this.store.heardAt = this.store.connected ? this.#connection.lastMessageAt : null;
     this.#progress.tick();
     this.#sayError();
     this.fusing.consider();

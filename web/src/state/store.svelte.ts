@@ -19,7 +19,7 @@ import type { UpAxis } from '../view/first_view';
 import type { DrawnError, TileCounts } from '../tiles/tile_set';
 import type { CatalogueFailure } from '../transport/catalogue_loader';
 import type { PartFailure } from '../transport/part_loader';
-import type { LinkState } from '../transport/connection';
+import { type LinkState, QUIET_MS } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
 import { withChange } from './fusion_change';
@@ -61,6 +61,8 @@ export class Store {
   link = $state.raw<LinkState>({ phase: 'connecting', attempt: 1 });
   /** When the connection was lost, on performance.now()'s clock; null while it is up or before the first one. */
   lostAt = $state<number | null>(null);
+  /** When the server was heard last, on the same clock, as of the last tick; null while there is no connection. */
+  heardAt = $state<number | null>(null);
   server = $state.raw<Pick<Hello, 'server' | 'role' | 'limits' | 'capabilities'> | null>(null);
   /** Undefined before the first hello, null when the server has no scene. */
   scene = $state.raw<Scene | null | undefined>(undefined);
@@ -209,8 +211,14 @@ export class Store {
       this.otherMethods.length > 0 &&
       (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS)),
   );
-  /** How exact the picture is; nobody can say that of the picture of a lost link, or where there is none. */
-  readonly accuracy = $derived(this.connected && this.graphicsLostAt === null ? this.drawnError : null);
+  /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual. */
+  readonly silentFor_s = $derived(
+    this.connected && this.heardAt !== null && this.now - this.heardAt > QUIET_MS ? (this.now - this.heardAt) / 1000 : null,
+  );
+  /** How exact the picture is; nobody can say that of the picture of a link that is lost or silent, or where there is none. */
+  readonly accuracy = $derived(
+    this.connected && this.silentFor_s === null && this.graphicsLostAt === null ? this.drawnError : null,
+  );
   readonly graphicsLostFor_s = $derived(this.graphicsLostAt === null ? 0 : Math.max(0, (this.now - this.graphicsLostAt) / 1000));
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));
 }

@@ -28,7 +28,7 @@ class FakeSocket implements SocketLike {
   }
 }
 
-function setUp() {
+function setUp(expectsMuch = false) {
   const sockets: FakeSocket[] = [];
   const states: LinkState[] = [];
   const frames: ArrayBuffer[] = [];
@@ -43,6 +43,7 @@ function setUp() {
       onFrame: (message) => frames.push(message),
       onState: (state) => states.push(state),
       onProtocolError: (error) => problems.push(error.message),
+      expectsMuch: () => expectsMuch,
       onRoundTrip: () => undefined,
     },
     () => {
@@ -100,6 +101,20 @@ describe('Connection', () => {
     expect(states.some(({ phase }) => phase === 'waiting')).toBe(true);
     await vi.advanceTimersByTimeAsync(1000);
     expect(sockets.length).toBe(2);
+  });
+
+  it('leaves a silent link after three seconds and a bit, later where much may be on its way', async () => {
+    for (const [expectsMuch, last_ms] of [
+      [false, 3_500],
+      [true, 5_000],
+    ] as const) {
+      const { sockets, last } = setUp(expectsMuch);
+      last().receive(helloText);
+      await vi.advanceTimersByTimeAsync(last_ms - 600);
+      expect(sockets[0]?.closed).toBe(false);
+      await vi.advanceTimersByTimeAsync(600);
+      expect(sockets[0]?.closed).toBe(true);
+    }
   });
 
   it('does not take a link for dead because the page slept', async () => {

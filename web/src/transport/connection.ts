@@ -35,6 +35,8 @@ export interface ConnectionEvents {
   onState: (state: LinkState) => void;
   /** A message that does not follow the protocol; it is left out. */
   onProtocolError: (error: Error) => void;
+  /** Whether much may be on its way: a long message on a slow link looks like silence. */
+  expectsMuch: () => boolean;
   /** Time from a request to its answer. */
   onRoundTrip: (round_trip_ms: number) => void;
 }
@@ -49,11 +51,15 @@ export type SocketLike = Pick<WebSocket, 'binaryType' | 'readyState' | 'send' | 
 
 const OPEN = 1;
 const HELLO_TIMEOUT_MS = 6_000;
-const CHECK_INTERVAL_MS = 500;
-/** Silence after which the server is asked for a sign of life. */
-const QUIET_MS = 1_500;
+const CHECK_INTERVAL_MS = 250;
+/** A page that has not checked for so long has slept, or stalled. */
+const SLEPT_MS = 1_000;
+/** Silence after which the server, which says something every second, is asked for a sign of life. */
+export const QUIET_MS = 1_500;
 /** Time it has to give one. A cut TCP connection takes seconds to resume; a new one is there at once. */
-const ANSWER_MS = 3_000;
+const ANSWER_MS = 1_500;
+/** The same while much may be on its way before it. */
+const ANSWER_BEHIND_MUCH_MS = 3_000;
 const BACKOFF_FIRST_MS = 250;
 const BACKOFF_LAST_MS = 5_000;
 
@@ -191,12 +197,15 @@ export class Connection {
 
   #check(): void {
     const now = performance.now();
-    // After a stalled or sleeping page messages may be waiting behind this timer: judge at the next check.
-    const late = now - this.#lastCheckAt > 4 * CHECK_INTERVAL_MS;
+    // After a stalled or sleeping page messages may be waiting behind this timer: the time for an answer begins anew.
+    const late = now - this.#lastCheckAt > SLEPT_MS;
     this.#lastCheckAt = now;
-    if (late) return;
+    if (late) {
+      if (this.#askedAt !== null) this.#askedAt = now;
+      return;
+    }
     if (this.#askedAt !== null) {
-      if (now - this.#askedAt > ANSWER_MS) this.#lost();
+      if (now - this.#askedAt > (this.events.expectsMuch() ? ANSWER_BEHIND_MUCH_MS : ANSWER_MS)) this.#lost();
       return;
     }
     if (now - this.#lastMessageAt > QUIET_MS) {

@@ -42,6 +42,18 @@ describe('Numbers', () => {
     expect([celsius(Infinity), celsius(-Infinity)]).toEqual(['over range', 'under range']);
   });
 
+  it('have a power of ten where a fill value would be 37 digits wide', () => {
+    expect([1e36, 9.96e35, 3.3e30, -1e9, 1_250_000, 999_999].map((t) => plain(celsius(t)))).toEqual([
+      '1e36 °C',
+      '1e36 °C',
+      '3.3e30 °C',
+      '−1e9 °C',
+      '1.3e6 °C',
+      '999999.0 °C',
+    ]);
+    expect(figures(6.664912760815277e35, 3)).toBe('6.7e35');
+  });
+
   it('say what a sensor could not', () => {
     expect(plain(reading({ temperature: 21.5 }))).toBe('21.5 °C');
     expect(reading({ temperature: null })).toBe('no temperature');
@@ -79,6 +91,8 @@ describe('Numbers', () => {
     const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2 };
     expect(plain(accuracyWords(rounded, true, true))).toBe('within 2 mm, 2 levels, 0 °C');
     expect(plain(accuracyWords(rounded, true, false))).toBe('within 0.002 units, 2 levels, 0 °C');
+    // Without a power of ten, and still no less than it is.
+    expect(plain(accuracyWords({ ...rounded, position_m: 8.3e-7 }, true, false))).toBe('within 0.000001 units, 2 levels, 0 °C');
     expect(accuracyWords(null, true, true)).toBeNull();
   });
 });

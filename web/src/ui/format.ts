@@ -10,8 +10,16 @@ function signed(text: string): string {
   return text.startsWith('-') ? MINUS + text.slice(1) : text;
 }
 
-/** Fixed decimals, with a real minus sign. */
+/** From here on a number is written with a power of ten: a fill value in the data, say, would be 37 digits wide. */
+const LARGEST_WRITTEN_OUT = 1e6;
+
+function huge(value: number): string {
+  return signed(value.toExponential(1).replace('.0', '').replace('+', ''));
+}
+
+/** Fixed decimals, with a real minus sign; of huge numbers two figures: 1.2e36. */
 export function fixed(value: number, decimals: number): string {
+  if (Math.abs(value) >= LARGEST_WRITTEN_OUT) return huge(value);
   const text = value.toFixed(decimals);
   return signed(Number(text) === 0 ? text.replace('-', '') : text);
 }
@@ -92,6 +100,7 @@ export function sizeTitle({ metric }: Pick<Scene, 'metric'>): string {
 /** So many significant figures, no exponent, no trailing zeros. */
 export function figures(value: number, wanted: number): string {
   if (value === 0) return '0';
+  if (Math.abs(value) >= 1e15) return huge(value);
   const decimals = Math.max(0, wanted - 1 - Math.floor(Math.log10(Math.abs(value))));
   return signed(String(Number(value.toFixed(Math.min(12, decimals)))));
 }
@@ -114,13 +123,16 @@ export function liveWords(age_s: number | null, isEmpty: boolean, isNarrow: bool
   return isNarrow ? `live, ${age}` : `live, newest ${age}`;
 }
 
+/** Nobody wants to know less. */
+const LEAST_SAID_M = 1e-6;
+
 /** How exact the picture is, in words: farthest that it may be off, for all but a twentieth of colours and temperatures. */
 export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMetric: boolean): string | null {
   if (error === null) return null;
   const { position_m, temperature_celsius } = error;
   const colour_levels = error.colour_levels + error.rounding_levels;
   const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
-  const parts = [`within ${length(position_m, isMetric)}`];
+  const parts = [`within ${length(Math.max(position_m, LEAST_SAID_M), isMetric)}`];
   if (!isOff) parts.push('colours exact');
   else if (Number.isNaN(colour_levels)) parts.push('colours coarse');
   else parts.push(withUnit(figures(roundedUp(colour_levels, 0), 3), colour_levels > 1 ? 'levels' : 'level'));

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { cardPlace, isNarrow, labelPlaces } from './layout';
+import { cardPlace, isNarrow, labelPlaces, narrowCardRoom } from './layout';
 
 describe('isNarrow', () => {
   it.each([
@@ -65,5 +65,21 @@ describe('labelPlaces', () => {
 
   it('is left out where there is no room', () => {
     expect(labelPlaces([label(110, 10)], { ...room, right: 150, bottom: 20 }, 13)).toEqual([null]);
+  });
+});
+
+describe('narrowCardRoom', () => {
+  const free = { left: 96, top: 156, right: 356, bottom: 270 };
+
+  it('is what is free where a reading fits in', () => {
+    expect(narrowCardRoom(free, 148)).toEqual(free);
+  });
+
+  it('is beside the orientation on a low page, where that is wide enough', () => {
+    expect(narrowCardRoom({ ...free, right: 636, bottom: 170 }, 148)).toEqual({ left: 96, top: 4, right: 480, bottom: 170 });
+  });
+
+  it('is never narrower than a reading: then it lies over the orientation', () => {
+    expect(narrowCardRoom({ ...free, bottom: 200 }, 148)).toEqual({ ...free, top: 4, bottom: 200 });
   });
 });

@@ -48,6 +48,19 @@ export function cardPlace(
   };
 }
 
+/** Least size of a reading. */
+const CARD = { width: 200, height: 80 };
+
+/**
+ * Where a card may stand on a narrow page, in `free`, which lies below the orientation: where that is too low, beside the orientation, and
+ * where there is too little of that as well, over it.
+ */
+export function narrowCardRoom(free: Box, gizmo = GIZMO_SIZE): Box {
+  if (free.bottom - free.top >= CARD.height) return free;
+  const right = free.right - gizmo - 8;
+  return { ...free, top: 4, right: right - free.left >= CARD.width ? right : free.right };
+}
+
 /** `low` wins where the two contradict each other. */
 function clamp(value: number, low: number, high: number): number {
   return Math.max(low, Math.min(high, value));

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { mostImportant, positionOf, roundTicks, sharesBeyond, spreadApart, travelOf, valueAt } from './scale';
+import { columnWidth, mostImportant, positionOf, roundTicks, sharesBeyond, spreadApart, travelOf, valueAt } from './scale';
 
 const base = { label: '', help: '' };
 
@@ -98,6 +98,15 @@ describe('Slider travel', () => {
 
   it('gives an open end a sensible one', () => {
     expect(travelOf({ ...base, name: 'k', kind: 'number', default: 1, min: 0 }).max).toBe(8);
+  });
+});
+
+describe('columnWidth', () => {
+  it('has room for the numbers of the axis, whatever they are', () => {
+    expect(columnWidth([], [])).toBe(0);
+    expect(columnWidth(['20', '30'], ['10.6', '40.3'])).toBeLessThanOrEqual(40);
+    expect(columnWidth(['310'], ['316.3', '301.0'])).toBeGreaterThan(40);
+    expect(columnWidth(['2e35', '8e35'], ['1e36'])).toBeGreaterThanOrEqual(40);
   });
 });
 

@@ -14,6 +14,19 @@ export function roundTicks(lo: number, hi: number, wanted: number): { values: nu
   return { values, step, decimals: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
 }
 
+/** About as wide as a text is on the axis, in pixels, in the widest of the usual fonts. */
+export function textWidth(text: string, isBold: boolean): number {
+  const points = text.length - text.replaceAll('.', '').length;
+  return (text.length - points) * (isBold ? 8 : 7.3) + points * 4.4;
+}
+
+/** Width of the column left of the strip, so that it holds these numbers, the tick beside them, and the arrow beside the bold ones. */
+export function columnWidth(numbers: readonly string[], bold: readonly string[]): number {
+  return Math.ceil(
+    Math.max(0, ...numbers.map((text) => textWidth(text, false) + 10), ...bold.map((text) => textWidth(text, true) + 11)),
+  );
+}
+
 /** Those `count` of the items, in their order, whose rank is lowest; the first of equals. */
 export function mostImportant<T>(items: readonly T[], count: number, rank: (item: T) => number): T[] {
   const kept = new Set([...items.keys()].sort((a, b) => rank(items[a]!) - rank(items[b]!) || a - b).slice(0, count));

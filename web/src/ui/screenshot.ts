@@ -53,18 +53,21 @@ function composed(session: Session, picture: ImageBitmap): HTMLCanvasElement {
   return canvas;
 }
 
-/** Saves the picture as a PNG file. */
+/** Saves the picture as a PNG file, or says why it does not. */
 export async function saveScreenshot(session: Session): Promise<void> {
-  const picture = await session.viewport.copy();
-  const canvas = composed(session, picture);
-  picture.close();
-  canvas.toBlob((blob) => {
-    if (blob === null) return;
+  try {
+    const picture = await session.viewport.copy();
+    const canvas = composed(session, picture);
+    picture.close();
+    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, 'image/png'));
+    if (blob === null) throw new Error('The browser makes no file of this picture.');
     const address = URL.createObjectURL(blob);
     const link = document.createElement('a');
     link.href = address;
     link.download = `spectra-${new Date().toISOString().slice(0, 19).replaceAll(':', '-')}.png`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(address), 10_000);
-  }, 'image/png');
+  } catch (error) {
+    session.store.failure = `Nothing was saved. ${error instanceof Error ? error.message : String(error)}`;
+  }
 }
