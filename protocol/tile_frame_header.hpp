@@ -17,13 +17,14 @@ enum class FrameKind : std::uint8_t {
   Temperature = 4,
   Visible = 5,
   ColoursSubtractGreen = 6,
-  VisibleSubtractGreen = 7
+  VisibleSubtractGreen = 7,
+  TemperatureSigma = 8
 };
 
 /// Header of a binary message.
 struct TileFrameHeader {
-  /// 1 geometry, 2 colours, 3 remove, 4 temperature, 5 visible, 6 colours_subtract_green, 7 visible_subtract_green;
-  /// a reader ignores others.
+  /// 1 geometry, 2 colours, 3 remove, 4 temperature, 5 visible, 6 colours_subtract_green, 7 visible_subtract_green,
+  /// 8 temperature_sigma; a reader ignores others.
   FrameKind kind = FrameKind::Geometry;
   /// Bit i set = child octant i (x + 2y + 4z) exists.
   std::uint8_t child_mask = 0;

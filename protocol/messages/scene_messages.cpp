@@ -74,6 +74,7 @@ static void describe(auto& fields, Is<SceneDescription> auto& message) {
   fields.optional("live", message.live);
   fields.optional("observed", message.observed);
   fields.optional("baseline", message.baseline);
+  fields.optional("has_temperature_sigma", message.has_temperature_sigma);
   fields.field("notes", message.notes);
   rules(fields, message);
 }

@@ -97,6 +97,8 @@ struct SceneDescription {
   std::optional<SceneObserved> observed;
   /// Absent in a scene that does not remember, as a file.
   std::optional<SceneBaseline> baseline;
+  /// Of some vertices it is known how sure their temperature is. Absent: of none.
+  std::optional<bool> has_temperature_sigma;
   /// What loading noticed.
   std::vector<SceneNote> notes;
 };

@@ -8,8 +8,10 @@ namespace spectra::protocol {
 
 template <>
 std::span<const EnumWord<Channel>> words_of() {
-  static constexpr EnumWord<Channel> kWords[] = {
-      {Channel::Fused, "fused"}, {Channel::Temperature, "temperature"}, {Channel::Visible, "visible"}};
+  static constexpr EnumWord<Channel> kWords[] = {{Channel::Fused, "fused"},
+                                                 {Channel::Temperature, "temperature"},
+                                                 {Channel::Visible, "visible"},
+                                                 {Channel::TemperatureSigma, "temperature_sigma"}};
   return kWords;
 }
 

@@ -24,7 +24,7 @@ struct CameraSet {
   std::array<int, 2> viewport{1, 1};
 };
 
-enum class Channel { Fused, Temperature, Visible };
+enum class Channel { Fused, Temperature, Visible, TemperatureSigma };
 
 /// Tiles that the client still has, with colours, from an earlier connection.
 struct ResumeRequest {

@@ -331,4 +331,9 @@ std::shared_ptr<const SceneSnapshot> SceneSnapshot::build(files::LoadedScene sce
   return map.apply(std::move(change), revision, pool, progress);
 }
 
+bool SceneSnapshot::has_temperature_sigma() const {
+  const auto all = tiles();
+  return std::any_of(all.begin(), all.end(), [](const auto& tile) { return !tile->sigma_kelvin.empty(); });
+}
+
 }  // namespace spectra::map

@@ -142,6 +142,8 @@ class SceneSnapshot {
   virtual int level_count() const = 0;
   /// All tiles, coarse before fine.
   virtual std::span<const std::shared_ptr<const Tile>> tiles() const = 0;
+  /// Of some vertices it is known how sure their temperature is.
+  bool has_temperature_sigma() const;
   /// Summary and histogram. A copy stays valid without the snapshot.
   virtual const fusion::SceneTemperature& temperature() const = 0;
   /// The same, for FusionPlan::prepare, of this or an earlier version of a map that grows: automatic values do not follow every

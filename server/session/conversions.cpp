@@ -290,6 +290,7 @@ protocol::SceneDescription to_message(const map::SceneSnapshot& scene) {
   message.up = to_message(scene.up());
   message.metric = scene.is_metric();
   message.live = scene.is_live();
+  if (scene.has_temperature_sigma()) message.has_temperature_sigma = true;
   message.observed.emplace();
   if (const auto observed = scene.observed()) {
     message.observed->oldest = observed->first;

@@ -93,6 +93,7 @@ void ViewerSession::opened() {
   hello.role = may_operate ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
                         "cache_bytes", "marks", "age",      "baseline",         "robot"};
+  hello.capabilities.emplace_back("temperature_sigma");
   if (gives_raw_layers()) hello.capabilities.emplace_back("raw_layers");
   hello.limits = {limits_.message_size_bytes, static_cast<std::uint32_t>(limits_.json_depth), limits_.requests_per_s};
   if (scene_) hello.scene = to_message(*scene_);
@@ -227,6 +228,7 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
                    .fused = has_channel(protocol::Channel::Fused),
                    .temperature = has_channel(protocol::Channel::Temperature),
                    .visible = has_channel(protocol::Channel::Visible),
+                   .temperature_sigma = has_channel(protocol::Channel::TemperatureSigma),
                    .temperature_step_celsius = request.temperature_step_celsius.value_or(0)};
   if (stream_) stream_->subscribe(subscription_);
   peer_.wake();

@@ -9,13 +9,15 @@
 
 namespace spectra::stream {
 
-/// Which raw layers one viewer is to have. An epoch rises when what it has of a layer is to be sent in another form.
+/// Which layers beside fused colours one viewer is to have. An epoch rises when what it has of a layer is to be sent in another form.
 struct RawDemand {
-  /// The raw layers, in the order in which they are sent.
-  static constexpr std::array<Layer, 2> kLayers = {Layer::Temperature, Layer::Visible};
+  /// The layers, in the order in which they are sent.
+  static constexpr std::array<Layer, 3> kLayers = {Layer::Temperature, Layer::Visible, Layer::TemperatureSigma};
+  /// So many of them, the first, are what colours are made of: the raw layers.
+  static constexpr std::size_t kRawCount = 2;
 
   std::array<bool, kLayers.size()> is_wanted{};
-  std::array<std::uint64_t, kLayers.size()> epoch = {1, 1};
+  std::array<std::uint64_t, kLayers.size()> epoch = {1, 1, 1};
   double temperature_step_celsius = 0;  ///< 0 = TemperatureCodes::kDefaultStepCelsius.
 };
 
@@ -58,7 +60,7 @@ struct Demand {
             .colour_bits = 8,
             .transform = is_visible ? colour_transform : protocol::ColourTransform::None,
             .layer = layer,
-            .step_celsius = is_visible ? 0 : raw.temperature_step_celsius};
+            .step_celsius = layer == Layer::Temperature ? raw.temperature_step_celsius : 0};
   }
   /// A method that highlights nothing has no marks to carry.
   bool carries_marks() const { return marks && plan && plan->highlights(); }

@@ -55,7 +55,7 @@ struct GeometryKey {
 struct PlanIdentity {};
 
 /// What a layer of a tile holds.
-enum class Layer { Fused, Visible, Temperature };
+enum class Layer { Fused, Visible, Temperature, TemperatureSigma };
 
 /// Names the encoding of a layer before it exists, by what it shows. The encoder speed is that of the geometry.
 struct ColourKey {

@@ -61,7 +61,7 @@ class RawLane {
 
   FrameCache::State& cache_;
   std::vector<std::shared_ptr<TileSlot>> order_;
-  std::size_t head_ = 0;  // Everything before it is there; two places a slot.
+  std::size_t head_ = 0;  // Everything before it is there; a place a layer of each slot.
 };
 
 }  // namespace spectra::stream

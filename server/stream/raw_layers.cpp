@@ -31,6 +31,9 @@ protocol::Result<Payload> encoded_layer(const RawEncoding& encoding, FrameCache:
   if (RawDemand::kLayers[encoding.layer] == Layer::Visible) {
     return encoded_visible_layer(*encoding.tile, *geometry, demand.encoder_speed, demand.colour_transform);
   }
+  if (RawDemand::kLayers[encoding.layer] == Layer::TemperatureSigma) {
+    return encoded_sigma_layer(*encoding.tile, *geometry, demand.encoder_speed);
+  }
   return encoded_temperature_layer(*encoding.tile, *geometry, demand.encoder_speed,
                                    demand.raw.temperature_step_celsius);
 }

@@ -60,28 +60,41 @@ protocol::Result<Payload> encoded_visible_layer(const map::Tile& tile, const Enc
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
 }
 
-protocol::Result<Payload> encoded_temperature_layer(const map::Tile& tile, const EncodedTile& geometry,
-                                                    int encoder_speed, double step_celsius) {
-  std::vector<float> temperature;
-  temperature.reserve(geometry.input_of_decoded.size());
+namespace {
+
+/// A number per vertex of the tile, none where there are none at all, in the decoded order.
+protocol::Result<Payload> encoded_scalars(std::span<const float> of_vertex, const EncodedTile& geometry,
+                                          int encoder_speed, double step) {
+  std::vector<float> values;
+  values.reserve(geometry.input_of_decoded.size());
   float lowest = std::numeric_limits<float>::infinity();
   float highest = -lowest;
   for (const std::uint32_t input : geometry.input_of_decoded) {
-    const float value =
-        tile.temperature_celsius.empty() ? std::numeric_limits<float>::quiet_NaN() : tile.temperature_celsius[input];
-    temperature.push_back(value);
+    const float value = of_vertex.empty() ? std::numeric_limits<float>::quiet_NaN() : of_vertex[input];
+    values.push_back(value);
     if (!std::isfinite(value)) continue;
     lowest = std::min(lowest, value);
     highest = std::max(highest, value);
   }
   using Codes = fusion::TemperatureCodes;
-  const double step = step_celsius > 0 ? step_celsius : Codes::kDefaultStepCelsius;
-  const Codes codes = lowest <= highest ? Codes::covering(lowest, highest, step) : Codes{};
-  std::vector<std::uint16_t> code(temperature.size());
-  codes.encode(temperature, code);
+  const double step_in_force = step > 0 ? step : Codes::kDefaultStepCelsius;
+  const Codes codes = lowest <= highest ? Codes::covering(lowest, highest, step_in_force) : Codes{};
+  std::vector<std::uint16_t> code(values.size());
+  codes.encode(values, code);
   BOOST_OUTCOME_TRY(auto payload,
                     protocol::codec::encoded_temperature_codes(code, {codes.scale, codes.offset}, encoder_speed));
   return std::make_shared<const std::vector<std::byte>>(std::move(payload));
+}
+
+}  // namespace
+
+protocol::Result<Payload> encoded_temperature_layer(const map::Tile& tile, const EncodedTile& geometry,
+                                                    int encoder_speed, double step_celsius) {
+  return encoded_scalars(tile.temperature_celsius, geometry, encoder_speed, step_celsius);
+}
+
+protocol::Result<Payload> encoded_sigma_layer(const map::Tile& tile, const EncodedTile& geometry, int encoder_speed) {
+  return encoded_scalars(tile.sigma_kelvin, geometry, encoder_speed, 0);
 }
 
 }  // namespace spectra::stream

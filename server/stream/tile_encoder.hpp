@@ -47,4 +47,7 @@ protocol::Result<Payload> encoded_visible_layer(const map::Tile& tile, const Enc
 protocol::Result<Payload> encoded_temperature_layer(const map::Tile& tile, const EncodedTile& geometry,
                                                     int encoder_speed, double step_celsius);
 
+/// How sure its temperatures are, kelvin, in the same codes with the default step. Of a tile of which nothing is known all are missing.
+protocol::Result<Payload> encoded_sigma_layer(const map::Tile& tile, const EncodedTile& geometry, int encoder_speed);
+
 }  // namespace spectra::stream

@@ -27,7 +27,9 @@ using protocol::TileFrameHeader;
 // Places in RawDemand::kLayers.
 constexpr std::size_t kTemperature = 0;
 constexpr std::size_t kVisible = 1;
-static_assert(RawDemand::kLayers[kTemperature] == Layer::Temperature && RawDemand::kLayers[kVisible] == Layer::Visible);
+constexpr std::size_t kSigma = 2;
+static_assert(RawDemand::kLayers[kTemperature] == Layer::Temperature &&
+              RawDemand::kLayers[kVisible] == Layer::Visible && RawDemand::kLayers[kSigma] == Layer::TemperatureSigma);
 
 // After every tile of anybody: raw layers fill what time is left.
 constexpr int kRawPriority = 100;
@@ -521,6 +523,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
     }
     raw.is_wanted[kTemperature] = subscription.temperature;
     raw.is_wanted[kVisible] = subscription.visible;
+    raw.is_wanted[kSigma] = subscription.temperature_sigma;
     if (subscription.fused == demand_.fused) return;
     demand_.fused = subscription.fused;
     for (const auto& slot : tiles_.slots()) tiles_.put_down(*slot);
@@ -543,6 +546,7 @@ class Stream final : public ViewerStream, public CacheWaiter {
   }
 
   FrameKind raw_frame_kind(std::size_t layer) const {
+    if (layer == kSigma) return FrameKind::TemperatureSigma;
     return layer == kTemperature ? FrameKind::Temperature : protocol::visible_frame_kind(demand_.colour_transform);
   }
 

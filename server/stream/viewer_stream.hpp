@@ -83,6 +83,7 @@ struct Subscription {
   /// Raw layers come after everything else, hottest and nearest first, and the visible colours after the temperatures of a tile.
   bool temperature = false;
   bool visible = false;
+  bool temperature_sigma = false;       ///< Comes as the raw layers do, after them.
   double temperature_step_celsius = 0;  ///< 0 = the default.
 
   static constexpr std::uint64_t kCacheBytes = 256u << 20;
@@ -92,7 +93,7 @@ struct Subscription {
 struct ResumedTile {
   protocol::TileId tile;
   std::uint32_t revision = 0;
-  bool has_raw_layers = false;  ///< Both, in the form that it subscribes to.
+  bool has_raw_layers = false;  ///< Temperatures and visible colours, in the form that it subscribes to.
 };
 
 struct EncodingTimes;

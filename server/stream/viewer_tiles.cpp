@@ -151,7 +151,7 @@ std::uint32_t ViewerTiles::resume(std::span<const ResumedTile> claims, const Dem
     } else if (hold_resumed(*known->second, claim.revision, demand, cache)) {
       ++current_count;
       if (!claim.has_raw_layers) continue;
-      for (std::size_t layer = 0; layer < demand.raw.epoch.size(); ++layer) {
+      for (std::size_t layer = 0; layer < RawDemand::kRawCount; ++layer) {
         known->second->raw[layer].held_epoch = demand.raw.epoch[layer];
       }
     }

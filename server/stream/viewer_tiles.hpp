@@ -91,7 +91,8 @@ struct TileSlot {
   /// With colours, or with what the viewer makes them of.
   bool is_drawable() const { return held.geometry_epoch != 0 && (held.colour_epoch != 0 || has_raw_layers()); }
   bool has_raw_layers() const {
-    return std::all_of(raw.begin(), raw.end(), [](const Raw& layer) { return layer.held_epoch != 0; });
+    return std::all_of(raw.begin(), raw.begin() + RawDemand::kRawCount,
+                       [](const Raw& layer) { return layer.held_epoch != 0; });
   }
   /// Holds that geometry, and a raw layer of it is wanted and not there.
   bool lacks_raw(std::size_t layer, const Demand& demand) const {

@@ -105,6 +105,8 @@ test("blocks are listed in pages and given back as they came", async () => {
   await server.stop();
 });
 
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
 test("how sure a temperature is reaches whoever asks, and every file", async () => {
   const store = path.join(scratch, "sure.spectra");
   const begin = () => serve(["--live", "--store", store]);
@@ -119,6 +121,17 @@ test("how sure a temperature is reaches whoever asks, and every file", async () 
     assert.deepEqual([sure.temperature_sigma, sure.temperature_at, sure.observed_at], [0.25, 1700000123.5, 1700000200]);
     const plain = await probe(15, 4);
     assert.deepEqual([plain.temperature_sigma, plain.temperature_at], [undefined, undefined]);
+    assert.ok(client.hello.capabilities.includes("temperature_sigma"));
+    assert.equal(client.hello.scene.has_temperature_sigma, true);
+    await client.request("scene.subscribe", { channels: ["fused", "temperature_sigma"] });
+    await client.complete(1);
+    const tiles = () => [...client.tiles.values()];
+    for (let i = 0; i < 100 && !(tiles().length > 0 && tiles().every(({ sigma }) => sigma)); ++i) await sleep(50);
+    const kelvin = tiles().flatMap(({ sigma: { codes, scale, offset } }) =>
+      [...codes].map((code) => (code === 65535 ? null : Math.round((code * scale + offset) * 1000) / 1000)),
+    );
+    assert.deepEqual([...new Set(kelvin)].sort(), [0.25, null]);
+    assert.equal(kelvin.filter((value) => value === 0.25).length, 11 * 11, "of every vertex of the block, and no other");
     await client.close();
     for (const [at, sigmas] of [
       ["blocks/sure", [0.25]],

@@ -11,6 +11,7 @@ export const KIND = {
   visible: 5,
   colours_subtract_green: 6,
   visible_subtract_green: 7,
+  temperature_sigma: 8,
 };
 export const isColours = ({ kind }) => kind === KIND.colours || kind === KIND.colours_subtract_green;
 const MAGIC = 0x31435053;
@@ -323,6 +324,10 @@ export class SpectraClient {
       if (colours.length !== tile.geometry.positions.length) throw new Error("colours: vertex count differs");
       tile.colours = colours;
       tile.generation = frame.generation;
+    } else if (frame.kind === KIND.temperature_sigma) {
+      const tile = this.tiles.get(frame.tile);
+      if (!tile || tile.frame.revision !== frame.revision) throw new Error("sigma before its geometry");
+      tile.sigma = this.draco.temperature(frame.payload);
     } else if (frame.kind === KIND.temperature || frame.kind === KIND.visible || frame.kind === KIND.visible_subtract_green) {
       const tile = this.tiles.get(frame.tile);
       if (!tile || tile.frame.revision !== frame.revision) throw new Error("a raw layer before its geometry");

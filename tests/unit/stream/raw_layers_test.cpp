@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <map>
+
 #include "fusion/temperature_codes.hpp"
 #include "server/stream/frame_cache.hpp"
 #include "stream_with_viewers.hpp"
@@ -224,6 +227,52 @@ TEST_F(RawLayers, GiveWayToAnAnswer) {
   for (std::size_t i = before; i < viewer.frames.size(); ++i) {
     EXPECT_EQ(viewer.frames[i].kind, FrameKind::Colours) << "no raw layer before the answer is there";
   }
+}
+
+TEST_F(RawLayers, SigmaComesAfterThePictureAndIsThatOfTheTile) {
+  auto tile = patch_tile({0, 0, 0, 0}, 20, 0, 30);
+  tile->sigma_kelvin.assign(tile->positions.size(), 0.25F);
+  for (std::size_t v = 0; v < 100; ++v) tile->sigma_kelvin[v] = 1.5F;
+  tile->sigma_kelvin[100] = std::numeric_limits<float>::quiet_NaN();
+  scene_ = scene_of({tile});
+  EXPECT_TRUE(scene_->has_temperature_sigma());
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({.temperature_sigma = true});
+  show(viewer, 0.3);
+  viewer.complete();
+  EXPECT_EQ(viewer.count(FrameKind::TemperatureSigma), 0U) << "complete is said first";
+  settle(viewer);
+  EXPECT_EQ(viewer.frames.size(), 3U) << "geometry, colours, sigma";
+  const auto& [table, codes] = viewer.tiles.at(tile->id).sigma;
+  std::map<int, int> hundredths;
+  for (const std::uint16_t code : codes) {
+    ++hundredths[code == fusion::TemperatureCodes::kMissing
+                     ? -1
+                     : static_cast<int>(std::lround((code * table.scale + table.offset) * 100))];
+  }
+  EXPECT_EQ(hundredths, (std::map<int, int>{{-1, 1}, {25, 299}, {150, 100}}));
+  // Another setting, or going without it and back, does not send it again.
+  show(viewer, 0.6);
+  viewer.stream().subscribe({});
+  viewer.stream().subscribe({.temperature_sigma = true});
+  settle(viewer);
+  EXPECT_EQ(viewer.count(FrameKind::TemperatureSigma), 1U);
+}
+
+TEST_F(RawLayers, SigmaIsNoPartOfWhatIsFused) {
+  EXPECT_FALSE(scene_->has_temperature_sigma());
+  TestViewer earlier(scene_, cache_, pool_);
+  earlier.stream().subscribe({.temperature = true, .visible = true, .temperature_sigma = true});
+  show(earlier, 0.3);
+  settle(earlier);
+  EXPECT_EQ(earlier.count(FrameKind::TemperatureSigma), scene_->tiles().size());
+  TestViewer viewer(scene_, cache_, pool_);
+  EXPECT_EQ(viewer.resume(earlier, earlier.claims()), scene_->tiles().size());
+  viewer.stream().subscribe({.temperature = true, .visible = true, .temperature_sigma = true});
+  show(viewer, 0.3);
+  settle(viewer);
+  EXPECT_EQ(viewer.count(FrameKind::Geometry) + viewer.count(FrameKind::Temperature), 0U);
+  EXPECT_EQ(viewer.count(FrameKind::TemperatureSigma), scene_->tiles().size()) << "it is not claimed";
 }
 
 class RawLayersInView : public testing::StreamOfATree {};

@@ -136,6 +136,7 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       break;
     }
     case protocol::FrameKind::Temperature:
+    case protocol::FrameKind::TemperatureSigma:
     case protocol::FrameKind::Visible:
     case protocol::FrameKind::VisibleSubtractGreen: {
       const auto held = tiles.find(header.tile);
@@ -146,6 +147,9 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       if (header.kind == protocol::FrameKind::Temperature) {
         held->second.temperature = protocol::codec::decoded_temperature_codes(frame.value().payload).value();
         EXPECT_EQ(held->second.temperature.codes.size(), header.vertex_count);
+      } else if (header.kind == protocol::FrameKind::TemperatureSigma) {
+        held->second.sigma = protocol::codec::decoded_temperature_codes(frame.value().payload).value();
+        EXPECT_EQ(held->second.sigma.codes.size(), header.vertex_count);
       } else {
         EXPECT_EQ(header.kind, protocol::visible_frame_kind(colour_transform));
         held->second.visible = protocol::codec::decoded_colours(frame.value().payload, colour_transform).value();

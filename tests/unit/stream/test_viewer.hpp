@@ -23,6 +23,7 @@ struct HeldTile {
   std::vector<std::uint8_t> marks;                    ///< That came with them, if any.
   std::vector<protocol::codec::ColourBytes> visible;  ///< Raw layers.
   protocol::codec::DecodedTemperatureCodes temperature;
+  protocol::codec::DecodedTemperatureCodes sigma;
 };
 
 /// A client on a perfect link: takes the frames of a stream, decodes them and expects of each what the protocol says

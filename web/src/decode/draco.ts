@@ -24,6 +24,8 @@ export function decodeJob(draco: DecoderModule, job: DecodeJob): DecodeResult {
       return decodeVisible(draco, job);
     case 'temperature':
       return decodeTemperature(draco, job.payload);
+    case 'sigma':
+      return { ...decodeTemperature(draco, job.payload), kind: 'sigma' };
   }
 }
 

@@ -21,7 +21,12 @@ export interface TemperatureJob {
   kind: 'temperature';
   payload: Uint8Array<ArrayBuffer>;
 }
-export type DecodeJob = GeometryJob | ColoursJob | VisibleJob | TemperatureJob;
+/** How sure its temperatures are. */
+export interface SigmaJob {
+  kind: 'sigma';
+  payload: Uint8Array<ArrayBuffer>;
+}
+export type DecodeJob = GeometryJob | ColoursJob | VisibleJob | TemperatureJob | SigmaJob;
 
 /** What the page keeps of a geometry, whose arrays go on to where they are drawn. */
 export interface GeometrySummary {
@@ -63,7 +68,14 @@ export interface DecodedTemperature {
   scale: number;
   offset: number;
 }
-export type DecodeResult = DecodedGeometry | DecodedColours | DecodedVisible | DecodedTemperature;
+export interface DecodedSigma {
+  kind: 'sigma';
+  /** Kelvin, as temperatures are written. */
+  codes: Uint16Array<ArrayBuffer>;
+  scale: number;
+  offset: number;
+}
+export type DecodeResult = DecodedGeometry | DecodedColours | DecodedVisible | DecodedTemperature | DecodedSigma;
 
 export interface WorkerRequest {
   id: number;

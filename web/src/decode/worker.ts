@@ -27,6 +27,7 @@ function buffersOf(result: DecodeResult): Transferable[] {
     case 'visible':
       return [result.rgb.buffer];
     case 'temperature':
+    case 'sigma':
       return [result.codes.buffer];
   }
 }

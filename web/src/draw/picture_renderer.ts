@@ -33,6 +33,7 @@ import type {
   RenderRequest,
   TileArrays,
 } from './render_messages';
+import { sigmaStep } from './sigma_steps';
 import { SlicePace, Slices } from './slices';
 import type { TileFuser } from './tile_fuser';
 import { TileMaterials } from './tile_materials';
@@ -195,6 +196,15 @@ export class PictureRenderer {
         if (tile !== undefined) tile.raw = command.raw;
         break;
       }
+      case 'sigma': {
+        const { sigma } = command;
+        const steps = Uint8Array.from(sigma.codes, (code) => sigmaStep(celsiusOf(code, sigma)));
+        this.#tiles.get(command.tile)?.object.geometry.setAttribute('sigma', new BufferAttribute(steps, 1, true));
+        break;
+      }
+      case 'hatch':
+        this.#materials.setHatch(command.kelvin);
+        break;
       case 'module':
         this.#load(command.module);
         break;
@@ -556,7 +566,7 @@ export class PictureRenderer {
     this.#camera.matrixWorldNeedsUpdate = true;
     this.#camera.projectionMatrix.makePerspective(-right * near, right * near, top * near, -top * near, near, far);
     this.#camera.projectionMatrixInverse.copy(this.#camera.projectionMatrix).invert();
-    this.#materials.lookFrom(eye, range, height / (2 * top));
+    this.#materials.lookFrom(eye, range, height / (2 * top), this.#pixelRatio);
     const { surface, cloud } = this.#materials;
     for (const { object, arrays } of shown) object.material = arrays.indices === null ? cloud : surface;
     return shown;

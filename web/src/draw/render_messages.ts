@@ -37,6 +37,10 @@ export type RenderCommand =
   | { change: 'facts'; facts: SceneFacts }
   /** From now on tiles with raw arrays show these settings, all in the same picture; null: they keep the colours that they are given. */
   | { change: 'fuse'; settings: FusionChange | null }
+  /** How sure its temperatures are, kelvin. */
+  | { change: 'sigma'; tile: number; sigma: Pick<RawArrays, 'codes' | 'scale' | 'offset'> }
+  /** What is less sure than that is hatched; null: nothing. */
+  | { change: 'hatch'; kelvin: number | null }
   | { change: 'visible'; tile: number; visible: boolean }
   | { change: 'dispose'; tile: number }
   | { change: 'background'; colour: number }

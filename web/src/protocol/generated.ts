@@ -61,7 +61,7 @@ export interface ChangeScale {
   max: number;
 }
 
-export type Channel = 'fused' | 'temperature' | 'visible';
+export type Channel = 'fused' | 'temperature' | 'visible' | 'temperature_sigma';
 
 /** r, g, b, sRGB-encoded, real-valued */
 export type Colour = [number, number, number];
@@ -643,6 +643,8 @@ export interface SceneDescription {
   observed?: SceneObserved;
   /** Absent in a scene that does not remember, as a file. */
   baseline?: SceneBaseline;
+  /** Of some vertices it is known how sure their temperature is. Absent: of none. */
+  has_temperature_sigma?: boolean;
   /** What loading noticed. */
   notes: SceneNote[];
 }
@@ -808,6 +810,7 @@ export const sceneDescription: Decoder<SceneDescription> = object({
   live: optional(boolean),
   observed: optional(sceneObserved),
   baseline: optional(sceneBaseline),
+  has_temperature_sigma: optional(boolean),
   notes: array(sceneNote),
 });
 

@@ -15,12 +15,13 @@ export const FrameKind = {
   visible: 5,
   colours_subtract_green: 6,
   visible_subtract_green: 7,
+  temperature_sigma: 8,
 } as const;
 
 export interface TileFrameHeader {
   /**
-   * 1 geometry, 2 colours, 3 remove, 4 temperature, 5 visible, 6 colours_subtract_green, 7 visible_subtract_green; a
-   * reader ignores others.
+   * 1 geometry, 2 colours, 3 remove, 4 temperature, 5 visible, 6 colours_subtract_green, 7 visible_subtract_green, 8
+   * temperature_sigma; a reader ignores others.
    */
   kind: number;
   /** Bit i set = child octant i (x + 2y + 4z) exists. */

@@ -244,6 +244,15 @@ export class Session {
     if (this.store.connected) this.quality.askMarks();
   }
 
+  /** Hatches what is less sure than a positive number of kelvin. */
+  setHatch(kelvin: number): void {
+    const { store } = this;
+    const before = store.hatchAbove_kelvin;
+    store.hatchAbove_kelvin = kelvin > 0 ? kelvin : null;
+    this.viewport.setHatch(store.hatchAbove_kelvin);
+    if ((before === null) !== (store.hatchAbove_kelvin === null)) void this.#subscription.channelsChanged();
+  }
+
   setBackground(colour: string): void {
     this.store.background = colour;
     this.viewport.setBackground(colour);

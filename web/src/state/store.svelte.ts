@@ -97,6 +97,8 @@ export class Store {
   robotShown = $state(true);
   /** The camera goes along with it. */
   followsRobot = $state(false);
+  /** What is less sure than that is hatched, kelvin; null: nothing. */
+  hatchAbove_kelvin = $state<number | null>(null);
   outlineWish = $state<OutlineWish>('automatic');
   /** Of the newest colours of the whole scene; null where they say of nothing that it is highlighted. */
   highlightContrast = $state.raw<HighlightContrast | null>(null);

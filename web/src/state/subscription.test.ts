@@ -93,6 +93,18 @@ describe('a subscription', () => {
     expect(concerned.progress.begin).toHaveBeenCalled();
   });
 
+  it('asks how sure temperatures are while that is hatched, of a server that knows', async () => {
+    const { store, subscription, asked } = setUp();
+    const able = { ...HELLO, capabilities: [...HELLO.capabilities, 'temperature_sigma'] };
+    store.hatchAbove_kelvin = 0.5;
+    subscription.greeted({ ...HELLO, capabilities: HELLO.capabilities.filter((one) => one !== 'temperature_sigma') });
+    subscription.greeted(able);
+    await later();
+    store.hatchAbove_kelvin = null;
+    void subscription.channelsChanged();
+    expect(asked.map(({ params }) => params['channels'])).toEqual([['fused', 'temperature_sigma'], ['fused']]);
+  });
+
   it('leaves methods and palettes until the link is free, and gets them at once when it comes back', () => {
     const { store, subscription, concerned } = setUp();
     subscription.greeted(BRIEF);

@@ -143,8 +143,9 @@ export class Subscription {
   }
 
   #params(capabilities: readonly string[]): object {
+    const isHatched = this.store.hatchAbove_kelvin !== null && capabilities.includes('temperature_sigma');
     return {
-      channels: this.concerned.fusing.channels,
+      channels: [...this.concerned.fusing.channels, ...(isHatched ? ['temperature_sigma'] : [])],
       ...(capabilities.includes('cache_bytes')
         ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
         : {}),

@@ -36,6 +36,7 @@ beforeEach(() => {
   tiles = new TileSet(() => ({
     setColours: () => undefined,
     setRaw: () => undefined,
+    setSigma: () => undefined,
     setVisible: () => undefined,
     dispose: () => undefined,
   }));

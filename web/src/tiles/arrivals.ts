@@ -46,7 +46,7 @@ export class Arrivals {
   drop(tile: TileId): void {
     const key = tileKey(tile);
     this.#waiting.delete(`geometry ${key}`);
-    for (const kind of ['colours', 'temperature', 'visible']) this.#waiting.delete(`${kind} ${key}`);
+    for (const kind of ['colours', 'temperature', 'visible', 'sigma']) this.#waiting.delete(`${kind} ${key}`);
     this.#hiding.delete(key);
   }
 
@@ -105,6 +105,10 @@ export class Arrivals {
       if (result.kind === 'colours') {
         this.tiles.addColours(frame, result.rgba);
         return result.rgba.byteLength;
+      }
+      if (result.kind === 'sigma') {
+        this.tiles.addSigma(frame, result);
+        return result.codes.byteLength;
       }
       this.tiles.addRaw(frame, result);
       return result.kind === 'visible' ? result.rgb.byteLength : result.codes.byteLength;

@@ -10,6 +10,7 @@ const COMPLETE = { generation: 1, scene_revision: 1, tiles: 1, vertices: 1 };
 const results: Record<DecodeResult['kind'], DecodeResult> = {
   visible: { kind: 'visible', rgb: new Uint8Array(3) },
   temperature: { kind: 'temperature', codes: new Uint16Array(1), scale: 1, offset: 0 },
+  sigma: { kind: 'sigma', codes: new Uint16Array(1), scale: 1, offset: 0 },
   geometry: decodedGeometry(),
   colours: { kind: 'colours', rgba: new Uint8Array(4) },
 };
@@ -38,6 +39,7 @@ beforeEach(() => {
   tiles = new TileSet(() => ({
     setColours: () => undefined,
     setRaw: () => undefined,
+    setSigma: () => undefined,
     setVisible: () => undefined,
     dispose: () => undefined,
   }));

@@ -73,6 +73,8 @@ export class FrameIntake {
       this.#decode(`colours ${key}`, frame, { kind: 'colours', payload: frame.payload, transform });
     } else if (frame.kind === FrameKind.temperature) {
       this.#decode(`temperature ${key}`, frame, { kind: 'temperature', payload: frame.payload });
+    } else if (frame.kind === FrameKind.temperature_sigma) {
+      this.#decode(`sigma ${key}`, frame, { kind: 'sigma', payload: frame.payload });
     } else if (frame.kind === FrameKind.visible || frame.kind === FrameKind.visible_subtract_green) {
       const transform = frame.kind === FrameKind.visible ? 'none' : 'subtract_green';
       this.#decode(`visible ${key}`, frame, { kind: 'visible', payload: frame.payload, transform });

@@ -56,6 +56,7 @@ class Picture {
         visible: false,
         setColours: () => undefined,
         setRaw: () => undefined,
+        setSigma: () => undefined,
         setVisible: (visible: boolean) => {
           drawable.visible = visible;
         },

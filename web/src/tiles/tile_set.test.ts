@@ -1,4 +1,5 @@
 import { beforeEach, describe, expect, it } from 'vitest';
+import type { DecodedSigma } from '../decode/messages';
 import { childTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 import { decodedGeometry, ROOT as root, tileFrame as frame } from './test_tiles';
 import { type Drawable, TileSet, RawMismatch, type RawLayers } from './tile_set';
@@ -16,6 +17,10 @@ class FakeDrawable implements Drawable {
   }
   setRaw(raw: RawLayers): void {
     this.raw = raw;
+  }
+  sigma: number[] | null = null;
+  setSigma({ codes }: DecodedSigma): void {
+    this.sigma = [...codes];
   }
   setVisible(visible: boolean): void {
     this.visible = visible;
@@ -128,6 +133,19 @@ describe('TileSet', () => {
     expect(drawable.shade).toBe(70);
     tiles.addColours(frame(root, { generation: 8 }), colours(80));
     expect(drawable.shade).toBe(80);
+  });
+
+  it('takes how sure temperatures are with the geometry of its revision, whichever comes first', () => {
+    const sigma = (...codes: number[]): DecodedSigma => ({ kind: 'sigma', codes: Uint16Array.from(codes), scale: 1, offset: 0 });
+    tiles.addSigma(frame(root), sigma(1, 2, 3));
+    expect(add(root).sigma).toEqual([1, 2, 3]);
+    // Of another revision, or of another length, it is of something else.
+    tiles.addSigma(frame(root, { revision: 2 }), sigma(4, 5, 6));
+    const next = add(root, { revision: 2, generation: 2 });
+    expect(next.sigma).toEqual([4, 5, 6]);
+    tiles.addSigma(frame(root, { revision: 1 }), sigma(7, 8, 9));
+    tiles.addSigma(frame(root, { revision: 2 }), sigma(7));
+    expect(next.sigma).toEqual([4, 5, 6]);
   });
 
   it('leaves out the finest levels while the camera moves, where nothing newer is lost by it', () => {

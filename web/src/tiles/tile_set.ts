@@ -1,4 +1,4 @@
-import type { DecodedGeometry, DecodedTemperature, DecodedVisible, GeometrySummary } from '../decode/messages';
+import type { DecodedGeometry, DecodedSigma, DecodedTemperature, DecodedVisible, GeometrySummary } from '../decode/messages';
 import type { Vec3 } from '../protocol/messages';
 import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 
@@ -7,6 +7,8 @@ export interface Drawable {
   setColours(rgba: Uint8Array<ArrayBuffer>): void;
   /** What the sensors saw, from which colours are made here. */
   setRaw(raw: RawLayers): void;
+  /** How sure the temperature of each vertex is. */
+  setSigma(sigma: DecodedSigma): void;
   setVisible(visible: boolean): void;
   dispose(): void;
 }
@@ -69,6 +71,8 @@ interface TileNode {
   waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
   /** Raw layers of which not both are there, or whose geometry is not. */
   waitingRaw: { revision: number; temperature: DecodedTemperature | null; visible: DecodedVisible | null } | null;
+  /** The same of how sure its temperatures are. */
+  waitingSigma: { revision: number; sigma: DecodedSigma } | null;
   /** Rank of the oldest colours that stand on the screen when the children are drawn in this tile's place; NOTHING when they cannot be. */
   coverRank: number;
   /** The same when this place is drawn as well as it can be: by the tile itself or by its children, whichever is newer. */
@@ -190,6 +194,7 @@ export class TileSet {
       node.waitingGeometry = null;
       node.waitingColours = null;
       node.waitingRaw = null;
+      node.waitingSigma = null;
       this.#prune(node);
     }
   }
@@ -274,6 +279,12 @@ export class TileSet {
     if (layer.kind === 'visible') node.waitingRaw.visible = layer;
     else node.waitingRaw.temperature = layer;
     this.#joinRaw(node);
+  }
+
+  addSigma(frame: TileFrame, sigma: DecodedSigma): void {
+    const node = this.#node(frame.tile);
+    node.waitingSigma = { revision: frame.revision, sigma };
+    this.#joinSigma(node);
   }
 
   /** True when these colours, once added, would put the tile on the screen in the place of older detail that stands there now. */
@@ -440,6 +451,7 @@ export class TileSet {
       waitingGeometry: null,
       waitingColours: null,
       waitingRaw: null,
+      waitingSigma: null,
       coverRank: NOTHING,
       bestRank: NOTHING,
       replacedIn: 0,
@@ -462,6 +474,15 @@ export class TileSet {
   #join(node: TileNode): void {
     this.#joinColours(node);
     this.#joinRaw(node);
+    this.#joinSigma(node);
+  }
+
+  #joinSigma(node: TileNode): void {
+    const { shown, waitingSigma } = node;
+    if (waitingSigma === null || shown?.revision !== waitingSigma.revision) return;
+    node.waitingSigma = null;
+    const { sigma } = waitingSigma;
+    if (sigma.codes.length === shown.geometry.vertex_count) shown.drawable.setSigma(sigma);
   }
 
   #joinRaw(node: TileNode): void {
@@ -498,6 +519,7 @@ export class TileSet {
         isKnownToServer: true,
       };
       if (node.isDrawn) drawable.setVisible(true);
+      this.#joinSigma(node);
       this.#arrived(node);
     }
   }
@@ -542,6 +564,7 @@ export class TileSet {
     node.waitingGeometry = null;
     node.waitingColours = null;
     node.waitingRaw = null;
+    node.waitingSigma = null;
     node.child_mask = 0;
     node.isDrawn = false;
     node.isEnd = false;

@@ -11,6 +11,7 @@ function captions({ store }: Session): string[] {
     `${method?.label ?? ''}${methodIsPending ? `, in parts still ${shown.join(' and ')}` : ''}`,
     `${seen} UTC`,
     ...(connected ? [] : [`Link lost: ${duration(lostFor_s)} old when saved`]),
+    ...(store.hatchAbove_kelvin === null ? [] : [`Hatched: less sure than ${store.hatchAbove_kelvin} °C`]),
     ...(scene?.temperature.missing_count && store.fusion?.missing !== 'visible'
       ? [`No temperature: ${store.fusion?.missing ?? ''}`]
       : []),

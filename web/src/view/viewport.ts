@@ -148,6 +148,7 @@ export class Viewport {
     ]);
     return {
       setRaw: (raw) => this.#change({ change: 'raw', tile, raw }, [raw.codes.buffer, raw.rgb.buffer]),
+      setSigma: (sigma) => this.#change({ change: 'sigma', tile, sigma }, [sigma.codes.buffer]),
       setColours: (next) => this.#change({ change: 'colours', tile, rgba: next }, [next.buffer]),
       setVisible: (visible) => {
         if (visible && !this.#hasShown) {
@@ -244,6 +245,11 @@ export class Viewport {
     if (isOn === this.#isOutlined) return;
     this.#isOutlined = isOn;
     this.#change({ change: 'outline', isOn });
+  }
+
+  /** Hatches what is less sure than that, or of which nobody knows; null: nothing. */
+  setHatch(kelvin: number | null): void {
+    this.#change({ change: 'hatch', kelvin });
   }
 
   /** How near to and how far from what is looked at the controls go, metres. */
