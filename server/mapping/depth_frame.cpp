@@ -16,33 +16,32 @@ constexpr int kNormalReach = 3;  ///< Pixels.
 constexpr float kLeastCosine = 0.17F;
 constexpr float kSteepest = 5.67F;  ///< The tangent of 80 degrees.
 
-/// What weighing a pixel needs.
+/// What weighing a pixel needs. Inner: of one whose neighbours as far as kNormalReach are in the picture.
+template <bool kInner>
 struct Scene {
   const float* depth;
   const RayTable& rays;
-  const DepthNoise& noise;
   float focal;
   int width, height;
 
   float at(int x, int y) const {
-    return x < 0 || y < 0 || x >= width || y >= height
+    return !kInner && (x < 0 || y < 0 || x >= width || y >= height)
                ? 0
                : depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
   }
 
   /// Metres by which neighbours may differ that are so many pixels apart on one surface.
-  float largest_step(float z, int pixels) const {
-    return 6 * static_cast<float>(noise.sigma_m(static_cast<double>(z))) +
-           static_cast<float>(pixels) * z / focal * kSteepest;
+  float largest_step(float z, float sigma_m, int pixels) const {
+    return 6 * sigma_m + static_cast<float>(pixels) * z / focal * kSteepest;
   }
 
-  bool is_at_edge(int x, int y, float z) const {
+  bool is_at_edge(int x, int y, float z, float sigma_m) const {
     constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
     for (int reach = 1; reach <= kEdgeReach; ++reach) {
-      const float most = largest_step(z, reach);
+      const float most = largest_step(z, sigma_m, reach);
       for (const auto& [dx, dy] : kAround) {
         const int u = x + reach * dx, v = y + reach * dy;
-        if (u < 0 || v < 0 || u >= width || v >= height) continue;
+        if (!kInner && (u < 0 || v < 0 || u >= width || v >= height)) continue;
         const float other = at(u, v);
         if (other == 0 ? reach == 1 : std::abs(other - z) > most) return true;
       }
@@ -51,7 +50,7 @@ struct Scene {
   }
 
   /// The neighbour on one line through a pixel, as a vector from it; the far one or the near one, whichever is on the surface.
-  bool step_along(int x, int y, int dx, int dy, float z, std::array<float, 3>& step) const {
+  bool step_along(int x, int y, int dx, int dy, float z, float sigma_m, std::array<float, 3>& step) const {
     float ends[2];
     int used[2];
     for (int side = 0; side < 2; ++side) {
@@ -60,7 +59,7 @@ struct Scene {
       ends[side] = z;
       for (int reach = kNormalReach; reach > 0; --reach) {
         const float other = at(x + sign * reach * dx, y + sign * reach * dy);
-        if (other > 0 && std::abs(other - z) <= largest_step(z, reach)) {
+        if (other > 0 && std::abs(other - z) <= largest_step(z, sigma_m, reach)) {
           used[side] = sign * reach;
           ends[side] = other;
           break;
@@ -77,10 +76,15 @@ struct Scene {
     return true;
   }
 
+  /// 0 for what lies at an edge, too.
+  float cosine_of(int x, int y, float z, float sigma_m) const {
+    return is_at_edge(x, y, z, sigma_m) ? 0 : cosine(x, y, z, sigma_m);
+  }
+
   /// Of the angle between the line of sight and the surface's normal; 0 when it cannot be told.
-  float cosine(int x, int y, float z) const {
+  float cosine(int x, int y, float z, float sigma_m) const {
     std::array<float, 3> a{}, b{};
-    if (!step_along(x, y, 1, 0, z, a) || !step_along(x, y, 0, 1, z, b)) return 0;
+    if (!step_along(x, y, 1, 0, z, sigma_m, a) || !step_along(x, y, 0, 1, z, sigma_m, b)) return 0;
     const float nx = a[1] * b[2] - a[2] * b[1], ny = a[2] * b[0] - a[0] * b[2], nz = a[0] * b[1] - a[1] * b[0];
     const std::size_t pixel =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -120,8 +124,9 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
   std::transform(picture.pixels.begin(), picture.pixels.end(), frame.depth_m.begin(), [&](std::uint16_t value) {
     return value == calibration.invalid ? 0 : static_cast<float>(value) * unit;
   });
-  const Scene scene{frame.depth_m.data(), rays,        calibration.noise, static_cast<float>(calibration.camera.fx),
-                    frame.width,          frame.height};
+  const Scene<true> inner{frame.depth_m.data(), rays, static_cast<float>(calibration.camera.fx), frame.width,
+                          frame.height};
+  const Scene<false> outer{inner.depth, rays, inner.focal, frame.width, frame.height};
   const double reference = 2 * calibration.noise.base_m;
   std::vector<std::size_t> counts(static_cast<std::size_t>(frame.tiles_down), 0);
   static_assert(kBandRows == DepthFrame::kTile);
@@ -133,11 +138,15 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
         const float z = frame.depth_m[pixel];
         if (z <= 0) continue;
         const double sigma = calibration.noise.sigma_m(static_cast<double>(z));
-        if (sigma > truncation_m || scene.is_at_edge(x, y, z)) continue;
-        const float cosine = scene.cosine(x, y, z);
+        if (sigma > truncation_m) continue;
+        const bool is_inner =
+            x >= kNormalReach && y >= kNormalReach && x + kNormalReach < frame.width && y + kNormalReach < frame.height;
+        const auto sigma_m = static_cast<float>(sigma);
+        const float cosine = is_inner ? inner.cosine_of(x, y, z, sigma_m) : outer.cosine_of(x, y, z, sigma_m);
         if (cosine < kLeastCosine) continue;
         const double trust = std::min(1.0, reference * reference / (sigma * sigma));
-        frame.weight[pixel] = std::max(1.0F, std::round(kWeightOne * static_cast<float>(trust) * cosine));
+        const int weight = static_cast<int>(kWeightOne * static_cast<float>(trust) * cosine + 0.5F);
+        frame.weight[pixel] = static_cast<float>(std::max(1, weight));
         float& farthest = frame.farthest_m[band * static_cast<std::size_t>(frame.tiles_across) +
                                            static_cast<std::size_t>(x / DepthFrame::kTile)];
         farthest = std::max(farthest, z);

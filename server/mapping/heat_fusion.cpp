@@ -33,7 +33,7 @@ class Differences {
   void add(float difference, float weight) {
     const double bin = std::floor((static_cast<double>(difference) + kReach) / kStep);
     if (!(bin >= 0 && bin < static_cast<double>(kBins))) return;
-    bins_[static_cast<std::size_t>(bin)] += static_cast<std::uint64_t>(std::lround(std::min(1e6F, 64 * weight))) + 1;
+    bins_[static_cast<std::size_t>(bin)] += static_cast<std::uint64_t>(std::min(1e6F, 64 * weight) + 0.5F) + 1;
     ++count_;
   }
   void add(const Differences& other) {
@@ -153,19 +153,24 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
 }
 
 void HeatFusion::find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
-                             HeatReport& report) {
+                             jobs::WorkerPool& pool, HeatReport& report) {
   // Everything that is known tells it, by how well it is known.
-  Differences differences;
-  for (const auto& chunk : looks) {
-    for (const Look& look : chunk) {
-      if (map.head(look.block).heat < 0) continue;
-      const HeatBlock& heat = map.heat(look.block);
-      const float variance = heat.variance[look.voxel];
-      if (variance < kMostVariance) {
-        differences.add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+  constexpr std::size_t kParts = 4;
+  std::array<Differences, kParts> parts;
+  pool.for_each(kParts, [&](std::size_t part) {
+    for (std::size_t chunk = part; chunk < looks.size(); chunk += kParts) {
+      for (const Look& look : looks[chunk]) {
+        if (map.head(look.block).heat < 0) continue;
+        const HeatBlock& heat = map.heat(look.block);
+        const float variance = heat.variance[look.voxel];
+        if (variance < kMostVariance) {
+          parts[part].add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+        }
       }
     }
-  }
+  });
+  Differences& differences = parts[0];
+  for (std::size_t part = 1; part < kParts; ++part) differences.add(parts[part]);
   report.compared = differences.count();
   if (report.compared >= kLeastCompared) {
     const double middle = differences.quantile(0.5);
@@ -241,7 +246,7 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
     }
   });
 
-  if (rules_.frame_offset) find_offset(map, looks, moment_s, report);
+  if (rules_.frame_offset) find_offset(map, looks, moment_s, pool, report);
   const auto offset = static_cast<float>(report.offset_kelvin);
   const auto common = static_cast<float>(report.offset_sigma_kelvin * report.offset_sigma_kelvin);
   const auto spread = static_cast<float>(report.spread_kelvin * report.spread_kelvin);

@@ -58,7 +58,7 @@ class HeatFusion {
   Prepared prepare(const Picture16& picture, jobs::WorkerPool& pool) const;
   bool is_frozen(const Picture16& picture);
   void find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
-                   HeatReport& report);
+                   jobs::WorkerPool& pool, HeatReport& report);
 
   const ThermalCalibration calibration_;
   const HeatRules rules_;

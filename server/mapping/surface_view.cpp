@@ -2,37 +2,19 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <limits>
 
-#include "server/mapping/block_view.hpp"
+#include "server/mapping/block_kernels.hpp"
 #include "server/mapping/depth_fusion.hpp"
+#include "server/mapping/surface_kernel.hpp"
 
 namespace spectra::mapping {
 namespace {
 
-constexpr float kNearest = 0.1F;
 constexpr float kBesideVoxels = 1.5F;  ///< What lies so near to a surface is an end of an edge that crosses it.
 constexpr float kFarthest = std::numeric_limits<float>::infinity();
 constexpr int kEdgeReach = 3, kHoleReach = 2;
-
-/// Positive floats are ordered as their bits are.
-void keep_nearest(float& depth, float z) {
-  const std::atomic_ref<std::uint32_t> bits(reinterpret_cast<std::uint32_t&>(depth));  // NOLINT
-  const auto mine = std::bit_cast<std::uint32_t>(z);
-  std::uint32_t held = bits.load(std::memory_order_relaxed);
-  while (mine < held && !bits.compare_exchange_weak(held, mine, std::memory_order_relaxed)) {
-  }
-}
-
-/// Half the difference across a voxel along one axis, or the whole one to the neighbour that is in the block.
-float slope(const VoxelBlock& block, std::size_t voxel, int at, std::size_t stride) {
-  const std::size_t low = at > 0 && block.weight[voxel - stride] > 0 ? voxel - stride : voxel;
-  const std::size_t high = at + 1 < kBlockEdge && block.weight[voxel + stride] > 0 ? voxel + stride : voxel;
-  const float difference = static_cast<float>(block.distance[high]) - static_cast<float>(block.distance[low]);
-  return high - low == 2 * stride ? 0.5F * difference : difference;
-}
 
 /// 1 where any value within `reach` is 1, along both axes.
 std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, int width, int height, int reach) {
@@ -88,76 +70,38 @@ std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, i
 struct Drawing {
   const VoxelMap& map;
   const CameraModel& camera;
-  const BlockView& view;
-  const Lens& lens;
-  std::vector<float>& depth_m;
+  const KernelCamera& kernel;
 
-  /// Finds the voxels of a block beside its surface and draws them.
-  void draw(std::int32_t index, std::vector<SurfaceVoxel>& out) const {
-    const VoxelBlock& block = map.voxels(index);
+  /// Finds the voxels of a block beside its surface and draws them into a picture.
+  void draw(std::int32_t index, std::vector<SurfaceVoxel>& out, std::vector<float>& depth_m) const {
     const auto voxel_m = static_cast<float>(map.voxel_m());
-    const float beside = kBesideVoxels / static_cast<float>(kTruncationVoxels) * kDistanceOne;
-    const float metres = static_cast<float>(kTruncationVoxels) * voxel_m / kDistanceOne;
-    const auto corner = view.corner(map.head(index).at);
-    std::array<std::uint16_t, kBlockVoxels> near;
-    std::size_t count = 0;
-    const auto most = static_cast<std::int16_t>(beside);
-    for (std::size_t voxel = 0; voxel < kBlockVoxels; ++voxel) {
-      near[count] = static_cast<std::uint16_t>(voxel);
-      const bool is_near = block.distance[voxel] <= most && block.distance[voxel] >= -most && block.weight[voxel] > 0;
-      count += is_near ? 1 : 0;
+    constexpr auto kTruncation = static_cast<float>(kTruncationVoxels);
+    const float beside = std::floor(kBesideVoxels / kTruncation * kDistanceOne);
+    SeenVoxels seen;
+    see_voxels(kernel, map.voxels(index), kernel.view.corner(map.head(index).at), voxel_m, beside,
+               kTruncation * voxel_m / kDistanceOne, seen);
+    out.reserve(seen.count);
+    for (std::size_t i = 0; i < seen.count; ++i) {
+      out.push_back(
+          {static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]});
+      if (seen.off_m[i] <= voxel_m) draw_square(seen, i, depth_m);  // else the surface is drawn by those next to it
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t voxel = near[i];
-      const auto distance = static_cast<float>(block.distance[voxel]);
-      const int x = static_cast<int>(voxel) % kBlockEdge, y = static_cast<int>(voxel) / kBlockEdge % kBlockEdge,
-                z = static_cast<int>(voxel) / (kBlockEdge * kBlockEdge);
-      const float gx = slope(block, voxel, x, 1), gy = slope(block, voxel, y, kBlockEdge),
-                  gz = slope(block, voxel, z, std::size_t{kBlockEdge} * kBlockEdge);
-      const float squared = gx * gx + gy * gy + gz * gz;
-      if (squared <= 0) continue;
-      // From the voxel along the normal to the surface; distances along lines of sight are longer than those to the surface, as the
-      // gradient is larger.
-      const float back = std::clamp(-distance / squared, -2 / std::sqrt(squared), 2 / std::sqrt(squared));
-      std::array<float, 3> p{}, n{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        n[k] = gx * view.step(0)[k] + gy * view.step(1)[k] + gz * view.step(2)[k];
-        p[k] = corner[k] + static_cast<float>(x) * view.step(0)[k] + static_cast<float>(y) * view.step(1)[k] +
-               static_cast<float>(z) * view.step(2)[k] + back * n[k];
-      }
-      if (p[2] < kNearest) continue;
-      const float along = -(n[0] * p[0] + n[1] * p[1] + n[2] * p[2]);
-      const float lengths =
-          std::sqrt((n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
-      if (along <= 0 || lengths <= 0) continue;
-      SurfaceVoxel seen;
-      lens.project(p[0] / p[2], p[1] / p[2], seen.u, seen.v);
-      // The square reaches its neighbours' even where they are apart by a diagonal.
-      const float half = 0.75F * voxel_m * lens.fx / p[2];
-      if (!(seen.u > -half && seen.v > -half && seen.u < static_cast<float>(camera.width) + half &&
-            seen.v < static_cast<float>(camera.height) + half)) {
-        continue;
-      }
-      seen.voxel = static_cast<std::uint16_t>(voxel);
-      seen.z_m = p[2];
-      seen.cosine = std::min(1.0F, along / lengths);
-      out.push_back(seen);
-      if (std::abs(distance) * metres > voxel_m) continue;  // the surface is drawn by those next to it
-      const int left = std::max(0, static_cast<int>(std::ceil(seen.u - half))),
-                right = std::min(camera.width - 1, static_cast<int>(std::floor(seen.u + half))),
-                top = std::max(0, static_cast<int>(std::ceil(seen.v - half))),
-                bottom = std::min(camera.height - 1, static_cast<int>(std::floor(seen.v + half)));
-      // Its plane through the pixels that it covers; beyond twice its size it is no longer the surface.
-      const float plane = -along;
-      for (int row = top; row <= bottom; ++row) {
-        float* pixels = &depth_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width)];
-        const float ry = p[1] / p[2] + (static_cast<float>(row) - seen.v) / lens.fy;
-        for (int column = left; column <= right; ++column) {
-          const float rx = p[0] / p[2] + (static_cast<float>(column) - seen.u) / lens.fx;
-          const float facing = n[0] * rx + n[1] * ry + n[2];
-          const float depth = facing < 0 ? plane / facing : p[2];
-          keep_nearest(pixels[column], std::clamp(depth, p[2] - 2 * voxel_m, p[2] + 2 * voxel_m));
-        }
+  }
+
+  /// The plane of the surface through the pixels that a voxel covers; beyond twice its size it is no longer the surface.
+  void draw_square(const SeenVoxels& seen, std::size_t i, std::vector<float>& depth_m) const {
+    const float u = seen.u[i], v = seen.v[i], z = seen.z_m[i], half = seen.half[i];
+    const float reach = 2 * static_cast<float>(map.voxel_m());
+    const int left = std::max(0, static_cast<int>(std::ceil(u - half))),
+              right = std::min(camera.width - 1, static_cast<int>(std::floor(u + half))),
+              top = std::max(0, static_cast<int>(std::ceil(v - half))),
+              bottom = std::min(camera.height - 1, static_cast<int>(std::floor(v + half)));
+    for (int row = top; row <= bottom; ++row) {
+      float* pixels = &depth_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width)];
+      const float of_row = (static_cast<float>(row) - v) * seen.per_v[i];
+      for (int column = left; column <= right; ++column) {
+        const float slope = of_row + (static_cast<float>(column) - u) * seen.per_u[i];
+        pixels[column] = std::min(pixels[column], z + std::clamp(slope, -reach, reach));
       }
     }
   }
@@ -168,8 +112,9 @@ struct Drawing {
 SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const Eigen::Isometry3d& world_from_camera,
                           jobs::WorkerPool& pool) {
   SurfaceView drawn;
-  const BlockView view(world_from_camera, map.voxel_m());
-  const Lens lens(camera);
+  const KernelCamera kernel(camera, world_from_camera, map.voxel_m());
+  const BlockView& view = kernel.view;
+  const Lens& lens = kernel.lens;
   const auto voxel_m = static_cast<float>(map.voxel_m());
   const float radius_m = 0.87F * kBlockEdge * voxel_m;
   for (const MapUnit& unit : map.units()) {
@@ -183,20 +128,31 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
   std::sort(drawn.blocks.begin(), drawn.blocks.end(), [](const auto& a, const auto& b) { return a.block < b.block; });
   drawn.depth_m.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), kFarthest);
 
-  const Drawing drawing{map, camera, view, lens, drawn.depth_m};
+  const Drawing drawing{map, camera, kernel};
   constexpr std::size_t kChunk = 64;
   const std::size_t chunks = (drawn.blocks.size() + kChunk - 1) / kChunk;
-  pool.for_each(chunks, [&](std::size_t chunk) {
-    const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) drawing.draw(drawn.blocks[i].block, drawn.blocks[i].voxels);
+  // Each thread draws into a picture of its own; the nearest of all is the same whoever has drawn what.
+  std::vector<std::vector<float>> pictures(
+      std::min<std::size_t>(pool.thread_count() + 1, std::max<std::size_t>(1, chunks)));
+  std::atomic<std::size_t> next_chunk{0};
+  pool.for_each(pictures.size(), [&](std::size_t picture) {
+    pictures[picture].assign(drawn.depth_m.size(), kFarthest);
+    for (std::size_t chunk = next_chunk++; chunk < chunks; chunk = next_chunk++) {
+      const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
+      for (std::size_t i = chunk * kChunk; i < end; ++i)
+        drawing.draw(drawn.blocks[i].block, drawn.blocks[i].voxels, pictures[picture]);
+    }
   });
+  for (const std::vector<float>& picture : pictures) {
+    for (std::size_t i = 0; i < picture.size(); ++i) drawn.depth_m[i] = std::min(drawn.depth_m[i], picture[i]);
+  }
   drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m);
 
   pool.for_each(chunks, [&](std::size_t chunk) {
     const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
       for (SurfaceVoxel& seen : drawn.blocks[i].voxels) {
-        const int x = static_cast<int>(std::lround(seen.u)), y = static_cast<int>(std::lround(seen.v));
+        const int x = static_cast<int>(std::floor(seen.u + 0.5F)), y = static_cast<int>(std::floor(seen.v + 0.5F));
         if (x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
         const float before = drawn.depth_m[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
                                            static_cast<std::size_t>(x)];

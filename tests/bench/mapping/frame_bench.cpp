@@ -1,9 +1,10 @@
 // What a whole frame takes: a depth and colour picture, the thermal pictures that come until the next one, meshing what has changed and
 // making blocks of it for a server.
 //
-//   frame_bench FRAMES [TRUTH.ply] [--voxel M] [--threads N] [--every N] [--from S]
+//   frame_bench FRAMES [TRUTH.ply] [--voxel M] [--threads N] [--every N] [--most N] [--from S]
 //
-// Threads: with the one that calls; 2 by default. --every: frames between two hand-overs, 1 by default. --from: frames before so many
+// Threads: with the one that calls; 2 by default. --every: frames between two hand-overs, 1 by default. --most: units that are
+// meshed at a time, all by default; what was too much waits for the next frame. --from: frames before so many
 // seconds are mapped and not counted. Pictures are decoded beforehand. TRUTH.ply: the map is compared with it at the end.
 #include <chrono>
 #include <cstdio>
@@ -53,7 +54,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> files;
   MapperSettings settings;
   unsigned threads = 2;
-  std::size_t every = 1;
+  std::size_t every = 1, most = UnitPublisher::kAll;
   double from_s = 0;
   for (int i = 1; i < argc; ++i) {
     const auto is = [&](const char* name) { return std::strcmp(argv[i], name) == 0 && i + 1 < argc; };
@@ -63,6 +64,8 @@ int main(int argc, char** argv) {
       threads = static_cast<unsigned>(std::max(1, std::atoi(argv[++i])));
     else if (is("--every"))
       every = static_cast<std::size_t>(std::max(1, std::atoi(argv[++i])));
+    else if (is("--most"))
+      most = static_cast<std::size_t>(std::max(1, std::atoi(argv[++i])));
     else if (is("--from"))
       from_s = std::atof(argv[++i]);
     else
@@ -88,7 +91,7 @@ int main(int argc, char** argv) {
     std::vector<PublishedUnit> changed;
     std::vector<std::string> blocks;
     const Eigen::Vector3d eye = folder.value().trajectory().at(time_s).pose.translation();
-    units.add_to_last([&] { changed = mapper.changed_units(publisher, eye, pool); });
+    units.add_to_last([&] { changed = mapper.changed_units(publisher, eye, pool, most); });
     hand_over.add_to_last([&] {
       for (const PublishedUnit& unit : changed) blocks.push_back(block_ply(unit.mesh, 0));
     });

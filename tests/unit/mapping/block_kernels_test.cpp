@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/mapping/depth_fusion.hpp"
+#include "server/mapping/surface_kernel.hpp"
 #include "tests/property/instruction_sets.hpp"
 
 namespace spectra::mapping {
@@ -125,6 +126,42 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
                                              [](std::int16_t distance) { return distance < 0; }));
     EXPECT_EQ(fuse_colours(colours, corner_, *block, near), recoloured) << name;
     EXPECT_TRUE(are_same(*block, *wanted)) << name;
+  }
+}
+
+TEST_P(BlockKernels, EveryInstructionSetSeesTheSameVoxels) {
+  // A wall askew through the block, of which a part was never seen.
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    const auto x = static_cast<float>(i % 8), y = static_cast<float>(i / 8 % 8), z = static_cast<float>(i / 64);
+    const float steps = 8000 * (3.6F - z + 0.3F * x - 0.2F * y);
+    before_->distance[i] = static_cast<std::int16_t>(std::clamp(steps, -kDistanceOne, kDistanceOne));
+    before_->weight[i] = i % 11 == 0 ? 0 : 50;
+  }
+  const KernelCamera camera(camera_, Eigen::Isometry3d::Identity(), kVoxel);
+  std::vector<std::unique_ptr<SeenVoxels>> all;
+  for (const std::int64_t target : fusion::test::instruction_sets()) {
+    const fusion::test::UsingInstructionSet using_it(target);
+    all.push_back(std::make_unique<SeenVoxels>());
+    see_voxels(camera, *before_, corner_, 0.01F, 12287, 0.04F / kDistanceOne, *all.back());
+  }
+  const SeenVoxels& first = *all.front();
+  ASSERT_GT(first.count, 100U);
+  for (const auto& other : all) {
+    ASSERT_EQ(other->count, first.count);
+    for (std::size_t i = 0; i < first.count; ++i) {
+      ASSERT_EQ(other->voxel[i], first.voxel[i]);
+      const auto values = [i](const SeenVoxels& s) {
+        return std::array{s.u[i], s.v[i], s.z_m[i], s.cosine[i], s.per_u[i], s.per_v[i], s.half[i], s.off_m[i]};
+      };
+      ASSERT_EQ(values(*other), values(first)) << i;
+    }
+  }
+  // On the plane: z = 0.95 + 0.01 (3.6 + 0.3 x - 0.2 y) with x, y in voxels from the corner.
+  for (std::size_t i = 0; i < first.count && !GetParam(); ++i) {
+    const float x = (first.u[i] - camera.lens.cx) / camera.lens.fx * first.z_m[i];
+    const float y = (first.v[i] - camera.lens.cy) / camera.lens.fy * first.z_m[i];
+    EXPECT_NEAR(first.z_m[i], corner_[2] + 0.036F + 0.3F * (x - corner_[0]) - 0.2F * (y - corner_[1]), 0.004F);
+    EXPECT_GT(first.cosine[i], 0.9F);
   }
 }
 
