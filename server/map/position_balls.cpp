@@ -248,6 +248,8 @@ void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
       cells_[c].is_crowded = is_crowded(cells_[c]);
     }
   });
+  const Planes planes = find_planes();
+  keep_flat(planes, halvings_);
   SidesRound round{.is_changed = std::vector<std::uint8_t>(points_.size(), 1),
                    .radius = std::vector<float>(points_.size()),
                    .wanted = halvings_};
@@ -259,6 +261,7 @@ void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
         keep_sides_in(cells_[c], around, round);
       }
     });
+    keep_flat(planes, round.wanted);
     bool is_any_changed = false;
     for (Cell& cell : cells_) {
       cell.is_changed = false;
@@ -270,6 +273,46 @@ void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
     }
     halvings_ = round.wanted;
     if (!is_any_changed) break;
+  }
+}
+
+PositionSteps::Planes PositionSteps::find_planes() const {
+  Planes planes;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<float> flat;
+    for (const Cell& cell : cells_) {
+      const float low = coordinates(cell.bounds.min)[axis];
+      if (cell.end - cell.begin > 1 && low == coordinates(cell.bounds.max)[axis]) flat.push_back(low);
+    }
+    std::sort(flat.begin(), flat.end());
+    flat.erase(std::unique(flat.begin(), flat.end()), flat.end());
+    planes[axis].resize(flat.size());
+    if (flat.empty()) continue;
+    for (std::uint32_t p = 0; p < points_.size(); ++p) {
+      const float at = coordinates(points_[p].position)[axis];
+      const auto found = std::lower_bound(flat.begin(), flat.end(), at);
+      if (found == flat.end() || *found != at) continue;
+      planes[axis][static_cast<std::size_t>(found - flat.begin())].push_back(p);
+    }
+  }
+  return planes;
+}
+
+void PositionSteps::keep_flat(const Planes& planes, std::vector<StepHalvings>& halvings) const {
+  const auto step_m = static_cast<double>(largest_step_m_);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const std::vector<std::uint32_t>& plane : planes[axis]) {
+      std::uint8_t finest = 0;
+      for (const std::uint32_t p : plane) finest = std::max(finest, halvings[p][axis]);
+      const double at = double{coordinates(points_[plane.front()].position)[axis]};
+      const auto rounded = [&](int fineness) {
+        const double step = std::ldexp(step_m, -fineness);
+        return std::floor(at / step + 0.5) * step;
+      };
+      std::uint8_t coarsest = finest;
+      while (coarsest > 0 && rounded(coarsest - 1) == rounded(finest)) --coarsest;
+      for (const std::uint32_t p : plane) halvings[p][axis] = std::max(halvings[p][axis], coarsest);
+    }
   }
 }
 

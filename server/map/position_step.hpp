@@ -74,6 +74,11 @@ class PositionSteps {
   void ask_cells(jobs::WorkerPool& pool);
   void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
   void ask_neighbours(jobs::WorkerPool& pool);
+  /// Per axis: the vertices of each exact plane across it that some cell lies in.
+  using Planes = std::array<std::vector<std::vector<std::uint32_t>>, 3>;
+  Planes find_planes() const;
+  /// So that each plane is rounded to one: where a finer step begins, half a step would stand out of it.
+  void keep_flat(const Planes& planes, std::vector<StepHalvings>& halvings) const;
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
   void keep_sides(jobs::WorkerPool& pool);
   void gather_around(const Cell& cell, double reach, Neighbourhood& around, const SidesRound& round);

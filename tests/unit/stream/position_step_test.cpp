@@ -222,6 +222,15 @@ TEST(PositionSteps, KeepEveryPatchOfFlatTerrainWithALabelOnIt) {
   EXPECT_TRUE(form.is_kept()) << described(form);
 }
 
+TEST(PositionSteps, LeaveAnExactWallFlatWhereFinerStepsBegin) {
+  // Off every lattice, along an axis, with something small hanging on it: half a step of the coarser side stood out.
+  Parts scene;
+  scene.grid(90, 60, {0, 0.3701F, 0}, {0.05F, 0, 0}, {0, 0, 0.05F}, [](int, int) { return 0.0; });
+  scene.grid(30, 30, {2, 0.3701F, 1}, {0.002F, 0, 0}, {0, 0.0001F, 0.002F},
+             [](int column, int row) { return 0.0004 * ((column * 7 + row * 3) % 5); });
+  expect_kept(scene.mesh());
+}
+
 TEST(PositionSteps, AreTheSameForATriangleSoup) {
   const mesh::MultispectralMesh terrain = spectra::testing::terrain({.columns = 110, .rows = 110});
   const auto shared = scene_of(spectra::testing::copy_of(terrain)), soup = scene_of(spectra::testing::soup_of(terrain));
