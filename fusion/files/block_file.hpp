@@ -30,6 +30,8 @@ class BlockFile {
 
   /// As it was when the file was opened; unpacked.
   std::uint64_t size_bytes() const { return size_bytes_; }
+  /// What follows the end of gzip data in the file, and is not read.
+  std::uint64_t packed_trailing_bytes() const { return gzip_ ? gzip_->trailing_bytes() : 0; }
   /// Of the next byte that was not consumed.
   std::uint64_t position() const { return buffer_position_ + begin_; }
   std::uint64_t remaining() const { return size_bytes_ > position() ? size_bytes_ - position() : 0; }

@@ -28,6 +28,8 @@ class GzipFile {
   GzipFile& operator=(GzipFile&&) noexcept;
 
   std::uint64_t unpacked_bytes() const { return unpacked_bytes_; }
+  /// Of the file, after the last of its gzip members: padding, or what somebody has appended.
+  std::uint64_t trailing_bytes() const { return trailing_bytes_; }
 
   /// The unpacked bytes from `position` on: how many were read, 0 at the end, -1 when they cannot be read.
   std::ptrdiff_t read(std::uint64_t position, std::span<unsigned char> bytes);
@@ -38,6 +40,7 @@ class GzipFile {
 
   std::unique_ptr<Handle> handle_;
   std::uint64_t unpacked_bytes_ = 0;
+  std::uint64_t trailing_bytes_ = 0;
 };
 
 }  // namespace spectra::files

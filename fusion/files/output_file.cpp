@@ -60,6 +60,23 @@ std::filesystem::path end_of_links(std::filesystem::path path) {
 
 }  // namespace
 
+base::Result<void> OutputFile::check(const std::filesystem::path& path) {
+  const auto refused = [&path](const std::string& why) {
+    return base::Error{base::ErrorCode::FileUnwritable, path.string() + " " + why, path.string()};
+  };
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored))
+    return refused("is a folder: name the file that is to be written into it");
+  const std::filesystem::path folder = end_of_links(std::filesystem::absolute(path)).parent_path();
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    return refused("cannot be created: there is no folder " + folder.string());
+  }
+  if (!std::filesystem::exists(path, ignored) && ::access(folder.c_str(), W_OK) != 0) {
+    return refused("cannot be created: " + std::generic_category().message(errno));
+  }
+  return base::success();
+}
+
 base::Result<OutputFile> OutputFile::create(const std::filesystem::path& path) {
   OutputFile file;
   file.path_ = path;

@@ -16,6 +16,8 @@ namespace spectra::files {
 class OutputFile {
  public:
   static base::Result<OutputFile> create(const std::filesystem::path& path);
+  /// What would surely fail, known before long work; touches nothing.
+  static base::Result<void> check(const std::filesystem::path& path);
   ~OutputFile();  ///< Removes what was written, unless it was committed.
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;

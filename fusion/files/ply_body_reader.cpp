@@ -83,6 +83,7 @@ base::Result<PlyBodyFacts> PlyBodyReader::read() {
         vertices->count - facts_.left_out_vertex_count - facts_.faces.referenced_vertex_count;
   }
   facts_.trailing_byte_count = cursor.trailing_bytes();
+  facts_.packed_trailing_byte_count = file_.packed_trailing_bytes();
   return facts_;
 }
 
@@ -211,8 +212,9 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   // Elsewhere in the scene it is what was measured again and again.
   if (hole->is_far || (!is_used && hole->place == base::Vec3d{}))
     facts_.hole = Hole{hole->place};
-  else if (is_used)
+  else
     facts_.crowded_place = hole->place;
+  facts_.is_crowded_place_used = is_used;
 }
 
 /// Brings the positions to metres, and finds those that are none.

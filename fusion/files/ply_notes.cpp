@@ -86,6 +86,8 @@ class Notes {
     about_faces();
     add("trailing_bytes", facts_.trailing_byte_count,
         counted(facts_.trailing_byte_count, "byte", "bytes") + " after the last element left out");
+    add("trailing_packed_bytes", facts_.packed_trailing_byte_count,
+        counted(facts_.packed_trailing_byte_count, "byte", "bytes") + " after the end of the gzip data left out");
     return std::move(notes_);
   }
 
@@ -109,8 +111,11 @@ class Notes {
     if (facts_.crowded_place) {
       add("crowded_place", 1,
           "many vertices are in exactly one place, " + place_text(*facts_.crowded_place) +
-              ", and faces use them, so that they are kept; where they stand for holes, write nan there or leave them "
-              "out of the faces");
+              (facts_.is_crowded_place_used
+                   ? ", and faces use them, so that they are kept; where they stand for holes, write nan there or "
+                     "leave them out of the faces"
+                   : ", among the others, so that they are kept; where they stand for holes, write nan or 0 0 0 "
+                     "there"));
     }
     add("left_out_faces", facts_.faces.left_out_face_count,
         counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
@@ -349,8 +354,14 @@ class Notes {
     } else if (most(facts.kelvin_like_count)) {
       add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin" + no_data);
     } else if (most(facts.tenth_kelvin_like_count)) {
+      // The same numbers may be either: what they would be tells.
+      const auto from_to = [&facts](double scale, double offset) {
+        const auto celsius = [&](float value) { return short_number(scale * static_cast<double>(value) + offset); };
+        return " (" + celsius(facts.lowest) + " to " + celsius(facts.highest) + " degC): --temperature-scale ";
+      };
       add(kId, facts.finite_count,
-          range + "look like tenths of kelvin: --temperature-scale 0.1 --temperature-offset -273.15" + no_data);
+          range + "look like hundredths of a degree" + from_to(0.01, 0) + "0.01, or like tenths of kelvin" +
+              from_to(0.1, -273.15) + "0.1 --temperature-offset -273.15" + no_data);
     } else if (size_bytes(property.type) == 1) {
       add(kId, facts.finite_count,
           range + "are of type " + std::string(to_string(property.type)) +

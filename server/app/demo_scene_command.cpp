@@ -1,5 +1,6 @@
 #include "fusion/demo/demo_scene.hpp"
 
+#include "fusion/files/output_file.hpp"
 #include "fusion/files/ply_writer.hpp"
 #include "server/app/command_output.hpp"
 #include "server/app/commands.hpp"
@@ -9,6 +10,7 @@
 namespace spectra::app {
 
 int run_demo_scene(const DemoSceneFileOptions& options) {
+  if (const auto is_writable = files::OutputFile::check(options.output); !is_writable) return fail(is_writable.error());
   const Interruption interruption;
   ProgressLine line({{base::kModellingPhase, "modelling the demo scene", 14},
                      {base::kWritingPhase, "writing " + options.output.filename().string(), 1}});

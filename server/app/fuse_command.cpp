@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "fusion/files/output_file.hpp"
 #include "fusion/files/ply_fuse.hpp"
 #include "fusion/registry.hpp"
 #include "server/app/command_output.hpp"
@@ -96,6 +97,7 @@ int run_fuse(const FuseOptions& options) {
   }
   const auto settings = session::settings_from_text(options.settings);
   if (!settings) return fail(settings.error());
+  if (const auto is_writable = files::OutputFile::check(options.output); !is_writable) return fail(is_writable.error());
   const auto facts = fused(options, settings.value(), *format);
   if (!facts) return fail(facts.error());
   print_notes(facts.value().notes);

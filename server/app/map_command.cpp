@@ -113,6 +113,10 @@ int run_map(const MapOptions& options) {
   }
   if (!options.output.empty() && options.output.extension() != ".ply")
     return fail(kWrongUsage, options.output.string() + ": the output must end in .ply");
+  if (!options.output.empty()) {
+    if (const auto is_writable = files::OutputFile::check(options.output); !is_writable)
+      return fail(is_writable.error());
+  }
   std::optional<UnitSender> sender;
   if (!options.to.empty()) {
     auto opened = UnitSender::to(options.to, options.token_file);

@@ -13,6 +13,7 @@ namespace {
 
 files::PlyLayout layout_of(const UnitMesh& mesh) {
   files::PlyLayout layout;
+  layout.comment = "positions in metres";
   layout.vertex_count = mesh.positions.size();
   layout.triangle_count = mesh.triangles.size();
   layout.has_temperature =
@@ -44,8 +45,7 @@ base::Result<void> encode_vertices(const UnitMesh& mesh, double begin_s, files::
 
 base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
                                  const base::Progress& progress) {
-  files::PlyLayout layout = layout_of(mesh);
-  layout.comment = "positions in metres";
+  const files::PlyLayout layout = layout_of(mesh);
   BOOST_OUTCOME_TRY(auto out, files::OutputFile::create(file));
   files::PlyEncoder encoder(layout, [&out](std::span<const std::byte> bytes) { return out.write(bytes); });
   BOOST_OUTCOME_TRYV(encode_vertices(mesh, begin_s, encoder,

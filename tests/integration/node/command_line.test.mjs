@@ -1,7 +1,7 @@
 // The program as a script sees it: exit status 0, 1 for a failed job, 2 for wrong usage, one clear line on standard error.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { closeSync, copyFileSync, existsSync, mkdtempSync, openSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { closeSync, copyFileSync, existsSync, mkdirSync, mkdtempSync, openSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import net from "node:net";
 import { tmpdir } from "node:os";
 import path from "node:path";
@@ -53,7 +53,13 @@ test("a failed job is 1 and names the file", () => {
   fails(1, /cut\.ply.*/, "info", inFolder("cut.ply"));
   writeFileSync(inFolder("huge.ply"), "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n");
   fails(1, /huge\.ply/, "info", inFolder("huge.ply"));
-  fails(1, /nowhere/, "fuse", demo, inFolder("nowhere/out.ply"), "--method", "thermal_only");
+  fails(1, /nowhere.*there is no folder/, "fuse", demo, inFolder("nowhere/out.ply"), "--method", "thermal_only");
+  // Before any work is done: ten million vertices take a minute.
+  const begun = Date.now();
+  fails(1, /is a folder: name the file/, "demo-scene", folder, "--vertices", "10000000");
+  fails(1, /there is no folder/, "demo-scene", inFolder("nowhere/demo.ply"), "--vertices", "10000000");
+  fails(1, /is a folder: name the file/, "map", inFolder("frames"), (mkdirSync(inFolder("folder.ply")), inFolder("folder.ply")));
+  assert.ok(Date.now() - begun < 30_000);
 });
 
 test("what would be lost is not overwritten, and what could not be written is said", () => {

@@ -223,6 +223,21 @@ TEST(FieldKinds, ASpotThatIsMeasuredOftenIsNoHole) {
   }
 }
 
+TEST(FieldKinds, ACrowdedPlaceAmongTheOthersIsKeptAndSaid) {
+  const auto scene_of = [](int count) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 400; ++i)
+      lines.push_back(std::to_string(i % 20 - 10) + ".5 " + std::to_string(i / 20 - 10) + ".5 " +
+                      std::to_string(i % 7 - 3));
+    lines.resize(static_cast<std::size_t>(400 + count), "-1 -1 -1");
+    return loaded(text_file("", lines));
+  };
+  const LoadedScene scene = scene_of(100);
+  EXPECT_EQ(scene.mesh.vertex_count(), 500U);
+  EXPECT_NE(note_text(scene, "crowded_place").find("exactly one place, -1 -1 -1, among the others"), std::string::npos);
+  EXPECT_EQ(note_text(scene_of(5), "crowded_place"), "");
+}
+
 TEST(FieldKinds, ACrowdedPlaceThatFacesUseIsSaid) {
   std::vector<std::string> lines;
   for (int i = 0; i < 400; ++i) lines.push_back(std::to_string(i % 20 - 10) + ' ' + std::to_string(i / 20 - 10) + " 5");
@@ -512,6 +527,9 @@ TEST(FieldKinds, ImplausibleTemperaturesSayWhatMendsThem) {
       {"float temperature_F", 70, 1, "--temperature-unit fahrenheit"},
       {"ushort temperature", 29000, 20, "--temperature-unit centikelvin"},
       {"ushort temperature", 2900, 2, "--temperature-scale 0.1 --temperature-offset -273.15"},
+      {"short temperature", 2000, 32,
+       "hundredths of a degree (20 to 22.88 degC): --temperature-scale 0.01, or like "
+       "tenths of kelvin (-73.15 to -44.35 degC): --temperature-scale 0.1"},
       {"uchar thermal", 20, 20, "--temperature-scale"},
       {"ushort thermal", 7000, 20, "--temperature-scale"}};
   for (const auto& [property, first, step, says] : cases) {
@@ -907,6 +925,15 @@ TEST(FieldKinds, GzipIsUnpackedWithinBounds) {
   ASSERT_GT(plain.size(), BlockFile::kBufferBytes);
   EXPECT_EQ(loaded(packed).mesh.vertex_count(), 50'000U);
   EXPECT_EQ(loaded(gzipped(plain.substr(0, 1000)) + gzipped(plain.substr(1000))).mesh.vertex_count(), 50'000U);
+
+  // What follows the last member is said.
+  EXPECT_EQ(note_count(loaded(packed), "trailing_packed_bytes"), 0U);
+  for (const std::string& behind :
+       {std::string("x"), std::string(200'000, '\0'), std::string("appended by somebody")}) {
+    const LoadedScene scene = loaded(packed + behind);
+    EXPECT_EQ(scene.mesh.vertex_count(), 50'000U);
+    EXPECT_EQ(note_count(scene, "trailing_packed_bytes"), behind.size());
+  }
 
   const auto cut = test::read_bytes(std::string_view(packed).substr(0, packed.size() / 2));
   ASSERT_FALSE(cut);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "box_world.hpp"
+#include "server/mapping/map_ply.hpp"
 #include "server/mapping/mapper.hpp"
 
 namespace spectra::mapping {
@@ -63,6 +64,16 @@ class UnitPublisherTest : public testing::Test {
   std::map<std::string, UnitMesh> told_;
   int looks_ = 0;
 };
+
+TEST(BlockPly, NamesTheUnitOfItsPositions) {
+  UnitMesh mesh;
+  mesh.positions = {{0, 0, 0}};
+  mesh.colours = {{1, 2, 3}};
+  mesh.celsius = {20};
+  mesh.sigma_kelvin = {1};
+  mesh.seen_s = {0};
+  EXPECT_NE(block_ply(mesh, 0).find("comment positions in metres\n"), std::string::npos);
+}
 
 TEST_F(UnitPublisherTest, TellsEverythingOnceAndThenNothing) {
   const BoxWorld world{{wall(20)}};
