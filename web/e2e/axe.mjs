@@ -67,4 +67,44 @@ export function addAxeTests(browser) {
     await assertAccessible(page, 'without a link');
     await page.close();
   });
+
+  test('axe finds nothing in any state of the page: connecting, hidden, tiny, notes, errors, lost graphics, lost link', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url, { width: 1280, height: 720 });
+    await settled(page, 180_000);
+    const store = (change) => page.evaluate((values) => Object.assign(globalThis.spectra.store, values), change);
+    await page.locator('.panel').waitFor();
+    await store({ panelsHidden: true });
+    await page.locator('.panel').waitFor({ state: 'detached' });
+    await assertAccessible(page, 'without controls');
+    await store({ panelsHidden: false });
+    await store({ statuses: ['warning', 'error'].map((level) => ({ id: `test.${level}`, level, message: `A ${level}.` })) });
+    await page.locator('[data-notice]').waitFor();
+    await page.getByRole('button', { name: 'All 2 notes' }).click();
+    await assertAccessible(page, 'all notes');
+    await page.getByRole('button', { name: 'Close the notes' }).click();
+    await store({ failure: 'Something went wrong.', graphicsLostAt: 0, helpOpen: false });
+    await page.getByText('The graphics do not come back').waitFor();
+    await assertAccessible(page, 'lost graphics, and an error');
+    await page.setViewportSize({ width: 200, height: 150 });
+    await page.locator('.panel').waitFor({ state: 'detached' });
+    await assertAccessible(page, 'a tiny window');
+    await page.setViewportSize({ width: 360, height: 740 });
+    await page.locator('.panel').waitFor();
+    await page.evaluate(() => globalThis.spectra.settings.setMethod('intensity_hue'));
+    await settled(page);
+    await server.stop();
+    await page.getByText('Reconnecting').waitFor();
+    await page.evaluate(() => {
+      globalThis.spectra.settings.setMethod('thermal_only');
+      globalThis.spectra.settings.setRange(15, 30, true);
+    });
+    await page.getByText(/^\d changes wait$/).waitFor();
+    await assertAccessible(page, 'on a phone, lost graphics, a lost link, changes that wait, and an error');
+    // As it opens where nothing answers.
+    await store({ scene: undefined, failure: null, graphicsLostAt: null });
+    await page.getByText('Connecting', { exact: true }).waitFor();
+    await assertAccessible(page, 'connecting');
+    await page.close();
+  });
 }

@@ -39,6 +39,16 @@ describe('clearSight', () => {
     eye?.forEach((value, axis) => expect(value).toBeCloseTo([0, 0, 2][axis]!, 9));
   });
 
+  it('stands before a surface that it would see along its edge', () => {
+    // The front of a box, which is closed behind.
+    const scene = [wall, square([0, 0, -0.1], 5, [0, 1])];
+    const preferred: Vec3 = [Math.sqrt(0.99), 0, 0.1];
+    const [, , z] = clearSight(scene, { ...wish, preferred })!;
+    expect(z).toBeGreaterThan(0.7);
+    // Of a sheet that is free on both sides the preferred one is taken, however flat.
+    expect(clearSight([wall], { ...wish, preferred: [0.8, 0, -0.6] })![2]).toBeLessThan(-0.5);
+  });
+
   it('looks past a board that stands close before the target', () => {
     const scene = [wall, square([0, 0, 0.026], 0.3, [0, 1])];
     const eye = clearSight(scene, wish)!;
