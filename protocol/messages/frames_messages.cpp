@@ -10,6 +10,7 @@ template <>
 std::span<const EnumWord<FramesKind>> words_of() {
   static constexpr EnumWord<FramesKind> kWords[] = {{FramesKind::Calibration, "calibration"},
                                                     {FramesKind::Poses, "poses"},
+                                                    {FramesKind::CorrectedPoses, "corrected_poses"},
                                                     {FramesKind::Picture, "picture"},
                                                     {FramesKind::End, "end"}};
   return kWords;

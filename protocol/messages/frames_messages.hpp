@@ -13,7 +13,7 @@
 namespace spectra::protocol {
 
 /// what a message of /frames speaks of
-enum class FramesKind { Calibration, Poses, Picture, End };
+enum class FramesKind { Calibration, Poses, CorrectedPoses, Picture, End };
 
 enum class FrameSensor { Depth, Color, Thermal };
 

@@ -25,11 +25,13 @@ inline constexpr int kWrongUsage = 2;
 struct ServeOptions {
   std::optional<std::filesystem::path> scene;  ///< Absent: the demo scene.
   std::optional<std::filesystem::path> thermal;
-  std::optional<std::filesystem::path> frames;                        ///< Mapped into a live map.
-  bool is_demo_drive = false;                                         ///< A simulated robot maps into a live map.
-  std::optional<double> voxel_m;                                      ///< Of what is mapped.
-  bool is_live = false;                                               ///< Begins with an empty map.
-  std::optional<std::filesystem::path> store;                         ///< Keeps the blocks of a live map.
+  std::optional<std::filesystem::path> frames;  ///< Mapped into a live map.
+  bool is_demo_drive = false;                   ///< A simulated robot maps into a live map.
+  std::optional<double> voxel_m;                ///< Of what is mapped.
+  bool is_tracking = false;                     ///< Its poses are found from what is seen.
+  bool has_submaps = false;                     ///< It is made in parts, which corrected poses move.
+  bool is_live = false;                         ///< Begins with an empty map.
+  std::optional<std::filesystem::path> store;   ///< Keeps the blocks of a live map.
   std::uint64_t history_bytes = store::StoreOptions{}.history_bytes;  ///< Of the store.
   std::optional<store::StoreTime> at;  ///< The map of the store is shown as it was then, and takes no blocks.
   std::string listen = "127.0.0.1:8080";
@@ -115,7 +117,9 @@ struct MapOptions {
   std::string to;                ///< A server to send it to while it grows; empty: none.
   std::optional<std::filesystem::path> token_file;
   std::optional<std::filesystem::path> poses;  ///< Absent: the folder's.
-  bool is_tracking = false;                    ///< Poses are found from the frames; only the first is taken as given.
+  std::optional<std::filesystem::path>
+      corrected_poses;       ///< Of the same drive, known later: submaps move to them in the end.
+  bool is_tracking = false;  ///< Poses are found from the frames; only the first is taken as given.
   std::optional<std::filesystem::path> found_poses;  ///< Where to write the poses that were found.
   std::optional<std::filesystem::path> vignetting;
   double voxel_m = 0.01;

@@ -84,8 +84,8 @@ void print_figures(const mapping::Mapper& mapper, const mapping::UnitMesh& mesh,
                1000 * figures.tracking_residual_m, figures.lost_frames);
   }
   fmt::print("\nmap          {} blocks of 8 x 8 x 8 voxels, {:.1f} MB, {:.1f} bytes a voxel\n",
-             mapper.map().block_count(), static_cast<double>(mapper.map().size_bytes()) / 1e6,
-             static_cast<double>(mapper.map().size_bytes()) /
+             mapper.map().block_count(), static_cast<double>(mapper.size_bytes()) / 1e6,
+             static_cast<double>(mapper.size_bytes()) /
                  static_cast<double>(std::max<std::size_t>(1, mapper.map().block_count() * mapping::kBlockVoxels)));
   fmt::print("mesh         {} vertices, {} triangles\n", mesh.positions.size(), mesh.triangles.size());
   std::vector<double> sigmas;
@@ -131,6 +131,14 @@ int run_map(const MapOptions& options) {
   mapping::MapperSettings settings;
   settings.voxel_m = options.voxel_m;
   settings.is_tracking = options.is_tracking;
+  mapping::FaultLog faults = folder.value().faults();
+  mapping::StampedPoses corrected;
+  if (options.corrected_poses) {
+    auto poses = folder.value().read_poses(*options.corrected_poses, faults);
+    if (!poses) return fail(poses.error());
+    corrected = poses.value().stamped();
+    settings.submaps.emplace();
+  }
   mapping::Mapper mapper(folder.value().calibration(), settings, pool);
   if (options.vignetting) {
     auto picture = mapping::read_pfm(*options.vignetting);
@@ -143,8 +151,8 @@ int run_map(const MapOptions& options) {
                      {mapping::Mapper::kMeshingPhase, "meshing", 10},
                      {base::kWritingPhase, "writing " + options.output.filename().string(), 5}});
   const base::Progress progress = line.sink();
-  mapping::FaultLog faults = folder.value().faults();
   std::vector<double> frame_ms;
+  std::size_t moved_count = 0;
   FrameReader reader(folder.value());
   for (std::size_t row = 0; row < count; ++row) {
     const LoadedFrame loaded = reader.take(row);
@@ -152,12 +160,21 @@ int run_map(const MapOptions& options) {
     const auto before = Clock::now();
     mapper.fuse(loaded.frame, folder.value().trajectory(), faults);
     frame_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - before).count());
+    const bool is_last = row + 1 == count;
+    if (is_last && options.corrected_poses) moved_count = mapper.correct(corrected).moved;
     if (sender) {
       const mapping::Trajectory& poses = options.is_tracking ? mapper.tracked() : folder.value().trajectory();
-      const auto problem = sender->send_changes(mapper, poses.at(loaded.frame.time_s), row + 1 == count, pool);
+      const auto problem = sender->send_changes(mapper, poses.at(loaded.frame.time_s), is_last, pool);
       if (problem) return fail(kJobFailed, *problem);
     }
     base::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
+  }
+  if (options.corrected_poses && moved_count == 0) {
+    line.end();
+    print_faults(faults);
+    return fail(kJobFailed, options.corrected_poses->string() +
+                                ": none of its poses differs from what the map was made with, at a time when there "
+                                "were frames; nothing was written");
   }
   const mapping::UnitMesh mesh = mapper.whole_mesh(progress);
   if (mesh.triangles.empty()) {
@@ -179,6 +196,7 @@ int run_map(const MapOptions& options) {
     fmt::print("sent         {} units, {} of them again, {} refused\n", sender->sent_count(), sender->again_count(),
                sender->refused_count());
   }
+  if (options.corrected_poses) fmt::print("submaps      {}, {} of them moved\n", mapper.submap_count(), moved_count);
   print_figures(mapper, mesh, frame_ms, std::chrono::duration<double>(Clock::now() - begin).count());
   return kDone;
 }

@@ -74,12 +74,14 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--listen", options.listen, "Where to listen, ADDRESS:PORT; port 0 picks a free one")
       ->capture_default_str();
   command->add_flag("--demo", is_demo, "Serve the demo scene")->excludes(scene);
-  command
-      ->add_option("--map", options.frames,
-                   "Begin with an empty map and fill it with what is made of a folder of frames, or of those that a "
-                   "robot sends (live)")
-      ->excludes(scene)
-      ->excludes("--demo");
+  auto* frames =
+      command
+          ->add_option(
+              "--map", options.frames,
+              "Begin with an empty map and fill it with what is made of a folder of frames, or of those that a "
+              "robot sends (live)")
+          ->excludes(scene)
+          ->excludes("--demo");
   command->add_flag("--demo-drive", options.is_demo_drive, "Begin with an empty map that a simulated robot fills")
       ->excludes(scene)
       ->excludes("--demo")
@@ -87,6 +89,16 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command
       ->add_option("--voxel", options.voxel_m, "The size of a voxel in metres, of --map (0.01) and --demo-drive (0.02)")
       ->check(CLI::Range(0.001, 1.0));
+  auto* track =
+      command
+          ->add_flag("--track", options.is_tracking,
+                     "With --map: find the poses from the frames; of those that are given only the first counts")
+          ->needs(frames);
+  command
+      ->add_flag("--submaps", options.has_submaps,
+                 "With --map live: make the map in parts, which move when the robot sends corrected poses")
+      ->needs(frames)
+      ->excludes(track);
   command->add_flag("--live", options.is_live, "Begin with an empty map, made of the blocks that are put into it")
       ->excludes(scene)
       ->excludes("--demo");
@@ -283,8 +295,12 @@ void add_map(CLI::App& app, MapOptions& options, Run& run) {
       ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str();
   command->add_option("--poses", options.poses, "A file of poses in place of the folder's (TUM)");
+  auto* corrected = command->add_option(
+      "--corrected-poses", options.corrected_poses,
+      "Poses of the same drive as they are known now (TUM): the map is made with the others, in submaps, which move");
   auto* track = command->add_flag("--track", options.is_tracking,
                                   "Find the poses from the frames; of those that are given only the first counts");
+  track->excludes(corrected);
   command
       ->add_option("--save-poses", options.found_poses, "With --track: a file for the poses of the depth camera (TUM)")
       ->needs(track);

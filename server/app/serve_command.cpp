@@ -165,7 +165,9 @@ int run_serve(const ServeOptions& options) {
   std::optional<sources::FrameStream> frames;
   const bool takes_frames = options.frames == kLiveFrames;
   if (options.frames && !takes_frames) {
-    auto folder = mapping::FrameFolder::open(*options.frames);
+    if (options.has_submaps)
+      return fail(kWrongUsage, "--submaps goes with --map live; of a folder, see spectra map --corrected-poses");
+    auto folder = mapping::FrameFolder::open(*options.frames, std::nullopt, !options.is_tracking);
     if (!folder) return fail(folder.error());
     frames = sources::stream_of(std::move(folder).value());
   } else if (options.is_demo_drive) {
@@ -229,17 +231,20 @@ int run_serve(const ServeOptions& options) {
   std::fflush(stdout);
 
   SceneLoader loader(options, *served, map, *server);
+  mapping::MapperSettings mapping;
+  mapping.voxel_m = options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01);
+  mapping.is_tracking = options.is_tracking;
+  if (options.has_submaps) mapping.submaps.emplace();
   if (frames) {
-    feed = std::make_unique<sources::MapFeed>(std::move(*frames),
-                                              options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01), map,
-                                              served->robot, [&loader] { return loader.is_done(); });
+    feed = std::make_unique<sources::MapFeed>(std::move(*frames), mapping, map, served->robot,
+                                              [&loader] { return loader.is_done(); });
   }
   std::optional<sources::UnitHandOver> hand_over;
   std::unique_ptr<sources::LiveFeed> live;
   if (takes_frames) {
     hand_over.emplace(map, "");
     live = std::make_unique<sources::LiveFeed>(
-        options.voxel_m.value_or(0.01),
+        mapping,
         sources::LiveFeed::Sinks{
             [&hand_over](auto units, const auto& moment) { return (*hand_over)(std::move(units), moment); },
             [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); }},

@@ -36,6 +36,28 @@ void FaultLog::add(const FaultLog& other) {
   }
 }
 
+namespace {
+
+void note_faults(const TrajectoryNotes& notes, const fs::path& file, FaultLog& faults) {
+  if (notes.unreadable > 0) {
+    faults.add(FaultKind::UnreadablePose, file.string() + ": lines without a time, a place and a rotation",
+               notes.unreadable);
+  }
+  if (notes.backwards > 0) {
+    faults.add(FaultKind::BackwardPose, file.string() + ": poses that are not later than the one before",
+               notes.backwards);
+  }
+}
+
+}  // namespace
+
+Result<Trajectory> FrameFolder::read_poses(const fs::path& file, FaultLog& faults) const {
+  BOOST_OUTCOME_TRY(auto poses, Trajectory::read(file));
+  poses.change_to(calibration_.is_world_to_camera, calibration_.depth_from_pose);
+  note_faults(poses.notes(), file, faults);
+  return poses;
+}
+
 Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optional<fs::path>& poses, bool needs_poses) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
@@ -54,15 +76,7 @@ Result<FrameFolder> FrameFolder::open(const fs::path& folder, const std::optiona
   const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
   trajectory.change_to(calibration.is_world_to_camera, calibration.depth_from_pose);
   FrameFolder frames(folder, std::move(calibration), std::move(trajectory));
-  const TrajectoryNotes& notes = frames.trajectory_.notes();
-  if (notes.unreadable > 0) {
-    frames.faults_.add(FaultKind::UnreadablePose, pose_file.string() + ": lines without a time, a place and a rotation",
-                       notes.unreadable);
-  }
-  if (notes.backwards > 0) {
-    frames.faults_.add(FaultKind::BackwardPose, pose_file.string() + ": poses that are not later than the one before",
-                       notes.backwards);
-  }
+  note_faults(frames.trajectory_.notes(), pose_file, frames.faults_);
   frames.read_rows(text);
   if (frames.rows_.empty()) {
     return base::failure(

@@ -79,6 +79,9 @@ class FrameFolder {
                                         const std::optional<std::filesystem::path>& poses = std::nullopt,
                                         bool needs_poses = true);
 
+  /// Other poses of the same drive, in the sense and of the camera that the calibration says; lines that are none are left out and stand in `faults`.
+  base::Result<Trajectory> read_poses(const std::filesystem::path& file, FaultLog& faults) const;
+
   const Calibration& calibration() const { return calibration_; }
   /// Of the depth camera, whatever camera the poses were given for.
   const Trajectory& trajectory() const { return trajectory_; }

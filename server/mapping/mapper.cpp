@@ -39,6 +39,7 @@ Mapper::Mapper(const Calibration& calibration, const MapperSettings& settings, j
       rays_(calibration.depth.camera),
       map_(settings.voxel_m) {
   if (settings.is_tracking) tracker_.emplace(calibration_, rays_, settings.tracker);
+  if (settings.submaps && !settings.is_tracking) submaps_.emplace(settings.voxel_m, *settings.submaps);
   if (!calibration.thermal || !settings.use_thermal) return;
   heat_.emplace(*calibration.thermal, settings.heat);
   heat_->set_vignetting(calibration.thermal->vignetting);
@@ -88,8 +89,10 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
   const DepthFrame depth =
       prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
   const DepthLook look{depth, calibration_.depth.camera, rays_, calibration_.depth.noise, pose.pose};
-  if (is_doubtful_ && map_.block_count() > 0) {
-    const FitOfDepth fit = fit_of(map_, look, pool_);
+  // Poses after a correction are of another world than those before.
+  if (submaps_ && !submaps_->is_open()) is_doubtful_ = false;
+  if (is_doubtful_ && fused().block_count() > 0) {
+    const FitOfDepth fit = fit_of(fused(), look, pool_);
     const auto both = static_cast<double>(fit.matching + fit.other);
     if (fit.matching < kLeastEvidence || static_cast<double>(fit.matching) < kLeastFit * both) {
       faults.add(FaultKind::UnfittingPose,
@@ -99,6 +102,7 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
     }
     is_doubtful_ = false;
   }
+  if (submaps_) submaps_->step(frame.time_s + calibration_.depth.delay_s, pose.pose);
   fuse_prepared(frame, look, trajectory);
   return true;
 }
@@ -113,7 +117,7 @@ void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Traj
       ++figures_.colour_frames;
     }
   }
-  fuse_depth(map_, look, colour ? &*colour : nullptr, pool_);
+  fuse_depth(fused(), look, colour ? &*colour : nullptr, pool_);
   ++figures_.depth_frames;
 }
 
@@ -184,9 +188,9 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
 void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   PoseAnswer pose;
   const double moment = frame.time_s + calibration_.thermal->delay_s;
-  if (!find_pose(trajectory, moment, pose, faults) || is_doubtful_) return;
+  if (!find_pose(trajectory, moment, pose, faults) || is_doubtful_ || (submaps_ && !submaps_->is_open())) return;
   const HeatReport report =
-      heat_->fuse(map_, frame.thermal, beside(pose, calibration_.thermal->from_depth), moment - *begin_s_, pool_);
+      heat_->fuse(fused(), frame.thermal, beside(pose, calibration_.thermal->from_depth), moment - *begin_s_, pool_);
   ++(report.is_frozen ? figures_.frozen_frames : figures_.thermal_frames);
   if (report.spread_kelvin > 0 && spreads_kelvin_.size() < kEnoughSpreads) {
     const auto at = std::upper_bound(spreads_kelvin_.begin(), spreads_kelvin_.end(), report.spread_kelvin);
@@ -194,6 +198,18 @@ void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLo
     figures_.spread_kelvin = spreads_kelvin_[spreads_kelvin_.size() / 2];
   }
   figures_.largest_offset_kelvin = std::max(figures_.largest_offset_kelvin, std::abs(report.offset_kelvin));
+}
+
+PoseAnswer Mapper::found_pose() const {
+  PoseAnswer answer;
+  if (tracked_.size() == 0) return answer;
+  answer = tracked_.at(tracked_.end_s());
+  answer.state = tracker_ && !tracker_->is_lost() ? PoseState::Known : PoseState::Unknown;
+  return answer;
+}
+
+CorrectionReport Mapper::correct(const StampedPoses& poses) {
+  return submaps_ ? submaps_->correct(poses) : CorrectionReport{};
 }
 
 MeshRules Mapper::mesh_rules() const {
@@ -205,10 +221,12 @@ MeshRules Mapper::mesh_rules() const {
 
 std::vector<PublishedUnit> Mapper::changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye,
                                                  jobs::WorkerPool& pool, std::size_t most) {
+  if (submaps_) submaps_->bake(map_, false, pool);
   return publisher.take(map_, mesh_rules(), eye, pool, most);
 }
 
-UnitMesh Mapper::whole_mesh(const base::Progress& progress) const {
+UnitMesh Mapper::whole_mesh(const base::Progress& progress) {
+  if (submaps_) submaps_->bake(map_, true, pool_);
   std::vector<UnitMesh> units(map_.units().size());
   const MeshRules rules = mesh_rules();
   std::size_t done = 0;

@@ -11,6 +11,7 @@
 #include "server/mapping/depth_fusion.hpp"
 #include "server/mapping/frame_folder.hpp"
 #include "server/mapping/heat_fusion.hpp"
+#include "server/mapping/submaps.hpp"
 #include "server/mapping/surface_mesh.hpp"
 #include "server/mapping/tracker.hpp"
 #include "server/mapping/unit_publisher.hpp"
@@ -23,6 +24,7 @@ struct MapperSettings {
   bool use_colour = true;
   bool use_thermal = true;
   bool is_tracking = false;  ///< Poses are found from what is seen; of those that are given only the first counts.
+  std::optional<SubmapRules> submaps;  ///< Of given poses: the map is made in parts, which correct() moves.
   HeatRules heat;
   MeshRules mesh;
   TrackerRules tracker;
@@ -52,9 +54,13 @@ class Mapper {
   /// depth picture after them); frames in order of their time. What cannot be fused is left out and stands in `faults`.
   void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
 
+  /// Poses of the depth camera turn out to be others: submaps move, and what is fused from now on has poses of the corrected world. Of a mapper with
+  /// submaps.
+  CorrectionReport correct(const StampedPoses& poses);
+
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
   /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
-  UnitMesh whole_mesh(const base::Progress& progress = {}) const;
+  UnitMesh whole_mesh(const base::Progress& progress = {});
   static constexpr double kSystematic = 0.5;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
@@ -62,9 +68,18 @@ class Mapper {
   std::vector<PublishedUnit> changed_units(UnitPublisher& publisher, const Eigen::Vector3d& eye, jobs::WorkerPool& pool,
                                            std::size_t most = UnitPublisher::kAll);
 
+  /// Of submaps: what was made of them last, by the two above.
   const VoxelMap& map() const { return map_; }
+  /// All that voxels take.
+  std::size_t size_bytes() const { return map_.size_bytes() + (submaps_ ? submaps_->size_bytes() : 0); }
+  std::size_t submap_count() const { return submaps_ ? submaps_->size() : 0; }
   /// Poses of the depth camera that were found by tracking.
   const Trajectory& tracked() const { return tracked_; }
+  bool is_tracking() const { return tracker_.has_value(); }
+  /// Of tracking: where the depth camera was last, Known while it is not lost.
+  PoseAnswer found_pose() const;
+  /// Poses that were found earlier are wanted no more.
+  void forget_tracked_before(double time_s) { tracked_.forget_before(time_s); }
   /// How the last picture that was tracked fitted; all 0 without tracking.
   Alignment last_alignment() const { return tracker_ ? tracker_->last() : Alignment{}; }
   const MapperFigures& figures() const { return figures_; }
@@ -75,6 +90,7 @@ class Mapper {
 
  private:
   MeshRules mesh_rules() const;
+  VoxelMap& fused() { return submaps_ ? submaps_->newest() : map_; }
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
@@ -90,6 +106,7 @@ class Mapper {
   jobs::WorkerPool& pool_;
   const RayTable rays_;
   VoxelMap map_;
+  std::optional<Submaps> submaps_;
   std::optional<HeatFusion> heat_;
   std::optional<double> begin_s_;
   double newest_s_ = 0;

@@ -80,6 +80,16 @@ void Trajectory::change_to(bool is_world_to_camera, const Eigen::Isometry3d& cam
   for (Eigen::Isometry3d& pose : poses_) pose = (is_world_to_camera ? pose.inverse() : pose) * own_from_camera;
 }
 
+void Trajectory::move(const Eigen::Isometry3d& by) {
+  for (Eigen::Isometry3d& pose : poses_) pose = by * pose;
+}
+
+StampedPoses Trajectory::stamped() const {
+  StampedPoses all;
+  for (std::size_t i = 0; i < times_.size(); ++i) all.emplace_back(times_[i], poses_[i]);
+  return all;
+}
+
 void Trajectory::forget_before(double time_s) {
   const auto first = std::lower_bound(times_.begin(), times_.end(), time_s) - times_.begin();
   // All but the two before.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fusion/base/error.hpp"
@@ -27,6 +28,9 @@ struct PoseAnswer {
       Eigen::Vector3d::Zero();  ///< In the world; both 0 where neighbours are too far away in time.
 };
 
+/// Poses by their time.
+using StampedPoses = std::vector<std::pair<double, Eigen::Isometry3d>>;
+
 /// Lines that were left out of a trajectory, by reason.
 struct TrajectoryNotes {
   std::size_t unreadable = 0;  ///< Not eight finite numbers, or no rotation.
@@ -49,6 +53,9 @@ class Trajectory {
   /// Poses of another camera, or from the world to it, become those of the camera that `camera_from_own` leads to.
   void change_to(bool is_world_to_camera, const Eigen::Isometry3d& camera_from_own);
 
+  /// All of them are somewhere else in the world.
+  void move(const Eigen::Isometry3d& by);
+
   /// The pose at a moment: the rotation by slerp, the translation linearly, between neighbours at most 100 ms apart; or that of a
   /// pose of exactly this moment, within a microsecond.
   PoseAnswer at(double time_s) const;
@@ -59,6 +66,7 @@ class Trajectory {
   /// The lines that read() reads, after a line that says what they are.
   std::string to_text() const;
 
+  StampedPoses stamped() const;
   std::size_t size() const { return times_.size(); }
   double begin_s() const { return times_.front(); }
   double end_s() const { return times_.back(); }

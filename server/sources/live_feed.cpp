@@ -49,6 +49,8 @@ std::string code_of(FaultKind kind) {
       return "jumping_pose";
     case FaultKind::UnfittingPose:
       return "unfitting_pose";
+    case FaultKind::LostTrack:
+      return "lost_track";
     case FaultKind::WrongSize:
       return "wrong_size";
     case FaultKind::DamagedFile:
@@ -67,6 +69,10 @@ std::optional<Eigen::Isometry3d> pose_of(const std::vector<double>& v) {
   pose.linear() = rotation.normalized().toRotationMatrix();
   pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
   return pose;
+}
+
+Eigen::Isometry3d depth_pose(const mapping::Calibration& calibration, const Eigen::Isometry3d& pose) {
+  return (calibration.is_world_to_camera ? pose.inverse() : pose) * calibration.depth_from_pose.inverse();
 }
 
 std::span<const unsigned char> body_of(const net::IncomingFrame& frame) {
@@ -102,8 +108,8 @@ base::Result<mapping::PictureRgb> colour_picture_of(const net::IncomingFrame& fr
 
 }  // namespace
 
-LiveFeed::LiveFeed(double voxel_m, Sinks sinks, std::function<bool()> may_begin)
-    : voxel_m_(voxel_m), sinks_(std::move(sinks)), may_begin_(std::move(may_begin)), thread_([this] {
+LiveFeed::LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin)
+    : settings_(settings), sinks_(std::move(sinks)), may_begin_(std::move(may_begin)), thread_([this] {
         try {
           work();
         } catch (const std::exception& error) {
@@ -189,6 +195,7 @@ net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
     return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
   }
   std::optional<net::BlockRefusal> refusal;
+  PoseNews news;
   for (const auto& values : frame.head.poses) {
     const auto pose = pose_of(values);
     if (!pose) {
@@ -203,10 +210,33 @@ net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
     }
     pose_end_s_ = time_s;
     newest_s_ = std::max(newest_s_.value_or(time_s), time_s);
-    const Eigen::Isometry3d own = calibration_->is_world_to_camera ? pose->inverse() : *pose;
-    new_poses_.emplace_back(time_s, own * calibration_->depth_from_pose.inverse());
+    news.poses.emplace_back(time_s, depth_pose(*calibration_, *pose));
   }
+  new_poses_.push_back(std::move(news));
   if (refusal) return *refusal;
+  return net::FrameTaken{};
+}
+
+net::FrameOutcome LiveFeed::take_corrections(const net::IncomingFrame& frame) {
+  if (!settings_.submaps) {
+    return refused(FaultKind::UnreadablePose, "no_submaps", "kind",
+                   "this map is made in one piece, which does not move; start the server with --submaps");
+  }
+  if (!calibration_) {
+    return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
+  }
+  PoseNews news;
+  news.is_correction = true;
+  for (const auto& values : frame.head.poses) {
+    const auto pose = pose_of(values);
+    // Half a correction would tear the map.
+    if (!pose) {
+      return refused(FaultKind::UnreadablePose, "bad_pose", "poses",
+                     "a corrected pose is not eight finite numbers with a rotation in the last four; none was taken");
+    }
+    news.poses.emplace_back(on_own_clock(values[0]), depth_pose(*calibration_, *pose));
+  }
+  new_poses_.push_back(std::move(news));
   return net::FrameTaken{};
 }
 
@@ -277,6 +307,9 @@ void LiveFeed::take(net::IncomingFrame frame, Done done) {
       case FramesKind::Poses:
         outcome = take_poses(frame);
         break;
+      case FramesKind::CorrectedPoses:
+        outcome = take_corrections(frame);
+        break;
       case FramesKind::Picture:
         outcome = take_picture(frame, done, answers);
         break;
@@ -300,7 +333,30 @@ bool LiveFeed::is_ready() const {
                          : rank == Rank::Colour && calibration_->colour   ? calibration_->colour->delay_s
                          : rank == Rank::Thermal && calibration_->thermal ? calibration_->thermal->delay_s
                                                                           : 0;
-  return (pose_end_s_ && *pose_end_s_ >= time_s + delay_s) || (newest_s_ && *newest_s_ - time_s > kPatienceS);
+  return (!settings_.is_tracking && pose_end_s_ && *pose_end_s_ >= time_s + delay_s) ||
+         (newest_s_ && *newest_s_ - time_s > kPatienceS);
+}
+
+void LiveFeed::correct(const mapping::StampedPoses& poses) {
+  const mapping::CorrectionReport report = mapper_->correct(poses);
+  if (report.moved == 0) return;
+  spdlog::info("corrected poses have moved {} of {} submaps", report.moved, mapper_->submap_count());
+  // What comes is of the corrected world; what is there is brought along, so that nothing jumps between.
+  trajectory_.move(report.newest);
+  has_changed_ = true;
+}
+
+void LiveFeed::tell_found_pose() {
+  teller_.tell(*mapper_);
+  if (mapper_->tracked().size() == 0) return;
+  const mapping::PoseAnswer found = mapper_->found_pose();
+  const double at_s = mapper_->tracked().end_s();
+  if (mapper_->tracked().size() > kManyPoses) mapper_->forget_tracked_before(at_s - 2 * kFarthestStampS);
+  moment_.eye = found.pose.translation();
+  moment_.begin_unix_s = mapping::unix_begin_s(mapper_->begin_s(), mapper_->newest_s(), unix_now_s());
+  RobotPose robot = robot_pose(found.pose, moment_.begin_unix_s + at_s - mapper_->begin_s());
+  robot.is_lost = found.state != mapping::PoseState::Known;
+  sinks_.moved(robot, false);
 }
 
 void LiveFeed::work() {
@@ -308,19 +364,15 @@ void LiveFeed::work() {
   for (;;) {
     std::optional<std::pair<Key, Waiting>> next;
     std::optional<double> pose_end_s, newest_s;
+    std::vector<PoseNews> news;
     {
       std::unique_lock lock(mutex_);
       has_work_.wait_for(lock, kLookEvery, [&] { return is_over_ || is_ready(); });
       if (is_over_) return;
       if (!mapper_ && calibration_) {
-        mapping::MapperSettings settings;
-        settings.voxel_m = voxel_m_;
-        mapper_.emplace(*calibration_, settings, pool_);
+        mapper_.emplace(*calibration_, settings_, pool_);
       }
-      for (const auto& [time_s, pose] : new_poses_) trajectory_.add(time_s, pose);
-      new_poses_.clear();
-      // Of pictures that wait the oldest may be as far from the newest pose as one may come, and wait as long.
-      if (pose_end_s_ && trajectory_.size() > kManyPoses) trajectory_.forget_before(*pose_end_s_ - 2 * kFarthestStampS);
+      news.swap(new_poses_);
       pose_end_s = pose_end_s_;
       newest_s = newest_s_;
       if (is_ready()) {
@@ -330,7 +382,17 @@ void LiveFeed::work() {
         is_flushing_ = false;
       }
     }
-    if (mapper_ && pose_end_s) {
+    for (const PoseNews& some : news) {
+      if (some.is_correction) {
+        correct(some.poses);
+      } else {
+        for (const auto& [time_s, pose] : some.poses) trajectory_.add(time_s, pose);
+      }
+    }
+    // Of pictures that wait the oldest may be as far from the newest pose as one may come, and wait as long.
+    if (pose_end_s && trajectory_.size() > kManyPoses) trajectory_.forget_before(*pose_end_s - 2 * kFarthestStampS);
+    if (mapper_ && settings_.is_tracking) tell_found_pose();
+    if (mapper_ && pose_end_s && !settings_.is_tracking) {
       const mapping::PoseAnswer latest = trajectory_.at(*pose_end_s);
       moment_.eye = latest.pose.translation();
       moment_.begin_unix_s = mapping::unix_begin_s(mapper_->begin_s(), newest_s.value_or(0), unix_now_s());

@@ -16,6 +16,7 @@
 #include "server/mapping/mapper.hpp"
 #include "server/mapping/unit_publisher.hpp"
 #include "server/net/frame_receiver.hpp"
+#include "server/sources/map_feed.hpp"
 #include "server/sources/robot_track.hpp"
 #include "server/sources/unit_hand_over.hpp"
 
@@ -40,7 +41,7 @@ class LiveFeed final : public net::FrameReceiver {
   };
 
   /// Takes nobody's frames before `may_begin`.
-  LiveFeed(double voxel_m, Sinks sinks, std::function<bool()> may_begin);
+  LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin);
   ~LiveFeed() override;  ///< Ends it after the picture that is being fused; what waits is answered by nobody.
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
@@ -66,6 +67,7 @@ class LiveFeed final : public net::FrameReceiver {
 
   // Under the lock.
   net::FrameOutcome take_calibration(const net::IncomingFrame& frame);
+  net::FrameOutcome take_corrections(const net::IncomingFrame& frame);
   net::FrameOutcome take_poses(const net::IncomingFrame& frame);
   /// Nothing: it waits.
   std::optional<net::FrameOutcome> take_picture(net::IncomingFrame& frame, Done& done, Answers& answers);
@@ -77,10 +79,12 @@ class LiveFeed final : public net::FrameReceiver {
   std::optional<double> wanted_rate() const;
 
   void work();
+  void tell_found_pose();
+  void correct(const mapping::StampedPoses& poses);
   net::FrameOutcome map_picture(const Key& key, const net::IncomingFrame& frame);
   mapping::Frame decoded(const Key& key, const net::IncomingFrame& frame, mapping::FaultLog& faults);
 
-  const double voxel_m_;
+  const mapping::MapperSettings settings_;
   const Sinks sinks_;
   const std::function<bool()> may_begin_;
 
@@ -92,7 +96,12 @@ class LiveFeed final : public net::FrameReceiver {
   std::string calibration_text_;
   std::optional<mapping::Calibration> calibration_;
   std::multimap<Key, Waiting> waiting_;
-  std::vector<std::pair<double, Eigen::Isometry3d>> new_poses_;
+  /// Poses, or what corrects those before.
+  struct PoseNews {
+    mapping::StampedPoses poses;
+    bool is_correction = false;
+  };
+  std::vector<PoseNews> new_poses_;
   std::optional<double> shift_s_;                ///< Added to the stamps of this sender, once it has said one.
   std::optional<double> newest_s_;               ///< Of all stamps.
   std::optional<double> pose_end_s_;             ///< Of this sender.
@@ -112,6 +121,7 @@ class LiveFeed final : public net::FrameReceiver {
   double colour_s_ = 0;
   FeedMoment moment_;
   bool has_changed_ = false;
+  TrackTeller teller_;
   std::thread thread_;
 };
 

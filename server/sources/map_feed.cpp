@@ -56,6 +56,18 @@ RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_
           vector(-world_from_camera.linear().col(1)), false};
 }
 
+void TrackTeller::tell(const mapping::Mapper& mapper) {
+  if (!mapper.is_tracking() || mapper.tracked().size() == 0) return;
+  const bool is_lost = mapper.found_pose().state != mapping::PoseState::Known;
+  if (is_lost == is_lost_) return;
+  is_lost_ = is_lost;
+  if (is_lost) {
+    spdlog::warn("tracking has lost its place: nothing is fused until what is seen fits the map again");
+  } else {
+    spdlog::info("tracking has found its place again");
+  }
+}
+
 void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& mapper, jobs::WorkerPool& pool,
               mapping::FaultLog& faults) {
   mapping::UnitPublisher publisher;
@@ -63,6 +75,7 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
   auto last = begin;
   FeedMoment moment;
   RobotPose robot;
+  TrackTeller teller;
   bool is_robot_known = false;
   for (std::size_t i = 0; i < frames.frame_count; ++i) {
     const auto due = begin + std::chrono::duration<double>(frames.stamp_s(i) - frames.stamp_s(0));
@@ -71,7 +84,9 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
       if (frames.is_paced && Clock::now() < due) std::this_thread::sleep_for(kWait);
     } while (frames.is_paced && Clock::now() < due);
     mapper.fuse(frames.load(i, faults), *frames.trajectory, faults);
-    const mapping::PoseAnswer pose = frames.trajectory->at(frames.stamp_s(i));
+    teller.tell(mapper);
+    const mapping::PoseAnswer pose =
+        mapper.is_tracking() ? mapper.found_pose() : frames.trajectory->at(frames.stamp_s(i));
     const bool is_last = i + 1 == frames.frame_count;
     moment.begin_unix_s = mapping::unix_begin_s(mapper.begin_s(), mapper.newest_s(), unix_now_s());
     const double at = moment.begin_unix_s + frames.stamp_s(i) - mapper.begin_s();
@@ -90,9 +105,10 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
   }
 }
 
-MapFeed::MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack& robot, std::function<bool()> may_begin)
+MapFeed::MapFeed(FrameStream frames, const mapping::MapperSettings& settings, MapKeeper& map, RobotTrack& robot,
+                 std::function<bool()> may_begin)
     : frames_(std::move(frames)),
-      voxel_m_(voxel_m),
+      settings_(settings),
       hand_over_(map, frames_.up),
       robot_(robot),
       thread_([this, may_begin = std::move(may_begin)] {
@@ -114,12 +130,9 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
     std::this_thread::sleep_for(kWait);
   }
   jobs::WorkerPool pool(1);
-  mapping::MapperSettings settings;
-  settings.voxel_m = voxel_m_;
-  mapping::Mapper mapper(*frames_.calibration, settings, pool);
+  mapping::Mapper mapper(*frames_.calibration, settings_, pool);
   mapping::FaultLog faults;
   FeedRun run;
-  run.voxel_m = voxel_m_;
   run.is_over = [this] { return hand_over_.is_over(); };
   run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
     return hand_over_(std::move(units), moment);

@@ -35,7 +35,6 @@ FrameStream demo_drive_stream();
 /// Maps frames and hands over, twice a second of real time and at the end, the units that have changed; what `hand_over` returns false for
 /// ends it. Ends early when `is_over`.
 struct FeedRun {
-  double voxel_m = 0.01;
   std::function<bool()> is_over = [] { return false; };
   std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment& moment)> hand_over;
   std::function<void(double share)> progress = [](double) {};
@@ -48,11 +47,21 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
 /// The pose of a depth camera (x to the right and y down in its picture) as that of the robot.
 RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_s);
 
+/// Says in the log when tracking loses the cameras, and when it has found them again.
+class TrackTeller {
+ public:
+  void tell(const mapping::Mapper& mapper);
+
+ private:
+  bool is_lost_ = false;
+};
+
 /// Maps frames in a thread of its own and puts what has changed into a map. Says in the log what was wrong, and when it is done.
 class MapFeed {
  public:
   /// Begins when `may_begin`, and says in `robot` where the cameras are.
-  MapFeed(FrameStream frames, double voxel_m, MapKeeper& map, RobotTrack& robot, std::function<bool()> may_begin);
+  MapFeed(FrameStream frames, const mapping::MapperSettings& settings, MapKeeper& map, RobotTrack& robot,
+          std::function<bool()> may_begin);
   ~MapFeed();  ///< Ends it after the frame that is being fused.
   MapFeed(const MapFeed&) = delete;
   MapFeed& operator=(const MapFeed&) = delete;
@@ -61,7 +70,7 @@ class MapFeed {
   void work(const std::function<bool()>& may_begin);
 
   const FrameStream frames_;
-  const double voxel_m_;
+  const mapping::MapperSettings settings_;
   UnitHandOver hand_over_;
   RobotTrack& robot_;
   std::thread thread_;

@@ -170,6 +170,25 @@ class Frames(unittest.TestCase):
             self.assertEqual([line.split()[0] for line in file if not line.startswith("#")], ["0.000000"])
         self.assertEqual(self.map("--save-poses", poses).returncode, 2)
 
+    def test_corrected_poses_move_the_map(self):
+        def bounds():
+            done = subprocess.run([SPECTRA, "info", "--json", self.output], capture_output=True, text=True, check=True)
+            facts = json.loads(done.stdout)
+            return facts["origin"][2] + facts["bounds"]["max"][2]
+
+        self.write("later.txt", "".join("%.2f 0 0 0.5 0 0 0 1\n" % (0.05 * i) for i in range(2 * self.COUNT)))
+        done = self.map("--corrected-poses", self.path("later.txt"), "--threads", "1")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("submaps      1, 1 of them moved", done.stdout)
+        self.assertAlmostEqual(bounds(), 2.0, delta=0.01)
+        # Poses that nothing was made with say nothing of it.
+        self.write("later.txt", "100 0 0 0.5 0 0 0 1\n")
+        done = self.map("--corrected-poses", self.path("later.txt"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("none of its poses", done.stderr)
+        done = self.map("--corrected-poses", self.path("later.txt"), "--track")
+        self.assertEqual(done.returncode, 2)
+
     def test_calibration_is_refused_where_it_cannot_be_told(self):
         done = subprocess.run([SPECTRA, "calibrate", "thermal-delay", self.folder], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
@@ -190,6 +209,33 @@ class Frames(unittest.TestCase):
         done = subprocess.run([SPECTRA, "serve", "--map", self.path("none"), "--listen", "127.0.0.1:0"], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertIn("no folder of frames", done.stderr)
+        done = subprocess.run([SPECTRA, "serve", "--map", self.folder, "--submaps", "--listen", "127.0.0.1:0"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--submaps goes with --map live", done.stderr)
+
+    def test_a_server_tracks_and_says_where_it_is_lost(self):
+        self.write("index.html", "")
+        os.remove(self.path("poses.txt"))
+        log = self.path("log.txt")
+        url = self.server("--map", self.folder, "--voxel", "0.02", "--track", "--log-file", log)
+        self.assertGreater(len(self.wait_for_blocks(url, 4)), 3, "of the first picture")
+        for _ in range(200):
+            with open(log) as file:
+                text = file.read()
+            if "mapping is done" in text:
+                break
+            time.sleep(0.05)
+        self.assertIn("tracking has lost its place: nothing is fused", text)
+        self.assertIn("mapping is done: 1 depth", text)
+
+    def test_the_example_of_a_sender(self):
+        self.write("index.html", "")
+        example = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../docs/examples/send_frames.py")
+        url = self.server("--map", "live", "--voxel", "0.02")
+        done = subprocess.run(["python3", example, self.folder, url, "--as-fast-as-possible"], capture_output=True, text=True, timeout=60)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertRegex(done.stdout, r"sent 3\d messages, .* 0 refused, 0 skipped")
+        self.assertGreater(len(self.wait_for_blocks(url, 4)), 3)
 
     def test_a_simulated_robot_fills_a_map(self):
         self.write("index.html", "")

@@ -1,7 +1,9 @@
 // The map of a simulated drive against the truth, and the processor time that a frame takes.
 //
-//   drive_bench [--seconds S] [--seed N] [--voxel M] [--vertices N] [--rules] [--check]
+//   drive_bench [--seconds S] [--seed N] [--voxel M] [--vertices N] [--rules] [--check] [--pose-drift M]
 //
+// --pose-drift: poses are told that wander, by so many metres after a second; beside the map of them that of submaps which the true poses have moved, and that
+// of the true poses.
 // --rules: the same without each of the rules of the thermal model. --check: ends with status 1 when the map is far from the truth.
 #include <cstdio>
 #include <cstdlib>
@@ -32,6 +34,8 @@ int main(int argc, char** argv) {
       voxel_m = std::atof(argv[++i]);
     else if (is("--vertices"))
       options.vertex_count = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    else if (is("--pose-drift"))
+      options.pose_drift_m = std::atof(argv[++i]);
     else if (std::strcmp(argv[i], "--check") == 0)
       is_checked = true;
     else if (std::strcmp(argv[i], "--rules") == 0)
@@ -42,6 +46,13 @@ int main(int argc, char** argv) {
   std::vector<mapping::Frame> frames(drive.frame_count());
   pool.for_each(frames.size(), [&](std::size_t i) { frames[i] = drive.frame(i); });
 
+  mapping::Trajectory true_poses;
+  for (double time_s = 0; time_s <= options.seconds; time_s += 0.02) true_poses.add(time_s, drive.true_pose(time_s));
+  mapping::StampedPoses corrected;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!drive.is_thermal(i)) corrected.emplace_back(drive.stamp_s(i), drive.true_pose(drive.stamp_s(i)));
+  }
+  const mapping::Trajectory* poses = &drive.trajectory();
   const auto run = [&](const char* name, const std::function<void(mapping::MapperSettings&)>& change) {
     mapping::MapperSettings settings;
     settings.voxel_m = voxel_m;
@@ -51,8 +62,12 @@ int main(int argc, char** argv) {
     std::vector<double> depth_ms, heat_ms;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const double begin = bench::cpu_ms();
-      mapper.fuse(frames[i], drive.trajectory(), faults);
+      mapper.fuse(frames[i], *poses, faults);
       (drive.is_thermal(i) ? heat_ms : depth_ms).push_back(bench::cpu_ms() - begin);
+    }
+    if (settings.submaps) {
+      const mapping::CorrectionReport moved = mapper.correct(corrected);
+      std::printf("%zu of %zu submaps moved\n", moved.moved, mapper.submap_count());
     }
     const double begin = bench::cpu_ms();
     const mapping::UnitMesh mesh = mapper.whole_mesh();
@@ -67,7 +82,7 @@ int main(int argc, char** argv) {
         "ms, %.1f bytes a voxel, %zu "
         "blocks\n",
         quantile(depth_ms, 0.5), quantile(depth_ms, 0.95), quantile(heat_ms, 0.5), quantile(heat_ms, 0.95), mesh_ms,
-        static_cast<double>(mapper.map().size_bytes()) /
+        static_cast<double>(mapper.size_bytes()) /
             static_cast<double>(mapper.map().block_count() * mapping::kBlockVoxels),
         mapper.map().block_count());
     for (const mapping::FrameFault& fault : faults.all()) {
@@ -76,6 +91,11 @@ int main(int argc, char** argv) {
   };
   print_head();
   run("all", [](mapping::MapperSettings&) {});
+  if (options.pose_drift_m > 0) {
+    run("corrected", [](mapping::MapperSettings& s) { s.submaps.emplace(); });
+    poses = &true_poses;
+    run("true poses", [](mapping::MapperSettings&) {});
+  }
   if (!with_rules) return is_checked && !is_good ? 1 : 0;
   run("plain mean", [](mapping::MapperSettings& s) {
     mapping::HeatRules& r = s.heat;

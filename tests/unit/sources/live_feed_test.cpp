@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace spectra::sources {
@@ -30,7 +31,7 @@ class LiveFeedTest : public ::testing::Test {
     head.sequence = 1;
     auto promise = std::make_shared<std::promise<net::FrameOutcome>>();
     Answer answer = promise->get_future();
-    feed_.take({std::move(head), "head" + body, 4},
+    own_->take({std::move(head), "head" + body, 4},
                [promise](net::FrameOutcome outcome) { promise->set_value(std::move(outcome)); });
     return answer;
   }
@@ -68,28 +69,45 @@ class LiveFeedTest : public ::testing::Test {
   std::mutex mutex_;
   std::vector<RobotPose> poses_;
   std::size_t unit_count_ = 0;
-  LiveFeed feed_{0.02,
-                 {[this](auto units, const FeedMoment&) {
-                    const std::lock_guard lock(mutex_);
-                    unit_count_ += units.size();
-                    return true;
-                  },
-                  [this](const RobotPose& pose, bool) {
-                    const std::lock_guard lock(mutex_);
-                    poses_.push_back(pose);
-                  }},
-                 [] { return true; }};
+  static mapping::MapperSettings settings() {
+    mapping::MapperSettings settings;
+    settings.voxel_m = 0.02;
+    return settings;
+  }
+  std::unique_ptr<LiveFeed> feed_of(const mapping::MapperSettings& settings) {
+    return std::make_unique<LiveFeed>(settings,
+                                      LiveFeed::Sinks{[this](auto units, const FeedMoment&) {
+                                                        const std::lock_guard lock(mutex_);
+                                                        unit_count_ += units.size();
+                                                        return true;
+                                                      },
+                                                      [this](const RobotPose& pose, bool) {
+                                                        const std::lock_guard lock(mutex_);
+                                                        poses_.push_back(pose);
+                                                      }},
+                                      [] { return true; });
+  }
+  std::size_t units_within(std::chrono::milliseconds patience) {
+    for (const auto end = std::chrono::steady_clock::now() + patience; std::chrono::steady_clock::now() < end;
+         std::this_thread::sleep_for(10ms)) {
+      const std::lock_guard lock(mutex_);
+      if (unit_count_ > 0) break;
+    }
+    const std::lock_guard lock(mutex_);
+    return std::exchange(unit_count_, 0);
+  }
+  std::unique_ptr<LiveFeed> own_ = feed_of(settings());
 };
 
 TEST_F(LiveFeedTest, TakesOneSenderAtATime) {
-  EXPECT_TRUE(feed_.begin());
-  EXPECT_FALSE(feed_.begin());
-  feed_.end();
-  EXPECT_TRUE(feed_.begin());
+  EXPECT_TRUE(own_->begin());
+  EXPECT_FALSE(own_->begin());
+  own_->end();
+  EXPECT_TRUE(own_->begin());
 }
 
 TEST_F(LiveFeedTest, WaitsForThePoseOfAPictureAndMapsInTheOrderOfTime) {
-  ASSERT_TRUE(feed_.begin());
+  ASSERT_TRUE(own_->begin());
   EXPECT_EQ(code_of(calibrate()), "taken");
   EXPECT_EQ(code_of(pose(10)), "taken");
   Answer early = depth(10.05);
@@ -113,7 +131,7 @@ TEST_F(LiveFeedTest, WaitsForThePoseOfAPictureAndMapsInTheOrderOfTime) {
 }
 
 TEST_F(LiveFeedTest, WaitsForNoPoseLongerThanItsPatience) {
-  ASSERT_TRUE(feed_.begin());
+  ASSERT_TRUE(own_->begin());
   code_of(calibrate());
   EXPECT_EQ(code_of(depth(5)), "no_pose") << "when nothing else comes";
   Answer waiting = depth(6);
@@ -123,11 +141,11 @@ TEST_F(LiveFeedTest, WaitsForNoPoseLongerThanItsPatience) {
   end.kind = FramesKind::End;
   EXPECT_EQ(code_of(send(end)), "taken");
   EXPECT_EQ(code_of(std::move(later)), "no_pose");
-  EXPECT_EQ(feed_.faults().of(mapping::FaultKind::NoPose).count, 3U);
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::NoPose).count, 3U);
 }
 
 TEST_F(LiveFeedTest, SkipsTheOldestWhenTooManyWait) {
-  ASSERT_TRUE(feed_.begin());
+  ASSERT_TRUE(own_->begin());
   code_of(calibrate());
   code_of(pose(100));
   std::vector<Answer> answers;
@@ -138,13 +156,13 @@ TEST_F(LiveFeedTest, SkipsTheOldestWhenTooManyWait) {
   }
   std::size_t skipped = 0;
   for (Answer& answer : answers) skipped += code_of(std::move(answer)) == "skipped" ? std::size_t{1} : 0;
-  EXPECT_EQ(skipped, feed_.skipped_count());
+  EXPECT_EQ(skipped, own_->skipped_count());
   EXPECT_GE(skipped, 39 - LiveFeed::kMostWaiting);
   EXPECT_LE(skipped, 40 - LiveFeed::kMostWaiting);
 }
 
 TEST_F(LiveFeedTest, GoesOnWithAClockThatIsBehindAndKeepsItsCalibration) {
-  ASSERT_TRUE(feed_.begin());
+  ASSERT_TRUE(own_->begin());
   code_of(calibrate());
   code_of(pose(100));
   EXPECT_EQ(code_of(depth(100)), "taken");
@@ -153,12 +171,73 @@ TEST_F(LiveFeedTest, GoesOnWithAClockThatIsBehindAndKeepsItsCalibration) {
   EXPECT_EQ(code_of(depth(200)), "no_pose") << "a stamp from nowhere does not stop the clock";
   code_of(pose(100.1));
   EXPECT_EQ(code_of(depth(100.1)), "taken");
-  feed_.end();
-  ASSERT_TRUE(feed_.begin());
+  own_->end();
+  ASSERT_TRUE(own_->begin());
   EXPECT_EQ(code_of(calibrate(R"(,"delay_s":0.5)")), "other_calibration");
   EXPECT_EQ(code_of(calibrate()), "taken");
   code_of(pose(1));
   EXPECT_EQ(code_of(depth(1)), "taken");
+}
+
+TEST_F(LiveFeedTest, TracksWithoutPosesAndSaysThatItIsLost) {
+  mapping::MapperSettings tracking = settings();
+  tracking.is_tracking = true;
+  own_ = feed_of(tracking);
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  Answer first = depth(0), second = depth(0.1);
+  FrameHead end;
+  end.kind = FramesKind::End;
+  EXPECT_EQ(code_of(send(end)), "taken");
+  EXPECT_EQ(code_of(std::move(first)), "taken") << "the first picture is where the map begins";
+  // A bare wall does not tell where along it one is.
+  EXPECT_EQ(code_of(std::move(second)), "lost_track");
+  EXPECT_GT(units_within(5s), 0U) << "of the first picture";
+  for (int i = 0; i < 100; ++i) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!poses_.empty() && poses_.back().is_lost) break;
+    }
+    std::this_thread::sleep_for(20ms);
+  }
+  const std::lock_guard lock(mutex_);
+  ASSERT_FALSE(poses_.empty());
+  EXPECT_TRUE(poses_.back().is_lost);
+}
+
+TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
+  mapping::MapperSettings in_parts = settings();
+  in_parts.submaps.emplace();
+  own_ = feed_of(in_parts);
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
+  EXPECT_EQ(code_of(depth(0.05)), "taken");
+  EXPECT_GT(units_within(5s), 0U);
+  FrameHead corrected;
+  corrected.kind = FramesKind::CorrectedPoses;
+  corrected.poses = {{0.05, 0, 0, 1, 0, 0, 0, 1}, {0.1, 0, 0, 1, 0, 0, 0, 0.5}};
+  EXPECT_EQ(code_of(send(corrected)), "bad_pose");
+  EXPECT_EQ(units_within(700ms), 0U) << "all of it, or nothing";
+  corrected.poses.pop_back();
+  EXPECT_EQ(code_of(send(corrected)), "taken");
+  EXPECT_GT(units_within(5s), 1U) << "gone where it was, there where it is";
+  // On from there: poses before and after the correction are of one world now.
+  FrameHead after;
+  after.kind = FramesKind::Poses;
+  after.poses = {{0.2, 0, 0, 1, 0, 0, 0, 1}};
+  EXPECT_EQ(code_of(send(after)), "taken");
+  EXPECT_EQ(code_of(depth(0.18)), "taken");
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::JumpingPose).count, 0U);
+}
+
+TEST_F(LiveFeedTest, AMapInOnePieceTakesNoCorrections) {
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  FrameHead corrected;
+  corrected.kind = FramesKind::CorrectedPoses;
+  corrected.poses = {{0.05, 0, 0, 1, 0, 0, 0, 1}};
+  EXPECT_EQ(code_of(send(corrected)), "no_submaps");
 }
 
 }  // namespace

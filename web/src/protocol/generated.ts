@@ -174,7 +174,7 @@ export interface FramesHello {
 }
 
 /** what a message of /frames speaks of */
-export type FramesKind = 'calibration' | 'poses' | 'picture' | 'end';
+export type FramesKind = 'calibration' | 'poses' | 'corrected_poses' | 'picture' | 'end';
 
 /** What one message may hold. */
 export interface FramesLimits {

@@ -1,0 +1,191 @@
+#include "server/mapping/submaps.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "box_world.hpp"
+#include "server/mapping/mapper.hpp"
+
+namespace spectra::mapping {
+namespace {
+
+/// A camera that goes once around in a room of 5 x 5 m, looking out; the loop closes where it began.
+class SubmapsTest : public testing::Test {
+ protected:
+  static constexpr int kFrames = 72;
+  static constexpr double kSeconds = 7.2;
+
+  SubmapsTest() {
+    settings_.voxel_m = 0.03;
+    settings_.submaps.emplace();
+    for (int i = 0; i <= 10 * kFrames / 2; ++i) {
+      const double time_s = 0.02 * i;
+      true_poses_.add(time_s, true_pose(time_s));
+      drifted_poses_.add(time_s, drifted_pose(time_s));
+    }
+  }
+
+  static Eigen::Isometry3d true_pose(double time_s) {
+    const double angle = 2 * std::numbers::pi * time_s / kSeconds;
+    return looking_ahead(0.8 * std::sin(angle), 0, 0.8 * std::cos(angle), angle);
+  }
+  /// After the loop 20 cm and 3 degrees off.
+  static Eigen::Isometry3d drifted_pose(double time_s) {
+    const double share = time_s / kSeconds;
+    Eigen::Isometry3d drift = Eigen::Isometry3d::Identity();
+    drift.linear() = Eigen::AngleAxisd(0.052 * share, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    drift.translation() = share * Eigen::Vector3d(0.2, 0.05, 0);
+    return drift * true_pose(time_s);
+  }
+
+  void fuse_all(Mapper& mapper, const Trajectory& poses) {
+    for (int i = 0; i < kFrames; ++i) {
+      Frame frame;
+      frame.time_s = 0.1 * i;
+      frame.depth = world_.depth(calibration_.depth.camera, true_pose(frame.time_s));
+      if (i % 2 == 0) frame.thermal = world_.thermal(calibration_.thermal->camera, true_pose(frame.time_s));
+      mapper.fuse(frame, poses, faults_);
+    }
+  }
+
+  /// How far vertices are from the nearest wall: root mean square, and the largest of 99 %.
+  struct Error {
+    double rms = 0, largest = 0;
+    std::size_t count = 0;
+  };
+  static Error error_of(const UnitMesh& mesh) {
+    std::vector<double> off;
+    double squares = 0;
+    for (const base::Vec3f& p : mesh.positions) {
+      const double x = std::abs(std::abs(static_cast<double>(p.x)) - 2.5);
+      const double z = std::abs(std::abs(static_cast<double>(p.z)) - 2.5);
+      off.push_back(std::min(x, z));
+      squares += off.back() * off.back();
+    }
+    std::sort(off.begin(), off.end());
+    return {std::sqrt(squares / static_cast<double>(off.size())), off[off.size() * 99 / 100], off.size()};
+  }
+
+  static WarmBox box(Eigen::Vector3d low, Eigen::Vector3d high, double celsius) {
+    return {low, high, [celsius](const Eigen::Vector3d&) { return celsius; }};
+  }
+  const BoxWorld world_{{box({-2.7, -2, 2.5}, {2.7, 2, 2.7}, 20), box({-2.7, -2, -2.7}, {2.7, 2, -2.5}, 22),
+                         box({2.5, -2, -2.7}, {2.7, 2, 2.7}, 24), box({-2.7, -2, -2.7}, {-2.5, 2, 2.7}, 26)}};
+  Calibration calibration_ = small_cameras();
+  MapperSettings settings_;
+  Trajectory true_poses_, drifted_poses_;
+  jobs::WorkerPool pool_{1};
+  FaultLog faults_;
+};
+
+TEST_F(SubmapsTest, ALoopWithDriftEndsNearTheMapOfTruePosesWithoutASecondLook) {
+  Mapper mapper(calibration_, settings_, pool_);
+  fuse_all(mapper, drifted_poses_);
+  EXPECT_GE(mapper.submap_count(), 5U) << "one every 60 degrees";
+  const Error before = error_of(mapper.whole_mesh());
+  const CorrectionReport report = mapper.correct(true_poses_.stamped());
+  EXPECT_GE(report.moved, 5U);
+  const UnitMesh corrected = mapper.whole_mesh();
+  const Error after = error_of(corrected);
+
+  MapperSettings one = settings_;
+  one.submaps.reset();
+  Mapper best(calibration_, one, pool_);
+  fuse_all(best, true_poses_);
+  const Error bar = error_of(best.whole_mesh());
+  // A submap of 60 degrees holds a sixth of the drift: 33 mm and half a degree, half of it on either side of its middle.
+  EXPECT_GT(before.rms, 0.03);
+  EXPECT_LT(after.rms, bar.rms + 0.01);
+  EXPECT_LT(after.largest, bar.largest + 0.035);
+  EXPECT_NEAR(static_cast<double>(after.count), static_cast<double>(bar.count), 0.1 * static_cast<double>(bar.count))
+      << "one surface, not one of each submap";
+  std::size_t warm = 0, wrong = 0;
+  for (std::size_t i = 0; i < corrected.positions.size(); ++i) {
+    if (std::isnan(corrected.celsius[i])) continue;
+    ++warm;
+    const base::Vec3f& p = corrected.positions[i];
+    if (std::abs(std::abs(p.x) - std::abs(p.z)) < 0.3F) continue;  // Beside a corner.
+    const float celsius = std::abs(p.x) > std::abs(p.z) ? (p.x > 0 ? 24.0F : 26.0F) : (p.z > 0 ? 20.0F : 22.0F);
+    wrong += std::abs(corrected.celsius[i] - celsius) > 0.3F ? 1U : 0U;
+  }
+  EXPECT_GT(warm, corrected.positions.size() / 2);
+  EXPECT_LT(wrong, warm / 50);
+}
+
+TEST_F(SubmapsTest, ASubmapAloneIsTheMapAsItWas) {
+  settings_.submaps->radians = 7;
+  Mapper mapper(calibration_, settings_, pool_);
+  fuse_all(mapper, true_poses_);
+  EXPECT_EQ(mapper.submap_count(), 1U);
+  settings_.submaps.reset();
+  Mapper plain(calibration_, settings_, pool_);
+  fuse_all(plain, true_poses_);
+  const UnitMesh one = mapper.whole_mesh(), other = plain.whole_mesh();
+  EXPECT_EQ(one.positions, other.positions);
+  EXPECT_EQ(one.triangles, other.triangles);
+  ASSERT_EQ(one.celsius.size(), other.celsius.size());
+  const auto is_same = [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  for (std::size_t i = 0; i < one.celsius.size(); ++i) {
+    ASSERT_TRUE(is_same(one.celsius[i], other.celsius[i]));
+    ASSERT_TRUE(is_same(one.sigma_kelvin[i], other.sigma_kelvin[i]));
+    ASSERT_TRUE(one.colours[i] == other.colours[i]);
+  }
+}
+
+TEST_F(SubmapsTest, SubmapsThatStayWhereTheyAreMakeTheSameSurface) {
+  Mapper mapper(calibration_, settings_, pool_);
+  fuse_all(mapper, true_poses_);
+  const UnitMesh before = mapper.whole_mesh();
+  EXPECT_EQ(mapper.correct(true_poses_.stamped()).moved, 0U);
+  EXPECT_EQ(mapper.whole_mesh().positions, before.positions);
+  settings_.submaps.reset();
+  Mapper plain(calibration_, settings_, pool_);
+  fuse_all(plain, true_poses_);
+  EXPECT_LT(error_of(before).rms, error_of(plain.whole_mesh()).rms + 0.002);
+}
+
+TEST_F(SubmapsTest, WhatIsToldAfterACorrectionIsWhereItIsNow) {
+  Mapper mapper(calibration_, settings_, pool_);
+  UnitPublisher publisher;
+  fuse_all(mapper, drifted_poses_);
+  std::size_t first = 0;
+  for (const PublishedUnit& unit : mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_))
+    first += unit.mesh.positions.empty() ? 0U : 1U;
+  EXPECT_GT(first, 20U);
+  EXPECT_TRUE(mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_).empty());
+  mapper.correct(true_poses_.stamped());
+  std::vector<UnitMesh> told;
+  for (PublishedUnit& unit : mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_))
+    told.push_back(std::move(unit.mesh));
+  EXPECT_GT(told.size(), 20U);
+  EXPECT_TRUE(mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_).empty());
+
+  // The robot goes on in the corrected world, without a word of poses that jump.
+  Frame frame;
+  frame.time_s = 0.1 * kFrames;
+  frame.depth = world_.depth(calibration_.depth.camera, true_pose(frame.time_s));
+  const std::size_t submaps = mapper.submap_count();
+  Trajectory after;
+  for (int i = -5; i <= 5; ++i) after.add(frame.time_s + 0.02 * i, true_pose(frame.time_s + 0.02 * i));
+  mapper.fuse(frame, after, faults_);
+  EXPECT_EQ(mapper.submap_count(), submaps + 1);
+  EXPECT_LT(error_of(mapper.whole_mesh()).largest, 0.08);
+}
+
+TEST_F(SubmapsTest, WithoutAPoseOfTheirOwnTheyGoWithTheOneBefore) {
+  Mapper mapper(calibration_, settings_, pool_);
+  fuse_all(mapper, drifted_poses_);
+  Eigen::Isometry3d away = Eigen::Isometry3d::Identity();
+  away.translation() = Eigen::Vector3d(0, 1, 0);
+  // Of the second submap alone; the first one stays.
+  const CorrectionReport report = mapper.correct({{1.8, away * drifted_pose(1.8)}});
+  EXPECT_EQ(report.moved + 1, mapper.submap_count());
+  EXPECT_TRUE(report.newest.isApprox(away, 1e-9));
+  EXPECT_EQ(mapper.correct({{100, away}}).moved, 0U);
+}
+
+}  // namespace
+}  // namespace spectra::mapping
