@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "server/access/role.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/outgoing_frame.hpp"
 
 namespace spectra::net {
 

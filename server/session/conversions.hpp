@@ -17,7 +17,10 @@
 #include "protocol/messages/stream_messages.hpp"
 #include "protocol/rpc_error.hpp"
 #include "server/map/scene_snapshot.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/camera.hpp"
+#include "server/stream/stream_quality.hpp"
+#include "server/stream/stream_report.hpp"
+#include "server/stream/subscription.hpp"
 
 /// The one place that translates between what the fusion library, the scene and the streams know and what goes over
 /// the wire.

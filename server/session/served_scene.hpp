@@ -15,7 +15,7 @@
 #include "server/session/session_ids.hpp"
 #include "server/sources/baseline_marked.hpp"
 #include "server/sources/robot_track.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/frame_cache.hpp"
 
 namespace spectra::session {
 

@@ -20,6 +20,7 @@
 #include "server/session/scene_questions.hpp"
 #include "server/session/served_scene.hpp"
 #include "server/session/status_board.hpp"
+#include "server/stream/viewer_stream.hpp"
 
 namespace spectra::session {
 

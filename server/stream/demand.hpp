@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "fusion/fusion_plan.hpp"
-#include "server/stream/frame_cache.hpp"
+#include "server/stream/frame_cache_state.hpp"
 
 namespace spectra::stream {
 
@@ -13,6 +13,8 @@ namespace spectra::stream {
 struct RawDemand {
   /// The layers, in the order in which they are sent.
   static constexpr std::array<Layer, 3> kLayers = {Layer::Temperature, Layer::Visible, Layer::TemperatureSigma};
+  // Their places in it.
+  static constexpr std::size_t kTemperature = 0, kVisible = 1, kSigma = 2;
   /// So many of them, the first, are what colours are made of: the raw layers.
   static constexpr std::size_t kRawCount = 2;
 

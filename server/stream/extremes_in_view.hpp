@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "server/map/scene_snapshot.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/camera.hpp"
 
 namespace spectra::stream {
 

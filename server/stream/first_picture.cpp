@@ -2,8 +2,9 @@
 
 #include <utility>
 
-#include "server/stream/frame_cache.hpp"
+#include "server/stream/frame_cache_state.hpp"
 #include "server/stream/lattice.hpp"
+#include "server/stream/stream_quality.hpp"
 #include "server/stream/view_selection.hpp"
 
 namespace spectra::stream {

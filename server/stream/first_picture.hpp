@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "server/map/scene_snapshot.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/frame_cache.hpp"
 
 namespace spectra::stream {
 

@@ -1,4 +1,4 @@
-#include "server/stream/frame_cache.hpp"
+#include "server/stream/frame_cache_state.hpp"
 
 #include <cstdio>
 #include <functional>

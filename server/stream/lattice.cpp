@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/stream_quality.hpp"
 
 namespace spectra::stream {
 namespace {

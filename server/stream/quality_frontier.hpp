@@ -7,7 +7,7 @@
 #include <span>
 
 #include "protocol/tile_frame.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/stream_quality.hpp"
 
 namespace spectra::stream {
 

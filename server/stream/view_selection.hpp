@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/map/scene_snapshot.hpp"
-#include "server/stream/viewer_stream.hpp"
+#include "server/stream/camera.hpp"
 
 namespace spectra::stream {
 

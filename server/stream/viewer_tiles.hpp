@@ -12,6 +12,7 @@
 
 #include "protocol/tile_frame.hpp"
 #include "server/stream/demand.hpp"
+#include "server/stream/subscription.hpp"
 #include "server/stream/view_selection.hpp"
 
 namespace spectra::stream {

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "fusion/temperature_codes.hpp"
-#include "server/stream/frame_cache.hpp"
+#include "server/stream/frame_cache_state.hpp"
 #include "stream_with_viewers.hpp"
 
 namespace spectra::stream {
