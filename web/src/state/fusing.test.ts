@@ -44,7 +44,7 @@ function setUp({
   store.fusionInForce = FUSION;
   store.stats = { throughput_bytes_per_s: 1e6 } as never;
   store.shown = { tiles: 2, vertices: 1000, triangles: 0 };
-  const counts = { drawn: 2, raw: 0 };
+  const counts = { drawn: 2, raw: 0, step_celsius: 0.01 };
   const diary: string[] = [];
   const asked: object[] = [];
   const busy = { settings: false };
@@ -134,6 +134,47 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(asked.at(-1)).toEqual({ method: 'fusion.facts', bins: 17 });
     await later();
     expect(fusing.apply(wanted)?.params_in_force['n']).toEqual(expect.any(Number));
+  });
+
+  it('leaves a range to the robot for which temperatures come in too coarse steps, and says so', async () => {
+    const { store, fusing, counts, diary } = setUp();
+    fusing.consider();
+    await vi.waitFor(() => expect(diary).toContain('facts'));
+    // A 65,000th of what a tile spans where somebody has written 65535 for nothing.
+    counts.step_celsius = 1;
+    counts.raw = 2;
+    fusing.consider();
+    expect(store.fusingPlace).toBe('robot');
+    expect(fusing.leftToRobot).toContain('steps of 1 °C');
+    expect(fusing.channels).toEqual(['fused']);
+    // A range that is wide enough for them may be made here.
+    store.fusionInForce = { ...FUSION, range: { mode: 'manual', min: 0, max: 600 } };
+    fusing.consider();
+    await later();
+    fusing.consider();
+    expect(store.fusingPlace).toBe('here');
+    expect(fusing.apply({ ...FUSION, range: { mode: 'manual', min: 12, max: 15 } })).toBeNull();
+    expect(fusing.channels).toContain('fused');
+  });
+
+  it('makes colours here when the link is lost and all layers are there, whoever made them before', async () => {
+    const { store, fusing, counts, diary } = await here();
+    store.fusionInForce = { ...FUSION, method: 'thermal_change' };
+    fusing.consider();
+    fusing.completed();
+    expect(store.fusingPlace).toBe('robot');
+    expect(fusing.apply(FUSION)).toBeNull();
+    store.link = { phase: 'lost' } as never;
+    expect(fusing.apply({ ...FUSION, method: 'thermal_change' })).toBeNull();
+    counts.raw = 1;
+    expect(fusing.apply(FUSION)).toBeNull();
+    counts.raw = 2;
+    expect(fusing.apply(FUSION)).toMatchObject({ method: FUSION.method });
+    expect(store.fusingPlace).toBe('here');
+    expect(diary.slice(-2)).toEqual(['fuse', 'here']);
+    // The next connection goes on with it.
+    fusing.greeted(['raw_layers']);
+    expect(fusing.channels).toEqual(['temperature', 'visible']);
   });
 
   it('goes back to the robot when that has brought everything, and not before', async () => {

@@ -14,6 +14,10 @@ export const LONGEST_RAW_S = 60;
 export const RAW_BYTES_PER_VERTEX = 2.1;
 /** Of a change of fused colours. */
 export const CHANGE_BYTES_PER_VERTEX = 1.6;
+/** Temperatures come here in steps, of which a range needs so many: half of one is then half a level of 256 at most. */
+const STEPS_OF_A_RANGE = 256;
+/** The step that the robot chooses unless a tile spans too much for it; fine enough for every range that means anything. */
+const USUAL_STEP_CELSIUS = 0.0101;
 /** Histograms that are got before they are needed, so that a lost link does not keep them away: of percentiles, and of bins by default. */
 const EARLY_BINS = [4096, 64];
 
@@ -36,7 +40,7 @@ export interface FusingPicture {
 }
 
 export interface FusingTiles {
-  rawCounts(): { drawn: number; raw: number };
+  rawCounts(): { drawn: number; raw: number; step_celsius: number };
   setHere(isHere: boolean): void;
 }
 
@@ -57,6 +61,8 @@ export class Fusing {
   /** Colours come from the robot again, and are still on their way. */
   #isLeaving = false;
   #isOfferedRaw = false;
+  /** The coarsest in which temperatures of the picture have come. */
+  #step_celsius = 0;
 
   constructor(
     private readonly store: Store,
@@ -81,6 +87,7 @@ export class Fusing {
     this.store.fusingWish = wish;
     // Whoever asks again, tries again.
     this.store.fusingProblem = null;
+    this.#step_celsius = 0;
     this.consider();
   }
 
@@ -121,6 +128,8 @@ export class Fusing {
   consider(): void {
     const { store } = this;
     if (!store.connected || store.scene == null || !this.#isOfferedRaw) return;
+    const counts = this.tiles.rawCounts();
+    if (this.#wantsRaw && counts.raw > 0) this.#step_celsius = counts.step_celsius;
     if (!this.#isWanted()) {
       if (this.isHere) this.#leave();
       else if (this.#wantsRaw) this.#leaveAtOnce();
@@ -136,7 +145,6 @@ export class Fusing {
       return;
     }
     if (store.fusingPlace !== 'coming') return;
-    const counts = this.tiles.rawCounts();
     store.rawShare = counts.drawn === 0 ? 0 : counts.raw / counts.drawn;
     if (store.rawShare < 1 || this.#planner === null || this.#facts === null) return;
     if (!store.settled || store.wanted !== null || this.events.isBusy() || store.fusion === null) return;
@@ -148,16 +156,18 @@ export class Fusing {
    * as the robot would refuse.
    */
   apply(wanted: Fusion): Fusion | null {
-    if (!this.isHere || this.store.fusingProblem !== null || this.#planner === null || this.#facts === null) return null;
+    if (this.store.fusingProblem !== null || this.#planner === null || this.#facts === null) return null;
+    if (!this.isHere && !this.#isAllHereWithoutLink()) return null;
     try {
-      if (this.#leftToRobot(wanted) !== null) {
+      const change = wholeChange(wanted);
+      const inForce = this.#leftToRobot(wanted) === null ? this.#planned(wanted, change) : null;
+      if (this.#leftToRobot(inForce ?? wanted) !== null) {
         this.#leave();
         return null;
       }
-      const change = wholeChange(wanted);
-      const inForce = this.#planned(wanted, change);
       if (inForce === null) return null;
       this.picture.fuse(change);
+      if (!this.isHere) this.#stay();
       return inForce;
     } catch (error) {
       if (error instanceof FusionRefusal) throw error;
@@ -179,11 +189,16 @@ export class Fusing {
     return fusion === null ? null : this.#leftToRobot(fusion);
   }
 
-  #leftToRobot({ method, age }: Fusion): string | null {
+  #leftToRobot({ method, age, range }: Fusion): string | null {
     const description = this.store.methods.find(({ id }) => id === method);
     if (description?.compares_with_baseline === true)
       return `${description.label} compares with temperatures of before, which the robot has.`;
-    return age?.mode === 'fade' ? 'What is old fades by the time when it was seen, which the robot has.' : null;
+    if (age?.mode === 'fade') return 'What is old fades by the time when it was seen, which the robot has.';
+    const step = this.#step_celsius;
+    const { min, max } = range;
+    return step > USUAL_STEP_CELSIUS && min !== null && max !== null && step * STEPS_OF_A_RANGE > max - min
+      ? `Some temperatures come here in steps of ${Number(step.toPrecision(2))} °C, as one of them stands far out: too coarse for this range.`
+      : null;
   }
 
   /** There is a library, and the robot gives what it needs. */
@@ -231,9 +246,20 @@ export class Fusing {
       this.failed(messageOf(error));
       return;
     }
+    this.#stay();
+    this.events.resubscribe();
+  }
+
+  #stay(): void {
+    this.#wantsRaw = true;
     this.store.fusingPlace = 'here';
     this.tiles.setHere(true);
-    this.events.resubscribe();
+  }
+
+  /** The link is lost while the robot made the colours, and all that is drawn could be fused here. */
+  #isAllHereWithoutLink(): boolean {
+    const { drawn, raw } = this.tiles.rawCounts();
+    return !this.store.connected && drawn > 0 && raw === drawn;
   }
 
   /** The robot makes colours again; until they are there what is here is shown, in the same settings. */

@@ -23,4 +23,17 @@ describe('the age of a map', () => {
     age.newestIs(1033, 1005);
     expect(age.at(1005)).toBe(2);
   });
+
+  it('forgets a time that was wrong, when the map takes it back', () => {
+    const age = new MapAge();
+    age.newestIs(990, 1000);
+    age.newestIs(1.7e12, 1001);
+    expect(age.at(1002)).toBeCloseTo(1);
+    age.newestIs(1000, 1003);
+    expect(age.at(1003)).toBe(3);
+    age.newestIs(1.7e12, 1004);
+    age.newestIs(null, 1005);
+    age.newestIs(1004, 1006);
+    expect(age.at(1006)).toBe(2);
+  });
 });

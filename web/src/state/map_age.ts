@@ -1,7 +1,7 @@
 /**
  * How long ago the newest part of a live map was seen: by the times of whoever saw it, and this machine's clock. Where that is found to
  * be behind, because something has been seen that is still to come, it is put right by as much; nothing tells that it is ahead, and then
- * ages are told too large rather than too small.
+ * ages are told too large rather than too small. A time that the map takes back says nothing about the clock any more.
  */
 export class MapAge {
   #newest_s: number | null = null;
@@ -9,6 +9,8 @@ export class MapAge {
 
   /** The map says when its newest part was seen (Unix seconds); null: of none that is known. */
   newestIs(newest_s: number | null, now_s: number): void {
+    const isTakenBack = this.#newest_s !== null && (newest_s ?? -Infinity) < this.#newest_s;
+    if (isTakenBack) this.#behind_s = 0;
     this.#newest_s = newest_s;
     if (newest_s !== null) this.#behind_s = Math.max(this.#behind_s, newest_s - now_s);
   }

@@ -524,10 +524,10 @@ describe('TileSet, raw layers', () => {
     tiles.updateSelection();
     tiles.addRaw(rawFrame(root), { kind: 'visible', rgb: new Uint8Array(9) });
     expect(top.raw).toBeNull();
-    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 0 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 0, step_celsius: 0 });
     addRaw(root);
     expect(top.raw).toMatchObject({ scale: 0.01, offset: 20 });
-    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
   });
 
   it('of another revision wait for their geometry', () => {

@@ -48,7 +48,7 @@ interface Shown {
   /** Rank of what was asked for that they answer: what they may hide, and be hidden by, is decided by it. */
   answer: number;
   /** The drawing side has both raw layers of this geometry. */
-  hasRaw: boolean;
+  rawStep_celsius: number | null;
   /** The server that is or was connected knows that this geometry is held here. */
   isKnownToServer: boolean;
 }
@@ -154,17 +154,19 @@ export class TileSet {
 
   /** Of these claims, by their places, those of which both raw layers are here. */
   rawOf(claims: readonly TileClaim[]): number[] {
-    const hasRaw = ([level, x, y, z]: TileClaim) => this.#nodes.get(tileKey({ level, x, y, z }))?.shown?.hasRaw === true;
+    const hasRaw = ([level, x, y, z]: TileClaim) => this.#nodes.get(tileKey({ level, x, y, z }))?.shown?.rawStep_celsius != null;
     return claims.flatMap((claim, place) => (hasRaw(claim) ? [place] : []));
   }
 
-  /** How many tiles are drawn, and how many of them can be fused here. */
-  rawCounts(): { drawn: number; raw: number } {
-    const counts = { drawn: 0, raw: 0 };
+  /** How many tiles are drawn, how many of them can be fused here, and the coarsest step in which the temperatures of one came. */
+  rawCounts(): { drawn: number; raw: number; step_celsius: number } {
+    const counts = { drawn: 0, raw: 0, step_celsius: 0 };
     for (const { shown } of this.#drawn) {
       if (shown === null) continue;
       counts.drawn += 1;
-      if (shown.hasRaw) counts.raw += 1;
+      if (shown.rawStep_celsius === null) continue;
+      counts.raw += 1;
+      counts.step_celsius = Math.max(counts.step_celsius, shown.rawStep_celsius);
     }
     return counts;
   }
@@ -377,7 +379,7 @@ export class TileSet {
     const generations = new Set<number | null>();
     for (const { shown } of this.#drawn) {
       if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
-      if (this.#isHere && shown.hasRaw) continue;
+      if (this.#isHere && shown.rawStep_celsius !== null) continue;
       generations.add(this.#isStale(shown) ? null : shown.answer - this.#rank(0));
     }
     return generations;
@@ -419,7 +421,7 @@ export class TileSet {
 
   #answerOf(shown: Shown | null): number {
     if (shown === null) return NOTHING;
-    return this.#isHere && shown.hasRaw ? HERE : shown.answer;
+    return this.#isHere && shown.rawStep_celsius !== null ? HERE : shown.answer;
   }
 
   /** Nothing that the tile stands for has newer colours. */
@@ -496,7 +498,7 @@ export class TileSet {
       node.waitingRaw = null;
       checkRaw(node, raw, shown.geometry);
       shown.drawable.setRaw(raw);
-      shown.hasRaw = true;
+      shown.rawStep_celsius = scale;
       this.#changed(node);
     } else if (this.#isHere && waitingGeometry !== null && waitingGeometry.revision === revision) {
       node.waitingRaw = null;
@@ -515,7 +517,7 @@ export class TileSet {
         error,
         rank,
         answer: rank,
-        hasRaw: true,
+        rawStep_celsius: scale,
         isKnownToServer: true,
       };
       if (node.isDrawn) drawable.setVisible(true);
@@ -547,7 +549,16 @@ export class TileSet {
       const drawable = this.createDrawable(geometry, rgba);
       error.rounding_levels = roundingOf(rgba);
       const answer = this.#answer(generation);
-      node.shown = { drawable, geometry: geometry.summary, revision, error, rank, answer, hasRaw: false, isKnownToServer: true };
+      node.shown = {
+        drawable,
+        geometry: geometry.summary,
+        revision,
+        error,
+        rank,
+        answer,
+        rawStep_celsius: null,
+        isKnownToServer: true,
+      };
       if (node.isDrawn) drawable.setVisible(true);
       this.#arrived(node);
     }
