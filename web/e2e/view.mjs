@@ -208,7 +208,7 @@ export function addViewTests(browser, scratch) {
     const scenes = {
       'one temperature': { text: sheet([21.5, 21.5, 21.5, 21.5]), says: /low 21\.5.*high 21\.5/, axis: /all 21\.5/ },
       'all missing': { text: sheet(['nan', 'nan', 'nan', 'nan']), says: /no thermal data/ },
-      'fill values': { text: sheet([20, '1e36', 30, 25]), says: /low 20\.0.*high 1e36/, axis: /hottest 1e36/ },
+      'fill values': { text: sheet([20, '1e36', 'inf', 25]), says: /low 20\.0.*high 1e36/, axis: /hottest 1e36.*1 over/ },
       'some missing': { text: sheet([20, 'nan', 30, 'nan']), says: /low 20\.0.*high 30\.0/, axis: /hottest 30\.0/, isGrey: true },
       'one vertex': { text: `${header(1, 0)}1 2 3 200 180 140 25\n`, says: /1 of 1 vertices/, axis: /all 25\.0/ },
       'two vertices': {
@@ -228,6 +228,16 @@ export function addViewTests(browser, scratch) {
         const html = await page.locator('main').evaluate((main) => main.outerHTML);
         assert.doesNotMatch(html, /NaN|undefined|Infinity|∞|\[object/, `${name} ${where}`);
         assert.deepEqual(problems, [], `${name} ${where}`);
+        const cut = await page.evaluate(() =>
+          [...document.querySelectorAll('.axis svg text')]
+            .filter((text) => {
+              const [box, edge] = [text, text.ownerSVGElement].map((element) => element.getBoundingClientRect());
+              const isBeside = box.left < edge.left - 0.5 || box.right > edge.right + 0.5;
+              return isBeside || box.top < edge.top - 0.5 || box.bottom > edge.bottom + 0.5;
+            })
+            .map(({ textContent }) => textContent),
+        );
+        assert.deepEqual(cut, [], `${name} ${where}: cut by the axis`);
       };
       assert.match((await page.locator('footer').innerText()).replaceAll(/\s+/g, ' '), says, name);
       if (axis === undefined) assert.equal(await page.locator('.axis').count(), 0, name);
