@@ -111,7 +111,8 @@ bool may_be_seen(const DepthLook& look, const KernelCamera& camera, GridPlace at
 
 }  // namespace
 
-void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool) {
+std::size_t fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool,
+                       std::uint64_t most_bytes) {
   const double voxel_m = map.voxel_m();
   const DistanceKernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
                               depth.frame.depth_m.data(),
@@ -123,7 +124,12 @@ void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
                               static_cast<float>(kBehindSigmas * depth.noise.growth_per_m),
                               static_cast<float>(depth.noise.from_m)};
   std::vector<std::uint8_t> is_near;
+  std::size_t not_made = 0;
   for (const GridPlace& place : blocks_near_surface(depth, voxel_m, pool)) {
+    if (map.would_be_beyond(place, most_bytes)) {
+      ++not_made;
+      continue;
+    }
     const auto block = static_cast<std::size_t>(map.ensure(place));
     if (block >= is_near.size()) is_near.resize(static_cast<std::size_t>(map.block_end()), 0);
     is_near[block] = 1;
@@ -186,6 +192,7 @@ void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour,
   for (const std::int32_t block : blocks) {
     if (map.head(block).is_free && is_near[static_cast<std::size_t>(block)] == 0) map.remove(block);
   }
+  return not_made;
 }
 
 FitOfDepth fit_of(const VoxelMap& map, const DepthLook& depth, jobs::WorkerPool& pool) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "server/mapping/depth_frame.hpp"
@@ -33,7 +34,10 @@ struct ColourLook {
 ///
 /// A mean is kept as distance += (new - distance) w / (W + w), rounded to the nearest whole number but at least by one step towards the
 /// new value, so that it never stalls however heavy W is; W is at most kWeightMost.
-void fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool);
+///
+/// When the blocks of the map take `most_bytes`, no more are made; what there is goes on. The number of blocks that were not made.
+std::size_t fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* colour, jobs::WorkerPool& pool,
+                       std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max());
 
 /// How well a depth picture fits the map where a pose puts it: pixels of a grid where both have something.
 struct FitOfDepth {

@@ -44,8 +44,9 @@ enum class FaultKind {
   NoCalibration,  ///< A picture of a camera that the calibration does not have.
   UnreadablePose,
   BackwardPose,
+  MapFull,  ///< Something new was not mapped: the map takes all the memory that it may.
 };
-inline constexpr std::size_t kFaultKinds = 12;
+inline constexpr std::size_t kFaultKinds = 13;
 
 /// The account of what was wrong.
 class FaultLog {

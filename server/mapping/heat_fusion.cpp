@@ -23,6 +23,7 @@ constexpr float kAfterShutter = 10;   ///< Times the variance.
 constexpr float kMostVariance = 9;    ///< K^2; a look that knows less says nothing.
 constexpr float kNewHeat = 1000;      ///< Kelvin by which a first temperature counts as a change.
 constexpr float kContradiction = 25;  ///< Variances; a look that is farther off than that tells of a change.
+constexpr float kRemembered = 0.98F;  ///< Of how sure looks were, from one picture to the next.
 constexpr std::size_t kLeastCompared = 300;
 /// How an offset may have wandered when nothing tells it: at once, and as a random walk.
 constexpr double kUntoldKelvin = 0.3, kWanderKelvin = 0.05;
@@ -261,11 +262,14 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
   pool.for_each(looks.size(), [&](std::size_t chunk) {
     // The looks of a block follow each other.
     std::int32_t block = -1;
-    float warmest = 0, hottest = -1000;
+    float warmest = 0, hottest = -1000, weights = 0, certain = 0, count = 0;
     const auto note = [&] {
       if (block < 0) return;
-      map.head(block).warmed += warmest;
-      map.head(block).hottest = std::max(map.head(block).hottest, hottest);
+      BlockHead& head = map.head(block);
+      head.heat_weight = kRemembered * head.heat_weight + weights / count;
+      head.heat_weight_certain = kRemembered * head.heat_weight_certain + certain / count;
+      head.warmed += warmest;
+      head.hottest = std::max(head.hottest, hottest);
     };
     for (const Look& look : looks[chunk]) {
       if (look.block != block) {
@@ -273,7 +277,11 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
         block = look.block;
         warmest = 0;
         hottest = -1000;
+        weights = certain = count = 0;
       }
+      weights += 1 / look.scale;
+      certain += 1 / (look.scale * std::sqrt(look.scale * std::sqrt(look.scale)));
+      count += 1;
       HeatBlock& heat = map.heat(look.block);
       float& celsius = heat.celsius[look.voxel];
       float& variance = heat.variance[look.voxel];

@@ -103,11 +103,11 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
     is_doubtful_ = false;
   }
   if (submaps_) submaps_->step(frame.time_s + calibration_.depth.delay_s, pose.pose);
-  fuse_prepared(frame, look, trajectory);
+  fuse_prepared(frame, look, trajectory, faults);
   return true;
 }
 
-void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory) {
+void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory, FaultLog& faults) {
   std::optional<ColourLook> colour;
   if (!frame.colour.empty() && settings_.use_colour) {
     const PoseAnswer at = trajectory.at(frame.colour_time_s.value_or(frame.time_s) + calibration_.colour->delay_s);
@@ -117,7 +117,14 @@ void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Traj
       ++figures_.colour_frames;
     }
   }
-  fuse_depth(fused(), look, colour ? &*colour : nullptr, pool_);
+  const std::size_t not_made = fuse_depth(fused(), look, colour ? &*colour : nullptr, pool_, settings_.most_bytes);
+  if (not_made > 0) {
+    faults.add(FaultKind::MapFull, "at " + seconds_text(frame.time_s) + " the voxels of the map take " +
+                                       std::to_string(settings_.most_bytes) +
+                                       " bytes, as many as they may: nothing new is mapped, what is known goes on; map "
+                                       "with larger voxels, or with "
+                                       "another --limit scene-bytes");
+  }
   ++figures_.depth_frames;
 }
 
@@ -171,7 +178,8 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
         prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
     if (const auto pose = track(frame, depth, trajectory, faults)) {
       tracked_.add(frame.time_s + calibration_.depth.delay_s, *pose);
-      fuse_prepared(frame, {depth, calibration_.depth.camera, rays_, calibration_.depth.noise, *pose}, tracked_);
+      fuse_prepared(frame, {depth, calibration_.depth.camera, rays_, calibration_.depth.noise, *pose}, tracked_,
+                    faults);
     }
   }
   // What was taken before the last pose that is known has one, or will never have one.

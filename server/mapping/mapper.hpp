@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -25,6 +27,8 @@ struct MapperSettings {
   bool use_thermal = true;
   bool is_tracking = false;  ///< Poses are found from what is seen; of those that are given only the first counts.
   std::optional<SubmapRules> submaps;  ///< Of given poses: the map is made in parts, which correct() moves.
+  /// Of the blocks of voxels, of each submap where there are some. A map that has taken them maps nothing new, says so (MapFull), and goes on with what it has.
+  std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
   HeatRules heat;
   MeshRules mesh;
   TrackerRules tracker;
@@ -61,7 +65,7 @@ class Mapper {
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
   /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
   UnitMesh whole_mesh(const base::Progress& progress = {});
-  static constexpr double kSystematic = 0.5;
+  static constexpr double kSystematic = 1;
   static constexpr std::string_view kMeshingPhase = "meshing";
 
   /// What has changed since the last call with this publisher; of at most about `most` units (UnitPublisher::take).
@@ -94,7 +98,7 @@ class Mapper {
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
-  void fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory);
+  void fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory, FaultLog& faults);
   void fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
   /// The pose of the depth camera at a moment, by tracking.
   std::optional<Eigen::Isometry3d> track(const Frame& frame, const DepthFrame& depth, const Trajectory& trajectory,

@@ -52,6 +52,7 @@ unsigned bits_of(const RowFlags& flags) {
 struct Neighbourhood {
   std::array<const VoxelBlock*, 8> voxels{};  ///< The block and those beyond, by bits of x, y, z; null: none.
   std::array<const HeatBlock*, 8> heat{};
+  std::array<float, 8> certainty{};  ///< BlockHead::heat_certainty.
   std::array<std::uint16_t, kEdge * kEdge> known{}, inside{};
 
   /// The block, by its number in the eight, and the index within it of a voxel at 0..8 each.
@@ -123,6 +124,7 @@ class Mesher {
       const std::int32_t found = unit == nullptr ? -1 : unit->blocks[index_within(at, 2)];
       around_.voxels[static_cast<std::size_t>(i)] = found < 0 ? nullptr : &map_.voxels(found);
       around_.heat[static_cast<std::size_t>(i)] = found < 0 || map_.head(found).heat < 0 ? nullptr : &map_.heat(found);
+      around_.certainty[static_cast<std::size_t>(i)] = found < 0 ? 1.0F : map_.head(found).heat_certainty();
       may_be_inside = may_be_inside || (found >= 0 && map_.head(found).has_inside);
       may_be_outside = may_be_outside || (found >= 0 && map_.head(found).has_outside);
     }
@@ -195,7 +197,7 @@ class Mesher {
     mesh_.positions.push_back({metres(base_.x, from.x, edge.axis == 0), metres(base_.y, from.y, edge.axis == 1),
                                metres(base_.z, from.z, edge.axis == 2)});
     add_colour(a, voxel_a, b, voxel_b, share);
-    add_temperature(around_.heat[block_a], voxel_a, around_.heat[block_b], voxel_b, static_cast<float>(share));
+    add_temperature(block_a, voxel_a, block_b, voxel_b, static_cast<float>(share));
   }
 
   void add_colour(const VoxelBlock& a, std::size_t voxel_a, const VoxelBlock& b, std::size_t voxel_b, double share) {
@@ -214,14 +216,16 @@ class Mesher {
 
   /// What a voxel knows of its temperature.
   struct Heat {
-    float celsius = 0, variance = std::numeric_limits<float>::infinity(), seen_s = 0;
+    float celsius = 0, variance = std::numeric_limits<float>::infinity(), own_variance = 0, seen_s = 0;
   };
-  static Heat heat_of(const HeatBlock* heat, std::size_t voxel) {
+  Heat heat_of(std::size_t block, std::size_t voxel) const {
+    const HeatBlock* heat = around_.heat[block];
     if (heat == nullptr) return {};
-    return {heat->celsius[voxel], heat->variance[voxel], heat->seen_s[voxel]};
+    return {heat->celsius[voxel], heat->variance[voxel], heat->variance[voxel] * around_.certainty[block],
+            heat->seen_s[voxel]};
   }
 
-  void add_temperature(const HeatBlock* block_a, std::size_t voxel_a, const HeatBlock* block_b, std::size_t voxel_b,
+  void add_temperature(std::size_t block_a, std::size_t voxel_a, std::size_t block_b, std::size_t voxel_b,
                        float share) {
     const Heat a = heat_of(block_a, voxel_a), b = heat_of(block_b, voxel_b);
     // Never quite 0, so that a voxel that knows nothing leaves it to the other, however far that is.
@@ -235,9 +239,9 @@ class Mesher {
     }
     mesh_.celsius.push_back((of_a * a.celsius + of_b * b.celsius) / sum);
     // The looks of both are the same looks: together they know no more than the mean of what each knows.
-    const float mixed = std::isinf(a.variance)   ? b.variance
-                        : std::isinf(b.variance) ? a.variance
-                                                 : (of_a * a.variance + of_b * b.variance) / sum;
+    const float mixed = std::isinf(a.variance)   ? b.own_variance
+                        : std::isinf(b.variance) ? a.own_variance
+                                                 : (of_a * a.own_variance + of_b * b.own_variance) / sum;
     mesh_.sigma_kelvin.push_back(std::sqrt(mixed + rules_.least_sigma_kelvin * rules_.least_sigma_kelvin));
     mesh_.seen_s.push_back(std::isinf(a.variance)   ? b.seen_s
                            : std::isinf(b.variance) ? a.seen_s

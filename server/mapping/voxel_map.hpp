@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cstddef>
@@ -58,6 +59,12 @@ struct BlockHead {
   bool is_free = true;  ///< Nothing but unseen space and what is well before surfaces.
   /// At most so much has changed since the unit was meshed: distance in voxels, temperature in kelvin, colour in levels.
   float moved = 0, warmed = 0, recoloured = 0;
+  /// Of its looks by the thermal camera: sums of 1 / s and of 1 / s^1.75 that forget slowly, s being what the variance of each is
+  /// multiplied by beyond that of its pixel, so that it weighs less.
+  float heat_weight = 0, heat_weight_certain = 0;
+  /// What variances of its temperatures are to be multiplied by to be those of the errors, at most 1: looks from afar are weighed down by more
+  /// than they err, which grows about as the fourth root of s.
+  float heat_certainty() const { return heat_weight > 0 ? std::min(1.0F, heat_weight_certain / heat_weight) : 1.0F; }
   float hottest = -1000;  ///< Of the temperatures that were told since; -1000: none was.
 };
 
@@ -82,6 +89,8 @@ class VoxelMap {
   std::int32_t ensure(GridPlace block);
   /// Gives a block temperatures; all unseen.
   void add_heat(std::int32_t block);
+  /// Whether ensure() would make a block of that place although the map has taken `most_bytes` or more.
+  bool would_be_beyond(GridPlace block, std::uint64_t most_bytes) const;
   /// Takes out a block; its room is used again.
   void remove(std::int32_t block);
 

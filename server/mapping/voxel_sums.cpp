@@ -96,6 +96,7 @@ void VoxelSums::add_single() {
   if (!sums_) sums_ = std::make_unique<std::array<Sum, kBlockVoxels>>();
   if (single_map_ == nullptr) return;
   const VoxelBlock& voxels = single_map_->voxels(single_block_);
+  const float certainty = single_map_->head(single_block_).heat_certainty();
   const HeatBlock* heat = single_map_->head(single_block_).heat >= 0 ? &single_map_->heat(single_block_) : nullptr;
   for (std::size_t v = 0; v < kBlockVoxels; ++v) {
     Known known;
@@ -106,7 +107,7 @@ void VoxelSums::add_single() {
     known.green = voxels.green[v];
     known.blue = voxels.blue[v];
     if (heat != nullptr && std::isfinite(heat->variance[v])) {
-      known.variance = heat->variance[v];
+      known.variance = certainty * heat->variance[v];
       known.celsius = heat->celsius[v];
       known.seen_s = heat->seen_s[v];
     }
@@ -163,7 +164,7 @@ void VoxelSums::add(const VoxelMap& map, const Eigen::Isometry3d& grid_from_worl
       const HeatBlock& heat = map.heat(from);
       if (!std::isfinite(heat.variance[k])) continue;
       warm += part;
-      known.variance += part * heat.variance[k];
+      known.variance += part * map.head(from).heat_certainty() * heat.variance[k];
       known.celsius += part * heat.celsius[k];
       known.seen_s = std::max(known.seen_s, heat.seen_s[k]);
     }

@@ -69,6 +69,19 @@ TEST_F(MapperTest, DoesNotWaitForAMissingModality) {
   EXPECT_FALSE(mapper.whole_mesh().positions.empty());
 }
 
+TEST_F(MapperTest, MapsNothingNewBeyondItsMemoryAndSaysSo) {
+  Mapper free(calibration_, settings_, pool_);
+  free.fuse(frame_at(0), trajectory_, faults_);
+  const std::size_t blocks = free.map().block_count();
+  settings_.most_bytes = blocks * (sizeof(VoxelBlock) + sizeof(HeatBlock) + sizeof(BlockHead)) / 2;
+  Mapper mapper(calibration_, settings_, pool_);
+  for (int i = 0; i < 6; ++i) mapper.fuse(frame_at(0.3 * i), trajectory_, faults_);
+  EXPECT_NEAR(static_cast<double>(mapper.map().block_count()), static_cast<double>(blocks) / 2, 1);
+  EXPECT_EQ(mapper.figures().depth_frames, 6U) << "what is known goes on";
+  EXPECT_EQ(faults_.of(FaultKind::MapFull).count, 6U);
+  EXPECT_NE(faults_.of(FaultKind::MapFull).what.find("--limit scene-bytes"), std::string::npos);
+}
+
 TEST_F(MapperTest, SaysThatAPoseIsFartherThanItCounts) {
   Trajectory far;
   for (int i = 0; i <= 10; ++i) {
