@@ -8,6 +8,8 @@
 namespace spectra::mapping {
 namespace {
 
+/// Of the eight voxels about a place, by their parts: less tells nothing of it.
+constexpr float kLeastSeen = 0.5F;
 /// Blocks that a turned block may reach each way.
 constexpr int kReach = 4;
 
@@ -141,15 +143,14 @@ void VoxelSums::add(const VoxelMap& map, const Eigen::Isometry3d& grid_from_worl
     const GridPlace base{static_cast<std::int32_t>(floor.x()), static_cast<std::int32_t>(floor.y()),
                          static_cast<std::int32_t>(floor.z())};
     Known known;
-    float coloured = 0, warm = 0;
-    bool is_known = true;
-    for (int c = 0; c < 8 && is_known; ++c) {
+    float seen = 0, coloured = 0, warm = 0;
+    for (int c = 0; c < 8; ++c) {
       const float part = ((c & 1) != 0 ? share.x() : 1 - share.x()) * ((c & 2) != 0 ? share.y() : 1 - share.y()) *
                          ((c & 4) != 0 ? share.z() : 1 - share.z());
       if (part <= 0) continue;
       const auto [from, k] = around.at({base.x + (c & 1), base.y + (c >> 1 & 1), base.z + (c >> 2)});
-      is_known = from >= 0 && map.voxels(from).weight[k] > 0;
-      if (!is_known) break;
+      if (from < 0 || map.voxels(from).weight[k] == 0) continue;
+      seen += part;
       const VoxelBlock& voxels = map.voxels(from);
       known.weight += part * static_cast<float>(voxels.weight[k]);
       known.distance += part * static_cast<float>(voxels.distance[k]);
@@ -168,7 +169,8 @@ void VoxelSums::add(const VoxelMap& map, const Eigen::Isometry3d& grid_from_worl
       known.celsius += part * heat.celsius[k];
       known.seen_s = std::max(known.seen_s, heat.seen_s[k]);
     }
-    if (!is_known) continue;
+    if (seen < kLeastSeen) continue;
+    known.distance /= seen;
     if (coloured > 0) {
       for (float* channel : {&known.red, &known.green, &known.blue}) *channel /= coloured;
     }

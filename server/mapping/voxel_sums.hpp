@@ -28,7 +28,7 @@ class VoxelSums {
 
   /// Of a map on the same grid: the block in the same place.
   void add(const VoxelMap& map, std::int32_t block);
-  /// Of a map that stands elsewhere: linear between the eight voxels around each; nothing where one of them was never seen.
+  /// Of a map that stands elsewhere: linear between those of the eight voxels around each that were ever seen; nothing where they are less than half.
   void add(const VoxelMap& map, const Eigen::Isometry3d& grid_from_world, GridPlace block);
 
   /// One block alone on the same grid comes back as it was.
