@@ -233,6 +233,7 @@ int run_serve(const ServeOptions& options) {
   SceneLoader loader(options, *served, map, *server);
   mapping::MapperSettings mapping;
   mapping.voxel_m = options.voxel_m.value_or(options.is_demo_drive ? 0.02 : 0.01);
+  mapping.most_bytes = options.limits.scene_bytes;
   mapping.is_tracking = options.is_tracking;
   if (options.has_submaps) mapping.submaps.emplace();
   if (frames) {

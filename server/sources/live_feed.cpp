@@ -55,6 +55,8 @@ std::string code_of(FaultKind kind) {
       return "wrong_size";
     case FaultKind::DamagedFile:
       return "damaged_picture";
+    case FaultKind::MapFull:
+      return "map_full";
     default:
       return "not_mapped";
   }

@@ -142,6 +142,7 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   for (const mapping::FrameFault& fault : faults.all()) {
     if (fault.count > 0) spdlog::warn("{} ({} times)", fault.what, fault.count);
   }
+  if (hand_over_.refused_count() > 0) spdlog::warn("{} units were refused by the map", hand_over_.refused_count());
   spdlog::info("mapping is done: {} depth and {} thermal frames, {} blocks of voxels", mapper.figures().depth_frames,
                mapper.figures().thermal_frames, mapper.map().block_count());
 }

@@ -36,7 +36,12 @@ bool UnitHandOver::operator()(std::vector<mapping::PublishedUnit> units, const F
     const auto done = [state = state_, id = unit.id](const auto& outcome) {
       --state->under_way;
       const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
-      if (refusal != nullptr && !state->is_over) spdlog::warn("{} is refused: {}", id, refusal->reason);
+      if (refusal == nullptr || state->is_over) return;
+      // A map that is full refuses one after the other.
+      constexpr std::size_t kSaidEvery = 1000;
+      const std::size_t count = ++state->refused;
+      if (count == 1 || count % kSaidEvery == 0)
+        spdlog::warn("{} is refused: {} ({} units so far)", id, refusal->reason, count);
     };
     if (unit.mesh.triangles.empty()) {
       map_.remove(unit.id, done, MapKeeper::WhenFull::Take);

@@ -35,6 +35,9 @@ class UnitHandOver {
   /// False: it is over, or cannot be done.
   bool operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment);
 
+  /// Units that the map has refused.
+  std::size_t refused_count() const { return state_->refused; }
+
   /// From any thread: nothing is waited for any more.
   void end() { state_->is_over = true; }
   bool is_over() const { return state_->is_over; }
@@ -45,7 +48,7 @@ class UnitHandOver {
   /// Shared with answers that may come when this is gone.
   struct State {
     std::atomic<bool> is_over{false};
-    std::atomic<std::size_t> under_way{0};
+    std::atomic<std::size_t> under_way{0}, refused{0};
   };
   const std::shared_ptr<State> state_ = std::make_shared<State>();
 };
