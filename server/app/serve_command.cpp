@@ -248,7 +248,8 @@ int run_serve(const ServeOptions& options) {
         mapping,
         sources::LiveFeed::Sinks{
             [&hand_over](auto units, const auto& moment) { return (*hand_over)(std::move(units), moment); },
-            [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); }},
+            [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); },
+            [&hand_over] { return hand_over->room(); }},
         [&loader] { return loader.is_done(); });
     server->set_frame_receiver(*live);
   }

@@ -23,7 +23,7 @@ using protocol::FrameSensor;
 using protocol::FramesKind;
 
 constexpr std::chrono::milliseconds kLookEvery{50};
-constexpr double kPublishEveryS = 0.5;
+constexpr double kPublishEveryS = 0.2;
 /// After a picture was skipped fewer are asked for as long.
 constexpr double kOverloadS = 2;
 /// Of what it could do that is asked for, so that it catches up.
@@ -414,11 +414,13 @@ void LiveFeed::work() {
       next->second.done(std::move(outcome));
     }
     const bool is_due = steady_s() - last_published_s >= kPublishEveryS;
-    if (has_changed_ && is_due) {
-      last_published_s = steady_s();
-      has_changed_ = false;
-      if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_), moment_)) return;
-    }
+    if (!mapper_ || !is_due || !(has_changed_ || publisher_.waiting_count() > 0)) continue;
+    // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
+    const std::size_t room = sinks_.room();
+    if (room == 0) continue;
+    last_published_s = steady_s();
+    has_changed_ = false;
+    if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_)) return;
   }
 }
 

@@ -38,6 +38,8 @@ class LiveFeed final : public net::FrameReceiver {
     /// As FeedRun::hand_over.
     std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment&)> hand_over;
     std::function<void(const RobotPose& pose, bool is_last)> moved;
+    /// Units that can be handed over without waiting.
+    std::function<std::size_t()> room = [] { return mapping::UnitPublisher::kAll; };
   };
 
   /// Takes nobody's frames before `may_begin`.

@@ -24,6 +24,11 @@ std::vector<std::pair<std::string, std::string>> unit_query(const std::string& u
   return query;
 }
 
+std::size_t UnitHandOver::room() const {
+  const std::size_t under_way = state_->under_way;
+  return under_way < kUnderWay ? kUnderWay - under_way : 0;
+}
+
 bool UnitHandOver::operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
   constexpr std::chrono::milliseconds kWait{10};
   for (mapping::PublishedUnit& unit : units) {

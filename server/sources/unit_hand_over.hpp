@@ -35,6 +35,8 @@ class UnitHandOver {
   /// False: it is over, or cannot be done.
   bool operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment);
 
+  /// Units that it would take now without waiting.
+  std::size_t room() const;
   /// Units that the map has refused.
   std::size_t refused_count() const { return state_->refused; }
 
