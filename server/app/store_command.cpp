@@ -80,7 +80,7 @@ int run_store_salvage(const StoreSalvageOptions& options) {
   fmt::print("{}: {}, {}, {} rescued; {}\n", options.output.string(), counted(found.block_count, "block"),
              counted(found.earlier_count, "earlier revision"), counted(found.constant_count, "constant"),
              found.lost.empty() ? "nothing is lost" : "what is lost stands on standard error");
-  return kDone;
+  return found.lost.empty() ? kDone : kJobFailed;
 }
 
 }  // namespace spectra::app

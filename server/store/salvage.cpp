@@ -216,6 +216,12 @@ StoreResult<SalvageReport> salvage(const std::string& file, const std::string& i
     found = search(pages, progress);
     report.lost.emplace_back("the log has a bad place; of what was written last, something may be missing");
   }
+  if (found.state && found.state->is_open && !log.exists) {
+    report.lost.push_back(
+        "the store was not closed in order, and its log " + file +
+        "-wal is missing: what was acknowledged last stood there, and nobody knows how much that was; "
+        "bring the log back if it is anywhere");
+  }
   if (found.changes.empty() && found.constants.empty() && !found.state) {
     return failure(StoreErrorCode::Damaged, "nothing of a Spectra store is to be found in " + file);
   }

@@ -229,6 +229,16 @@ TEST(StoreSalvage, OfAHealthyStoreLosesNothing) {
   }
 }
 
+TEST(StoreSalvage, SaysThatTheLogIsMissing) {
+  const StoreFixture here;
+  const KilledStore killed = killed_store();
+  write_content(here.file(), killed.file);
+  const auto report = salvage(here.file(), here.file() + ".rescued", no_progress);
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_FALSE(report.value().lost.empty());
+  EXPECT_NE(report.value().lost.front().find("-wal is missing"), std::string::npos) << report.value().lost.front();
+}
+
 TEST(StoreSalvage, SaysWhichBlockIsLostAndWhatStandsInItsPlace) {
   const StoreFixture here;
   {
