@@ -107,11 +107,17 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
       ->excludes(scene)
       ->excludes("--demo");
   command
-      ->add_option("--history", options.history_bytes,
-                   "Bytes that earlier revisions of blocks may take in the store, such as 500MB")
-      ->transform(CLI::AsSizeValue(false))
+      ->add_option(
+          "--history", options.history_bytes,
+          "Bytes that earlier revisions of blocks may take in the store, such as 500MB (of 1000) or 500MiB (of 1024)")
+      ->transform(CLI::AsSizeValue(true))
+      ->transform(CLI::Validator(
+          [](std::string& text) {
+            return text.starts_with('-') ? std::string("a size of 0 bytes or more is wanted") : std::string();
+          },
+          ""))
       ->needs("--store")
-      ->default_str("1GB");
+      ->default_str("1GiB");
   const auto set_time = [&options](const std::string& text) {
     options.at = store::time_of(text);
     if (!options.at)
@@ -245,7 +251,12 @@ void add_push(CLI::App& app, PushOptions& options, Run& run) {
       ->required();
   command->add_option("--to", options.to, "The server, such as http://127.0.0.1:8080")->required();
   command->add_option("--rate", options.blocks_per_s, "Blocks a second at most")->check(CLI::Range(1e-3, 1e6));
-  command->add_option("--id", options.id, "The name of the block, for one file; else the file's without its ending");
+  command->add_option("--id", options.id, "The name of the block, for one file; else the file's without its ending")
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            return text.empty() ? std::string("an id has 1 to 64 letters") : std::string();
+          },
+          ""));
   const auto is_time = [](const std::string& text) {
     char* end = nullptr;
     const double seconds = std::strtod(text.c_str(), &end);

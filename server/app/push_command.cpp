@@ -46,6 +46,10 @@ std::optional<std::string> block_id_of(const fs::path& path) {
   return std::nullopt;
 }
 
+std::string no_name(const std::string& id) {
+  return "\"" + id + "\" is no name of a block (1 to 64 of a-z A-Z 0-9 . _ -); rename the file";
+}
+
 base::Result<std::vector<BlockFile>> block_files(const PushOptions& options) {
   const auto failed = [&](const std::string& what) {
     return base::failure(base::ErrorCode::FileUnreadable, options.input.string() + ": " + what);
@@ -71,11 +75,10 @@ base::Result<std::vector<BlockFile>> block_files(const PushOptions& options) {
             [](const auto& a, const auto& b) { return a.path.filename() < b.path.filename(); });
   std::map<std::string, fs::path> named;
   for (const BlockFile& file : files) {
-    if (!store::is_block_id(file.id)) {
+    // In a folder the others go on.
+    if (!store::is_block_id(file.id) && files.size() == 1) {
       return base::failure(base::ErrorCode::FileUnreadable,
-                           file.path.string() + ": \"" + file.id +
-                               "\" is no name of a block (1 to 64 of a-z A-Z 0-9 . _ -); rename the file" +
-                               (files.size() == 1 ? ", or name the block with --id" : ""));
+                           file.path.string() + ": " + no_name(file.id) + ", or name the block with --id");
     }
     const auto [other, is_new] = named.emplace(file.id, file.path);
     if (!is_new) {
@@ -155,6 +158,7 @@ class Push {
       warn(file.path.string() + ": " + why);
       return std::nullopt;
     };
+    if (!store::is_block_id(file.id)) return leave_out(no_name(file.id));
     std::ifstream in(file.path, std::ios::binary);
     std::error_code error;
     const auto size = fs::file_size(file.path, error);

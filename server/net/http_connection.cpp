@@ -55,6 +55,16 @@ std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
 }
 
+/// What is wrong with a request, in the form that its path has for errors: JSON where programs ask.
+HttpReply refused_request(std::string_view target, unsigned status, const std::string& reason) {
+  if (!target.starts_with("/api/")) return text_reply(status, reason + "\n");
+  const std::string code = status == 405   ? "method_not_allowed"
+                           : status == 413 ? "too_large"
+                           : status == 431 ? "header_too_large"
+                                           : "bad_request";
+  return refused({status, code, status == 400 ? "target" : "", reason, ""});
+}
+
 std::size_t count_of(const http::fields& fields, http::field name) {
   const auto [begin, end] = fields.equal_range(name);
   return static_cast<std::size_t>(std::distance(begin, end));
@@ -288,7 +298,7 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
     const unsigned status = error == http::error::header_limit || error == http::error::buffer_overflow ? 431U
                             : error == http::error::body_limit                                          ? 413U
                                                                                                         : 400U;
-    co_return co_await write(text_reply(status, error.message() + "\n"), 11, false, false);
+    co_return co_await write(refused_request(view(parser.get().target()), status, error.message()), 11, false, false);
   }
 
   Request request = parser.release();
@@ -445,12 +455,13 @@ std::optional<HttpReply> HttpConnection::refusal_of(const Request& request) {
       return refused({403, "forbidden", "", "pages of that origin may not change the map; see --allow-host", ""});
     }
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
-    auto reply = text_reply(405, "only GET and HEAD; blocks of the map also PUT and DELETE\n");
+    auto reply =
+        refused_request(view(request.target()), 405, "only GET and HEAD; blocks of the map also PUT and DELETE");
     reply.headers.emplace_back("Allow", "GET, HEAD");
     return reply;
   }
   const auto target = parsed_target(view(request.target()));
-  if (!target) return text_reply(400, "bad request target\n");
+  if (!target) return refused_request(view(request.target()), 400, "bad request target");
   who_ =
       context_.options.access->identify(view(request[http::field::authorization]), joined(request, http::field::cookie),
                                         peer_address_, is_from_here_, steady_seconds());

@@ -53,17 +53,32 @@ asio::awaitable<std::optional<std::size_t>> IngestSession::read_part(char* data,
   co_return read_bytes;
 }
 
-asio::awaitable<bool> IngestSession::skip_rest(std::uint64_t most_bytes) {
+asio::awaitable<std::optional<std::uint64_t>> IngestSession::skip_rest() {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 32U;
   std::array<char, 16 * 1024> forgotten;
+  std::uint64_t skipped = 0;
   while (!ws_.is_message_done()) {
     const auto count = co_await read_part(forgotten.data(), forgotten.size());
-    if (!count) co_return false;
-    if (*count > most_bytes) {
-      close(websocket::close_code::protocol_error, "a message is longer than it announces");
-      co_return false;
+    if (!count) co_return std::nullopt;
+    skipped += *count;
+    if (skipped > kMostBytes + protocol::kIngestTargetSize) {
+      close(websocket::close_code::protocol_error, "a message is longer than any may be");
+      co_return std::nullopt;
     }
-    most_bytes -= *count;
   }
+  co_return skipped;
+}
+
+asio::awaitable<bool> IngestSession::refuse_message(const protocol::IngestHeader& header, std::uint64_t read_bytes,
+                                                    BlockRefusal refusal) {
+  const auto skipped = co_await skip_rest();
+  if (!skipped) co_return false;
+  const std::uint64_t announced = header.message_size_bytes();
+  const std::uint64_t size_bytes = std::max(announced, protocol::kIngestHeaderSize + read_bytes + *skipped);
+  // What came beyond what was announced counts, too.
+  received_bytes_ += size_bytes - announced;
+  answer(header.sequence, size_bytes, std::move(refusal));
+  is_within_message_ = false;
   co_return true;
 }
 
@@ -77,6 +92,10 @@ asio::awaitable<bool> IngestSession::read_message() {
     close(websocket::close_code::unknown_data, "blocks are binary messages");
     co_return false;
   }
+  // Where that byte is not 0, the message is of another version perhaps, but its sequence and end are known.
+  constexpr std::size_t kReservedByte = 5;
+  const bool has_reserved = *head_bytes > kReservedByte && head[kReservedByte] != 0;
+  if (has_reserved) head[kReservedByte] = 0;
   const auto header = protocol::decoded_ingest_header(std::as_bytes(std::span(head.data(), *head_bytes)));
   if (!header) {
     close(websocket::close_code::protocol_error, header.error().message);
@@ -101,7 +120,9 @@ asio::awaitable<bool> IngestSession::read_message() {
 
   const std::uint64_t announced = incoming.header.message_size_bytes() - protocol::kIngestHeaderSize;
   std::optional<BlockRefusal> refusal;
-  if (incoming.header.body_size_bytes > limits.block_size_bytes) {
+  if (has_reserved) {
+    refusal = bad_request("reserved", "byte 5 of the message is not 0", "0");
+  } else if (incoming.header.body_size_bytes > limits.block_size_bytes) {
     refusal = BlockRefusal{413, "too_large", "body", "the block is larger than a block may be",
                            std::to_string(limits.block_size_bytes) + " bytes"};
   } else if (incoming.header.target_size_bytes > protocol::kIngestTargetSize) {
@@ -109,10 +130,7 @@ asio::awaitable<bool> IngestSession::read_message() {
                           std::to_string(protocol::kIngestTargetSize) + " bytes");
   }
   if (refusal) {
-    if (!co_await skip_rest(announced)) co_return false;
-    answer(incoming.header.sequence, incoming.header.message_size_bytes(), std::move(*refusal));
-    is_within_message_ = false;
-    co_return true;
+    co_return co_await refuse_message(incoming.header, 0, std::move(*refusal));
   }
   if (!co_await wait_for_room(incoming)) co_return false;
   incoming.target.resize(incoming.header.target_size_bytes);
@@ -122,7 +140,13 @@ asio::awaitable<bool> IngestSession::read_message() {
   const auto body_bytes = co_await read_part(incoming.body.data(), incoming.body.size());
   if (!body_bytes) co_return false;
   incoming.is_cut_short = *target_bytes + *body_bytes < announced;
-  if (!co_await skip_rest(0)) co_return false;
+  const auto excess = co_await skip_rest();
+  if (!excess) co_return false;
+  if (*excess > 0) {
+    co_return co_await refuse_message(incoming.header, announced + *excess,
+                                      bad_request("body", "the message is longer than it announces",
+                                                  std::to_string(incoming.header.message_size_bytes()) + " bytes"));
+  }
   is_within_message_ = false;
   if (is_stopping() || is_over()) co_return false;
   hand_over(std::move(incoming));

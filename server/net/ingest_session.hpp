@@ -50,9 +50,12 @@ class IngestSession final : public SenderSession {
   boost::asio::awaitable<bool> read_message();
   /// Reads to the end of the buffer or of the message: how much; nothing when the connection has ended.
   boost::asio::awaitable<std::optional<std::size_t>> read_part(char* data, std::size_t size_bytes);
-  /// Reads what is left of a message, at most so many bytes, and forgets it; false when the connection has ended, or when the
-  /// message is longer, which ends it.
-  boost::asio::awaitable<bool> skip_rest(std::uint64_t most_bytes);
+  /// Reads what is left of a message and forgets it: how many bytes; nothing when the connection has ended, or when they are more than any
+  /// message may have, which ends it.
+  boost::asio::awaitable<std::optional<std::uint64_t>> skip_rest();
+  /// Reads over the rest of a message of which `read_bytes` behind its header are read, and refuses it.
+  boost::asio::awaitable<bool> refuse_message(const protocol::IngestHeader& header, std::uint64_t read_bytes,
+                                              BlockRefusal refusal);
   boost::asio::awaitable<bool> wait_for_room(Incoming& incoming);
   void hand_over(Incoming incoming);
   void answer(std::uint64_t sequence, std::uint64_t size_bytes, BlockOutcome outcome);

@@ -71,8 +71,8 @@ std::string target_text(std::string_view path, const std::vector<std::pair<std::
 }
 
 std::optional<RequestTarget> parsed_target(std::string_view target) {
-  if (!target.starts_with('/')) return std::nullopt;
-  target = target.substr(0, target.find('#'));
+  // A fragment is no part of a request: what stands behind a # was meant to be something else.
+  if (!target.starts_with('/') || target.find('#') != std::string_view::npos) return std::nullopt;
   const auto question = target.find('?');
   auto path = percent_decoded(target.substr(0, question), false);
   if (!path || !has_plain_segments(*path)) return std::nullopt;

@@ -136,8 +136,11 @@ StoreResult<Revision> Catalogue::revision_at(StoreTime time) const {
     if (change->second.facts.accepted_at <= time) revision = change->first;
   }
   if (revision < history_floor_) {
-    return failure(StoreErrorCode::HistoryGone, "the history reaches back to " + utc_text(history_floor_at_) +
-                                                    "; what was before is no longer kept (--history BYTES keeps more)");
+    return failure(StoreErrorCode::HistoryGone,
+                   "the history reaches back to " +
+                       // Rounded up: what is said can be asked for.
+                       utc_text(std::chrono::ceil<std::chrono::seconds>(history_floor_at_)) +
+                       "; what was before is no longer kept (--history BYTES keeps more)");
   }
   return revision;
 }

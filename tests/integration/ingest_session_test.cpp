@@ -183,8 +183,12 @@ TEST_F(IngestSessionTest, RefusesABadMessageWithItsSequenceAndLivesOn) {
   EXPECT_EQ(refusal(3, message(3, "a", "x", static_cast<protocol::IngestKind>(7))), "bad_request kind");
   EXPECT_EQ(refusal(4, message(4, "a", "x", protocol::IngestKind::Remove)), "bad_request body");
   EXPECT_EQ(refusal(5, message(5, "a?scale=%zz", "x")), "bad_request target");
-  const std::string whole = message(6, "kitchen", "0123456789");
-  std::uint64_t sequence = 6;
+  EXPECT_EQ(refusal(6, message(6, "a", "x") + "and more"), "bad_request body");
+  std::string with_reserved = message(7, "a", "x");
+  with_reserved[5] = 1;
+  EXPECT_EQ(refusal(7, with_reserved), "bad_request reserved");
+  const std::string whole = message(8, "kitchen", "0123456789");
+  std::uint64_t sequence = 8;
   for (std::size_t size = protocol::kIngestHeaderSize; size < whole.size(); ++size, ++sequence) {
     EXPECT_EQ(refusal(sequence, message(sequence, "kitchen", "0123456789").substr(0, size)), "bad_request ");
   }
@@ -212,7 +216,7 @@ TEST_F(IngestSessionTest, ClosesWhereNoSequenceIsToBeBelieved) {
   }
   std::string other_version = good;
   other_version[3] = '2';
-  const std::vector<std::string> bad{other_version, std::string(500, 'z'), message(0, "a", "x"), good + "and more"};
+  const std::vector<std::string> bad{other_version, std::string(500, 'z'), message(0, "a", "x")};
   for (const std::string& bytes : bad) {
     RawWebSocket peer = sender();
     peer.send_frame(kBinary, bytes);

@@ -168,7 +168,7 @@ test("what was not acknowledged when the link broke is sent again, and what was 
 
 test("a folder becomes a map; what is refused or cannot be read is named, and the others go on", async () => {
   const server = await serve(["--live"]);
-  const where = folder("map", ["a.ply", "b.ply", "c.ply", "d.ply", "e.ply"]);
+  const where = folder("map", ["a.ply", "b.ply", "c.ply", "d.ply", "e.ply", "f f.ply"]);
   writeFileSync(path.join(where, "b.ply"), "no PLY");
   rmSync(path.join(where, "d.ply"));
   mkdirSync(path.join(where, "d.ply"));
@@ -178,8 +178,9 @@ test("a folder becomes a map; what is refused or cannot be read is named, and th
   assert.equal(status, 1);
   assert.match(errors, /^spectra: warning: .*b\.ply is refused: not a PLY file.*$/m);
   if (!isRoot) assert.match(errors, /^spectra: warning: .*e\.ply: cannot be read$/m);
+  assert.match(errors, /^spectra: warning: .*f f\.ply: "f f" is no name of a block .*$/m);
   const taken = isRoot ? ["a", "c", "e"] : ["a", "c"];
-  assert.match(errors, new RegExp(`^spectra: ${taken.length} of 4 blocks are acknowledged\n$`, "m"));
+  assert.match(errors, new RegExp(`^spectra: ${taken.length} of 5 blocks are acknowledged\n$`, "m"));
   assert.deepEqual((await blocksOf(server)).map(({ id }) => id), taken);
   await server.stop();
 });
@@ -243,6 +244,7 @@ test("says what is wrong with an address", async (t) => {
     [1, /--id names the block of one file/, where, "--id", "x"],
     [1, /is no name of a block/, path.join(where, "a.ply"), "--id", "a b"],
     [2, /file, now or Unix seconds/, where, "--observed-at", "yesterday"],
+    [2, /--id/, path.join(where, "a.ply"), "--id", ""],
     [2, /rate/, where, "--rate", "0"],
   ]) {
     const { status, errors } = await push(...args, "--to", plain.url);

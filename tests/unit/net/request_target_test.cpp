@@ -8,7 +8,7 @@ namespace {
 using Query = std::vector<std::pair<std::string, std::string>>;
 
 TEST(RequestTarget, IsDecodedOnce) {
-  const auto target = parsed_target("/a%20b/c%2525?x=1&y=a+b%2B&z&=v&&x=2#fragment");
+  const auto target = parsed_target("/a%20b/c%2525?x=1&y=a+b%2B&z&=v&&x=2");
   ASSERT_TRUE(target);
   EXPECT_EQ(target->path, "/a b/c%25");
   EXPECT_EQ(target->query, (Query{{"x", "1"}, {"y", "a b+"}, {"z", ""}, {"", "v"}, {"x", "2"}}));
@@ -25,9 +25,9 @@ TEST(RequestTarget, KeepsPlainPaths) {
 
 TEST(RequestTarget, RefusesWhatLeavesTheRoot) {
   for (const auto* text :
-       {"",        "*",    "x",        "http://h/x", "//x",       "/a//b",  "/..",     "/../x",       "/a/..",
-        "/a/../b", "/.",   "/./a",     "/a/.",       "/%2e%2e/x", "/%2e/x", "/..%2fx", "/a%2f..%2fb", "/a\\b",
-        "/a%5cb",  "/%00", "/a%0d%0a", "/a\x7f",     "/%",        "/%1",    "/%g0",    "/a?%",        "/a?x=%0"}) {
+       {"",         "*",      "x",    "http://h/x", "//x",    "/a//b",   "/..",         "/../x", "/a/..",   "/a/../b",
+        "/.",       "/./a",   "/a/.", "/%2e%2e/x",  "/%2e/x", "/..%2fx", "/a%2f..%2fb", "/a\\b", "/a%5cb",  "/%00",
+        "/a%0d%0a", "/a\x7f", "/%",   "/%1",        "/%g0",   "/a?%",    "/a?x=%0",     "/a#b",  "/a?x=1#b"}) {
     EXPECT_FALSE(parsed_target(text)) << text;
   }
 }
