@@ -310,7 +310,12 @@ void PlyBodyReader::convert_confidence(const PlyRawVertices& raw) {
     const auto kelvin = static_cast<float>(raw.sigmas[i] * factor);
     const bool is_known = std::isfinite(temperatures_[i]) && std::isfinite(kelvin) && kelvin >= 0;
     sigmas_[i] = is_known ? kelvin : std::numeric_limits<float>::quiet_NaN();
-    if (is_known && !raw.seen.empty() && std::isfinite(raw.seen[i])) looked_at_[i] = raw.seen[i];
+    if (!is_known || raw.seen.empty() || std::isnan(raw.seen[i])) continue;
+    if (is_unix_time(raw.seen[i])) {
+      looked_at_[i] = raw.seen[i];
+    } else {
+      ++facts_.absurd_time_count;
+    }
   }
 }
 

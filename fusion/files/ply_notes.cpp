@@ -60,9 +60,10 @@ std::vector<std::string> unused_names(const PlyElement& element, const PlySlots&
 }
 
 /// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
-constexpr std::array<std::string_view, 11> kNeedAttention = {
-    "hole_vertices",  "crowded_place",  "rounded_positions",        "coarse_positions",  "clamped_colours", "texture",
-    "unused_options", "no_temperature", "implausible_temperatures", "crossing_polygons", "large_polygons"};
+constexpr std::array<std::string_view, 12> kNeedAttention = {
+    "hole_vertices",     "crowded_place",  "rounded_positions", "coarse_positions",         "clamped_colours",
+    "texture",           "unused_options", "no_temperature",    "implausible_temperatures", "absurd_times",
+    "crossing_polygons", "large_polygons"};
 
 class Notes {
  public:
@@ -81,6 +82,9 @@ class Notes {
     about_colours();
     about_temperature_property();
     about_temperatures();
+    add("absurd_times", facts_.absurd_time_count,
+        counted(facts_.absurd_time_count, "vertex", "vertices") +
+            " whose property seen is no Unix time (0 to 1e11 seconds; milliseconds?): taken for not known");
     about_options();
     about_what_is_skipped();
     about_faces();

@@ -12,6 +12,11 @@
 
 namespace spectra::files {
 
+/// Whether a number can be meant as Unix seconds: 0 to 1e11, the year 5138. Milliseconds of today are more.
+constexpr bool is_unix_time(double seconds) {
+  return seconds >= 0 && seconds <= 1e11;
+}
+
 /// What a temperature property counts in.
 enum class TemperatureUnit { Celsius, Kelvin, Centikelvin, Fahrenheit };
 

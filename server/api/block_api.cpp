@@ -17,6 +17,8 @@ namespace {
 /// So many blocks are listed at a time, at most.
 constexpr std::size_t kBlocksOfPage = 1000;
 
+constexpr const char* kNothingSaid = "nothing is said of a block that is taken out";
+
 /// Names and notes may hold what is no UTF-8.
 std::string text_of(const nlohmann::json& json) {
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
@@ -41,6 +43,14 @@ net::BlockRefusal no_time(const std::string& text) {
           "2026-01-31T12:34:56Z (or +01:00 for Z), or Unix seconds"};
 }
 
+net::BlockRefusal not_open() {
+  return {503, "busy", "", "the map is not open yet", ""};
+}
+
+net::BlockRefusal said_twice(const std::string& field) {
+  return {400, "bad_request", field, field + " stands in the query more than once", "once"};
+}
+
 net::BlockRefusal no_name() {
   return {400, "bad_request", "id", "that is no name of a block", "1 to 64 of a-z A-Z 0-9 . _ -"};
 }
@@ -62,6 +72,9 @@ BlockApi::BlockApi(session::ServedScene& served, sources::MapKeeper& map, export
 
 void BlockApi::handle(const net::HttpRequest& request, const std::function<void(net::HttpReply)>& reply) {
   const std::string& path = request.target.path;
+  if (const auto field = sources::repeated_field(request.target.query)) {
+    return reply(net::refused(said_twice(*field)));
+  }
   if (path == net::kBlocksPath) {
     std::string after;
     std::size_t limit = kBlocksOfPage;
@@ -84,6 +97,7 @@ void BlockApi::handle(const net::HttpRequest& request, const std::function<void(
                                    "after=ID, at=TIME, limit=1.." + std::to_string(kBlocksOfPage)}));
       }
     }
+    if (!map_.is_open()) return reply(net::refused(not_open()));
     sources::MapKeeper::Page page;
     if (at) {
       auto past = map_.page_at(*at, after, limit);
@@ -102,6 +116,9 @@ void BlockApi::handle(const net::HttpRequest& request, const std::function<void(
   if (!store::is_block_id(id)) return reply(net::refused(no_name()));
   if (request.method == net::HttpMethod::Put) return put(id, request, reply);
   if (request.method == net::HttpMethod::Get) return give(id, request.target.query, reply);
+  if (!request.target.query.empty()) {
+    return reply(net::refused({400, "bad_request", request.target.query[0].first, kNothingSaid, ""}));
+  }
   map_.remove(id, [reply](const std::variant<store::Revision, net::BlockRefusal>& outcome) {
     const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
     reply(refusal != nullptr ? net::refused(*refusal) : net::text_reply(200, "{}\n", "application/json"));
@@ -113,7 +130,7 @@ void BlockApi::put(const std::string& id, const net::HttpRequest& request,
   auto block = sources::incoming_block(id, request.target.query);
   if (!block) {
     const auto& error = block.error();
-    return reply(net::refused({400, "bad_request", error.field, error.message, ""}));
+    return reply(net::refused({400, "bad_request", error.field, error.message, sources::limits_of(error.field)}));
   }
   block.value().ply = request.body;
   map_.put(std::move(block).value(),
@@ -135,10 +152,10 @@ void BlockApi::put(const std::string& id, const net::HttpRequest& request,
 
 void BlockApi::change(net::BlockChange change, std::function<void(net::BlockOutcome)> done) {
   if (!store::is_block_id(change.id)) return done(no_name());
+  if (const auto field = sources::repeated_field(change.query)) return done(said_twice(*field));
   if (!change.ply) {
     if (!change.query.empty()) {
-      return done(net::BlockRefusal{400, "bad_request", change.query[0].first,
-                                    "nothing is said of a block that is taken out", ""});
+      return done(net::BlockRefusal{400, "bad_request", change.query[0].first, kNothingSaid, ""});
     }
     return map_.remove(
         std::move(change.id),
@@ -149,7 +166,10 @@ void BlockApi::change(net::BlockChange change, std::function<void(net::BlockOutc
         sources::MapKeeper::WhenFull::Take);
   }
   auto block = sources::incoming_block(std::move(change.id), change.query);
-  if (!block) return done(net::BlockRefusal{400, "bad_request", block.error().field, block.error().message, ""});
+  if (!block) {
+    const auto& error = block.error();
+    return done(net::BlockRefusal{400, "bad_request", error.field, error.message, sources::limits_of(error.field)});
+  }
   block.value().ply = std::move(change.ply);
   map_.put(
       std::move(block).value(),
@@ -171,6 +191,7 @@ void BlockApi::give(const std::string& id, const std::vector<std::pair<std::stri
     at = store::time_of(value);
     if (!at) return reply(net::refused(no_time(value)));
   }
+  if (!map_.is_open()) return reply(net::refused(not_open()));
   const net::BlockRefusal unknown{404, "not_found", "id", "there is no block \"" + id + "\"", ""};
   if (!at && !map_.has(id)) return reply(net::refused(unknown));
   const exports::ExportShelf::Slot slot = exports_.take();

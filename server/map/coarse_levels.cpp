@@ -180,6 +180,7 @@ void CoarseLevels::change(ChangedTree& changed, const std::shared_ptr<const MapN
   if (!root) {
     outdated_.clear();
     round_.clear();
+    median_celsius_ = std::numeric_limits<float>::quiet_NaN();
     return;
   }
   if (has_new_spread(root)) collect_inner(root, wanted);

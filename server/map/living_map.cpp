@@ -5,9 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
+#include <tuple>
 #include <utility>
 
 #include "fusion/base/box.hpp"
+#include "server/map/block_core.hpp"
 #include "server/map/leaf_facts.hpp"
 #include "server/map/map_version.hpp"
 #include "server/map/position_step.hpp"
@@ -26,6 +29,10 @@ using base::Vec3f;
 constexpr double kLeavesShare = 0.25;
 constexpr double kCutShare = 0.6;
 constexpr double kStepsShare = 0.9;
+
+/// A tile of the full mesh reaches over at most so many doublings of the extent of the first block. Of what 24 bits tell apart it
+/// leaves 17 to the block, and maps of small blocks are not cut into crumbs.
+constexpr int kLeafLevelsAbove = 6;
 
 /// Automatic values follow when a fact of the temperatures has moved by this part of their span: a quantile is looked at when so
 /// large a part of the map has changed. When all of it has, they follow in any case.
@@ -79,6 +86,13 @@ void collect_shown(const std::shared_ptr<const MapNode>& node, bool is_point_clo
   for (const auto& branch : node->branches) collect_shown(branch.node, is_point_cloud, with_coarse, tiles);
 }
 
+/// NaN is the same as itself here.
+template <class T>
+bool has_same_bytes(std::span<const T> a, std::span<const T> b) {
+  const auto bytes = std::as_bytes(a), others = std::as_bytes(b);
+  return std::equal(bytes.begin(), bytes.end(), others.begin(), others.end());
+}
+
 bool has_moved(double from, double to, double span) {
   return std::abs(from - to) > kReferenceMove * span;
 }
@@ -115,6 +129,7 @@ TileSizes LivingMap::sizes() const {
   sizes.changing_leaf_vertex_count = options_.settled_block.empty()
                                          ? sizes.leaf_vertex_count
                                          : std::max(1u, sizes.leaf_vertex_count / kSmallerWhereChanging);
+  sizes.first_leaf_level = std::max(0, options_.first_level - kLeafLevelsAbove);
   // 20,000 of 32,000: with 32,000 vertices geometry and colours of a noisy scene would be more than a first picture should
   // cost.
   if (options_.levels == LevelsOfDetail::All) sizes.root_vertex_count = std::max(1u, sizes.leaf_vertex_count / 8 * 5);
@@ -201,6 +216,7 @@ std::shared_ptr<const SceneSnapshot> LivingMap::apply(MapChange change_wanted, s
   for (BlockPut& one : put) {
     if (!one.baseline) one.baseline = handed_on(one.id, one.scene.mesh, one.observed_at);
   }
+  std::erase_if(put, [this](const BlockPut& one) { return is_there_already(one); });
   std::sort(put.begin(), put.end(), [](const BlockPut& a, const BlockPut& b) { return a.id < b.id; });
   if (!constants_ && !put.empty()) {
     BlockPut first = std::move(put.front());
@@ -249,7 +265,6 @@ MapVersion LivingMap::version(std::uint32_t revision) {
   }
   if (!options_.name.empty()) facts.name = options_.name;
   if (blocks_.size() == 1) facts.left_out = blocks_.begin()->second->facts.left_out;
-  std::vector<base::Vec3f> core;
   for (const auto& [id, block] : blocks_) {
     facts.vertex_count += block->facts.vertex_count;
     facts.triangle_count += block->facts.triangle_count;
@@ -260,11 +275,12 @@ MapVersion LivingMap::version(std::uint32_t revision) {
       version.oldest_observed_at = std::min(version.oldest_observed_at.value_or(*seen), *seen);
       version.newest_observed_at = std::max(version.newest_observed_at.value_or(*seen), *seen);
     }
-    if (block->core_bounds) core.insert(core.end(), {block->core_bounds->min, block->core_bounds->max});
   }
   version.blocks = blocks_;
   version.notes = notes();
-  if (!core.empty()) version.core_bounds = bounds_of(core);
+  BlockCore core = core_of(blocks_);
+  version.core_bounds = core.bounds;
+  if (core.note) version.notes.push_back(std::move(*core.note));
   version.leaves = leaves_of(root_);
   if (root_) {
     version.top_level = top_of(root_)->id.level;
@@ -323,6 +339,28 @@ std::vector<files::Note> LivingMap::notes() const {
     notes.push_back(std::move(told.note));
   }
   return notes;
+}
+
+bool LivingMap::is_there_already(const BlockPut& put) const {
+  const auto found = blocks_.find(put.id);
+  if (found == blocks_.end() || found->second->observed_at != put.observed_at) return false;
+  const MapBlock& block = *found->second;
+  const mesh::MultispectralMesh& mesh = put.scene.mesh;
+  const MeshFacts facts = facts_of(mesh);
+  const auto plain = [](const MeshFacts& f) {
+    return std::tuple(f.vertex_count, f.triangle_count, f.has_visible, f.has_temperature, f.double_positions, f.up,
+                      f.is_metric, f.origin.x, f.origin.y, f.origin.z);
+  };
+  const auto is_same_note = [](const files::Note& a, const files::Note& b) { return a.message == b.message; };
+  if (plain(facts) != plain(block.facts) || !std::ranges::equal(put.scene.notes, block.notes, is_same_note)) {
+    return false;
+  }
+  const mesh::MultispectralMesh before = mesh_of_blocks(leaves_of(root_), {{block.number, BlockPlace{}}}, block.facts);
+  return has_same_bytes(before.positions(), mesh.positions()) && has_same_bytes(before.visible(), mesh.visible()) &&
+         has_same_bytes(before.temperature_celsius(), mesh.temperature_celsius()) &&
+         before.triangles() == mesh.triangles() &&
+         has_same_bytes(std::span(before.confidence.sigma_kelvin), std::span(mesh.confidence.sigma_kelvin)) &&
+         has_same_bytes(std::span(before.confidence.looked_at), std::span(mesh.confidence.looked_at));
 }
 
 void LivingMap::put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress) {
@@ -404,6 +442,8 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
   }
   base::report(progress, kTilingPhase, leaves_share * kStepsShare);
   take(std::move(changed), pool, progress);
+  // What comes next may lie somewhere else altogether.
+  if (blocks_.empty()) constants_.reset();
 }
 
 void LivingMap::take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress) {

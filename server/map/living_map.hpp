@@ -61,7 +61,7 @@ struct MapChange {
   std::vector<std::string> removed;  ///< Names that are not there are nothing.
 };
 
-/// What stays the same for the life of a map.
+/// What stays the same as long as there is anything in a map.
 struct MapConstants {
   base::Vec3d origin;  ///< What positions are relative to.
   MapGrid grid;
@@ -70,7 +70,7 @@ struct MapConstants {
 
 /// A map that is made of blocks, and its versions: each is a scene of its own that does not change any more and shares with the
 /// one before what is the same. At full accuracy a version depends on its blocks alone, not on the order in which they came.
-/// The constants are given, or what the first block asks for. One thread at a time.
+/// The constants are given, or what the first block asks for; a map that is emptied takes them from its next first block. One thread at a time.
 class LivingMap {
  public:
   struct Options {
@@ -88,7 +88,7 @@ class LivingMap {
 
   explicit LivingMap(const Options& options, const std::optional<MapConstants>& constants = std::nullopt);
 
-  /// Once there was a block.
+  /// As long as there is a block.
   const std::optional<MapConstants>& constants() const { return constants_; }
 
   /// Why a change cannot be taken: a block of points where the map has triangles, or the other way round; a block without a vertex;
@@ -125,6 +125,8 @@ class LivingMap {
   /// Automatic values found with the reference are still what this version would ask for, nearly.
   bool is_reference_good(const MapVersion& version);
   std::vector<files::Note> notes() const;
+  /// The map has that block already, the same in every vertex and triangle and of the same time: all tiles stay as they are.
+  bool is_there_already(const BlockPut& put) const;
   void put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress);
   void change(std::vector<BlockPut> put, std::span<const std::string> removed, jobs::WorkerPool& pool,
               const base::Progress& progress);

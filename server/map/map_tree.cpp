@@ -179,6 +179,7 @@ class TreeChange {
 
   bool is_leaf(const CellContent& content, int level) const {
     if (level >= kDeepestLevel) return true;
+    if (level < sizes_.first_leaf_level) return false;
     if (content.owned_count > sizes_.root_vertex_count && content == total_) return false;
     return 4 * content.owned_count <= 5 * std::uint64_t{sizes_.leaf_size(content)};
   }
@@ -310,8 +311,9 @@ class TreeChange {
     CellContent sum;
     for (const CellContent& octant : contents) sum += octant;
     // Not all of them may become one again.
-    const auto leaf_size = [this, most = sum.owned_count / 2](const CellContent& content) {
-      return std::min<std::uint64_t>(sizes_.leaf_size(content), most);
+    const bool is_apart = node.id.level < sizes_.first_leaf_level;
+    const auto leaf_size = [this, is_apart, most = sum.owned_count / 2](const CellContent& content) {
+      return is_apart ? 0 : std::min<std::uint64_t>(sizes_.leaf_size(content), most);
     };
     const std::vector<OctantGroup> groups = octant_groups(contents, leaf_size, total_.triangle_count > 0);
     std::array<std::size_t, 8> group_of{};

@@ -60,6 +60,9 @@ struct TileSizes {
   std::uint32_t leaf_vertex_count = kLeafVertexCount;           ///< Of leaves with nothing but settled blocks.
   std::uint32_t changing_leaf_vertex_count = kLeafVertexCount;  ///< Of others.
   std::uint32_t root_vertex_count = 0xffffffffu;                ///< A map of more is cut in any case.
+  /// Cells above this level are never leaves, and their octants are never joined: what is far from each other has no tile of the
+  /// full mesh together, however little it is.
+  int first_leaf_level = 0;
 
   std::uint32_t leaf_size(const CellContent& content) const {
     return content.changing_count > 0 ? changing_leaf_vertex_count : leaf_vertex_count;
@@ -77,7 +80,8 @@ struct ChangedTree {
 /// Takes the blocks with the numbers `removed` out of a map and puts others in. What depends on what: the places of
 /// tiles and all that lies in a leaf are those of the tree made at once of the blocks that are in the map then. A cell that owns at most 1.25
 /// times the leaf size of its content is a leaf; others are cut in their middle. Octants are joined with their neighbours as long as they stay
-/// within the leaf size of what they hold together, and those with less than a quarter of it always; in a map with triangles every leaf has one.
+/// within the leaf size of what they hold together, and those with less than a quarter of it always, unless they are above the first level of
+/// leaves, where each has its own; in a map with triangles every leaf has one.
 /// The same for any number of threads. `labels` has all blocks of the map, old and new: in a leaf they stand in the order of
 /// their names. Must not be called from a job of the pool. `made_share` is told from any thread what share is made.
 ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,

@@ -8,6 +8,7 @@
 #include "fusion/registry.hpp"
 #include "server/session/settings_text.hpp"
 #include "server/stream/extremes_in_view.hpp"
+#include "server/stream/lattice.hpp"
 
 namespace spectra::session {
 namespace {
@@ -286,7 +287,7 @@ protocol::SceneDescription to_message(const map::SceneSnapshot& scene) {
   message.temperature = to_message(scene.temperature().summary);
   message.tile_count = scene.tiles().size();
   message.levels = static_cast<std::uint32_t>(scene.level_count());
-  message.position_step_m = double{scene.suggested_position_step_m()};
+  message.position_step_m = double{stream::coarsest_step(scene, scene.suggested_position_step_m())};
   message.up = to_message(scene.up());
   message.metric = scene.is_metric();
   message.live = scene.is_live();

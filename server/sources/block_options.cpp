@@ -20,6 +20,16 @@ base::Result<double> number(const std::string& name, std::string_view text, bool
   return value;
 }
 
+base::Result<double> unix_seconds(const std::string& name, std::string_view text) {
+  BOOST_OUTCOME_TRY(const double seconds, number(name, text));
+  if (files::is_unix_time(seconds)) return seconds;
+  const bool is_thousandfold = files::is_unix_time(seconds / 1000);
+  return base::failure(base::ErrorCode::OutOfRange,
+                       name + " is " + std::string(text) + "; Unix seconds are wanted" +
+                           (is_thousandfold ? " (are these milliseconds?)" : ""),
+                       name);
+}
+
 base::Result<base::Vec3d> place(const std::string& name, std::string_view text) {
   std::array<double, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -40,7 +50,7 @@ base::Result<void> read_field(IncomingBlock& block, const std::string& name, con
     return base::failure(base::ErrorCode::WrongType, name + " has more than one line", name);
   }
   if (name == "observed_at") {
-    BOOST_OUTCOME_TRY(block.observed_at, number(name, value));
+    BOOST_OUTCOME_TRY(block.observed_at, unix_seconds(name, value));
   } else if (name == "sensor") {
     BOOST_OUTCOME_TRY(block.sensor, place(name, value));
   } else if (name == "temperature_property") {
@@ -80,6 +90,21 @@ std::string number_text(double value) {
 }
 
 }  // namespace
+
+std::optional<std::string> repeated_field(const std::vector<std::pair<std::string, std::string>>& query) {
+  for (auto field = query.begin(); field != query.end(); ++field) {
+    const bool is_again =
+        std::any_of(query.begin(), field, [&](const auto& other) { return other.first == field->first; });
+    if (is_again && field->first != "no_data") return field->first;
+  }
+  return std::nullopt;
+}
+
+std::string limits_of(std::string_view field) {
+  if (field == "observed_at") return "0 to 1e11 seconds since 1970";
+  if (field == "scale" || field == "temperature_scale") return "1e-16 to 1e16";
+  return "";
+}
 
 std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptions& read) {
   std::vector<std::pair<std::string, std::string>> query;

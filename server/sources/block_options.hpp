@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,12 @@ namespace spectra::sources {
 /// OutOfRange or UnknownParameter, naming the field.
 base::Result<IncomingBlock> incoming_block(std::string id,
                                            const std::vector<std::pair<std::string, std::string>>& query);
+
+/// A field that stands in a query more than once and may not (no_data may); nothing when there is none.
+std::optional<std::string> repeated_field(const std::vector<std::pair<std::string, std::string>>& query);
+
+/// Between which values a field of a query may be, for people; empty where nothing is to be said.
+std::string limits_of(std::string_view field);
 
 /// The other way round: what a query says of reading options.
 std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptions& read);

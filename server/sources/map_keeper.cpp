@@ -15,17 +15,18 @@
 #include <set>
 #include <utility>
 
+#include "fusion/base/distance_text.hpp"
 #include "fusion/files/ply_reader.hpp"
 #include "fusion/files/scene_survey.hpp"
 #include "server/jobs/priority.hpp"
 #include "server/sources/block_options.hpp"
 #include "server/sources/stored_baseline.hpp"
+#include "server/sources/stored_constants.hpp"
 #include "server/store/time_text.hpp"
 
 namespace spectra::sources {
 namespace {
 
-constexpr const char* kConstantsKey = "map";
 /// Fusing and encoding for viewers get ten times as much of a processor as coarse tiles.
 constexpr int kCoarseNiceness = 10;
 /// After so long without any the memory for making them is given back.
@@ -121,6 +122,45 @@ net::BlockRefusal busy(std::string reason, std::string limits = "") {
   return {503, "busy", "", std::move(reason), std::move(limits)};
 }
 
+std::string place_text(const base::Vec3d& p) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%.7g %.7g %.7g", p.x, p.y, p.z);
+  return text;
+}
+
+/// Why a block cannot lie where its file says, strays aside. `known`: of the map, where it has any.
+std::optional<net::BlockRefusal> refusal_of_place(const files::LoadedScene& scene,
+                                                  const std::optional<map::MapConstants>& known) {
+  constexpr double kMostCoordinate_m = 1e9;
+  constexpr double kReach_m = 1e6;
+  constexpr double kFloatSteps = 0x1p24;
+  if (!scene.core_bounds || scene.mesh.vertex_count() == 0) return std::nullopt;
+  const base::Vec3d& origin = scene.mesh.origin;
+  const auto absolute = [&](const base::Vec3f& p) {
+    return base::Vec3d{origin.x + double{p.x}, origin.y + double{p.y}, origin.z + double{p.z}};
+  };
+  const base::Vec3d low = absolute(scene.core_bounds->min), high = absolute(scene.core_bounds->max);
+  const auto largest = [](const base::Vec3d& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); };
+  const std::string where = "the block reaches from " + place_text(low) + " to " + place_text(high) + " m";
+  if (!(std::max(largest(low), largest(high)) <= kMostCoordinate_m)) {
+    return net::BlockRefusal{422, "absurd_extent", "body",
+                             where + ", farther than anything on Earth; if its file counts in other units, say scale",
+                             "coordinates from -1e9 to 1e9 m"};
+  }
+  if (!known) return std::nullopt;
+  const double reach = std::max(kReach_m, kFloatSteps * double{known->position_step_m});
+  const auto away = [&](const base::Vec3d& p) {
+    return largest({p.x - known->origin.x, p.y - known->origin.y, p.z - known->origin.z});
+  };
+  const double farthest = std::max(away(low), away(high));
+  if (farthest <= reach) return std::nullopt;
+  return net::BlockRefusal{422, "too_far_away", "body",
+                           where + ", " + base::distance_text(farthest) + " from where the map began (" +
+                               place_text(known->origin) +
+                               "): blocks of one map share one coordinate system; a map that is emptied begins anew",
+                           base::distance_text(reach) + " along each axis"};
+}
+
 net::BlockRefusal no_history() {
   return {409, "no_history", "at", "the map's past is kept nowhere; serve it with --store FILE", ""};
 }
@@ -150,28 +190,6 @@ net::BlockRefusal refusal_of(const store::StoreError& error) {
 net::BlockRefusal refusal_to_store(const store::StoreError& error) {
   const auto refusal = refusal_of(error);
   return refusal.status == 500 ? net::BlockRefusal{507, "not_stored", "", error.message, ""} : refusal;
-}
-
-std::string text_of(const map::MapConstants& constants) {
-  char text[256];
-  const auto& corner = constants.grid.corner_m();
-  std::snprintf(text, sizeof text, "%a %a %a %a %a %a %a %a", constants.origin.x, constants.origin.y,
-                constants.origin.z, corner[0], corner[1], corner[2], constants.grid.edge_m(),
-                double{constants.position_step_m});
-  return text;
-}
-
-std::optional<map::MapConstants> constants_of(const std::string& text) {
-  std::array<double, 8> v{};
-  if (std::sscanf(text.c_str(), "%la %la %la %la %la %la %la %la", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &v[6],
-                  &v[7]) != 8) {
-    return std::nullopt;
-  }
-  const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
-  if (!is_finite || !(v[6] > 0) || !(static_cast<float>(v[7]) > 0)) return std::nullopt;
-  return map::MapConstants{.origin = {v[0], v[1], v[2]},
-                           .grid = map::MapGrid({v[3], v[4], v[5]}, v[6]),
-                           .position_step_m = static_cast<float>(v[7])};
 }
 
 }  // namespace
@@ -209,14 +227,18 @@ std::optional<std::string> MapKeeper::restore() {
   map::MapChange change;
   std::optional<std::string> problem;
   std::map<std::string, BlockEntry, std::less<>> entries;
-  std::optional<base::Vec3d> origin;
   if (store_) {
     std::optional<map::MapConstants> constants;
     if (const auto text = store_->constant(kConstantsKey)) {
       constants = constants_of(*text);
       if (!constants) return "the store's constants of the map cannot be read";
-      origin = constants->origin;
     }
+    const auto first = at_ ? store_->page_at(*at_, "", 1) : store::StoreResult<store::BlockPage>(store_->page("", 1));
+    if (!first) return first.error().message;
+    const auto& any = first.value().blocks;
+    // An empty map takes those that its next block asks for.
+    constants = any.empty() ? std::nullopt : constants_at(any.front().revision);
+    const auto origin = constants ? std::optional(constants->origin) : std::nullopt;
     StoredMark marked;
     if (const auto text = store_->constant(kBaselineKey)) {
       const auto found = mark_from(*text);
@@ -247,11 +269,11 @@ std::optional<std::string> MapKeeper::restore() {
     if (problem) return problem;
   }
   change_map(std::move(change));
-  if (const auto constants = scenes_.constants()) origin = constants->origin;
+  if (store_) last_revision_ = store_->status().last_revision;
+  if (!at_) keep_constants(last_revision_);
   const std::lock_guard lock(mutex_);
   entries_ = std::move(entries);
-  if (store_) last_revision_ = store_->status().last_revision;
-  origin_ = origin;
+  constants_ = scenes_.constants();
   is_open_ = true;
   return std::nullopt;
 }
@@ -271,7 +293,7 @@ void MapKeeper::open_with_file() {
                   scene->triangle_count(),
                   {absolute(scene->bounds().min), absolute(scene->bounds().max)},
                   ""};
-  origin_ = origin;
+  constants_ = scenes_.constants();
   is_open_ = true;
 }
 
@@ -325,8 +347,8 @@ void MapKeeper::enqueue(Change change, std::size_t bytes, WhenFull when_full) {
 }
 
 void MapKeeper::begin_reading(Queue::iterator waiting) {
-  if (waiting->is_ready || waiting->is_reading || is_ending_ || (!origin_ && is_first_under_way_)) return;
-  is_first_under_way_ = !origin_;
+  if (waiting->is_ready || waiting->is_reading || is_ending_ || (!constants_ && is_first_under_way_)) return;
+  is_first_under_way_ = !constants_;
   waiting->is_reading = true;
   ++reading_count_;
   pool_.post([this, waiting] {
@@ -339,18 +361,19 @@ void MapKeeper::begin_reading(Queue::iterator waiting) {
 }
 
 void MapKeeper::read(Queue::iterator waiting) {
-  std::optional<base::Vec3d> origin;
+  std::optional<map::MapConstants> constants;
   {
     const std::lock_guard lock(mutex_);
-    origin = origin_;
+    constants = constants_;
     if (is_ending_) return;  // refused there
   }
   auto& put = std::get<Put>(waiting->change);
   std::optional<net::BlockRefusal> refusal;
   try {
-    auto scene = loaded(put.block, origin);
+    auto scene = loaded(put.block, constants ? std::optional(constants->origin) : std::nullopt);
     if (scene) {
       put.scene = std::move(scene).value();
+      refusal = refusal_of_place(put.scene, constants);
     } else {
       refusal = {422, "unreadable_block", scene.error().field, scene.error().message, ""};
     }
@@ -363,7 +386,7 @@ void MapKeeper::read(Queue::iterator waiting) {
     const std::lock_guard lock(mutex_);
     waiting->is_ready = true;
     if (refusal) refused.splice(refused.begin(), waiting_, waiting);
-    if (refusal && !origin) read_next();
+    if (refusal && !constants) read_next();
     has_work_.notify_one();
   }
   if (refusal) put.done(*refusal);
@@ -597,7 +620,7 @@ void MapKeeper::publish(std::vector<Change> batch, const std::vector<store::Revi
     wanted.put.push_back({put->block.id, std::move(put->scene), put->block.observed_at, std::move(put->baseline)});
   }
   change_map(std::move(wanted));
-  keep_constants();
+  keep_constants(*std::max_element(revisions.begin(), revisions.end()));
   for (std::size_t i = 0; i < batch.size(); ++i) {
     {
       const std::lock_guard lock(mutex_);
@@ -638,17 +661,40 @@ void MapKeeper::mark(const Mark& wanted) {
   wanted.done(BaselineMarked{now, marked->revision()});
 }
 
-void MapKeeper::keep_constants() {
+void MapKeeper::keep_constants(store::Revision revision) {
   const auto constants = scenes_.constants();
-  if (!constants) return;
   {
     const std::lock_guard lock(mutex_);
-    origin_ = constants->origin;
+    constants_ = constants;
   }
-  if (!store_ || store_->constant(kConstantsKey) == text_of(*constants)) return;
-  store_->set_constant(kConstantsKey, text_of(*constants), [](const store::StoreResult<void>& outcome) {
-    if (!outcome) spdlog::error("the map's constants could not be stored: {}", outcome.error().message);
+  if (!store_) return;
+  const auto set = [this](const char* key, std::string text) {
+    store_->set_constant(key, std::move(text), [](const store::StoreResult<void>& outcome) {
+      if (!outcome) spdlog::error("the map's constants could not be stored: {}", outcome.error().message);
+    });
+  };
+  const auto known = store_->constant(kConstantsKey);
+  if (constants) {
+    if (known != text_of(*constants)) set(kConstantsKey, text_of(*constants));
+    return;
+  }
+  const auto gone = known ? constants_of(*known) : std::nullopt;
+  if (!gone) return;
+  auto earlier = earlier_constants_of(store_->constant(kEarlierConstantsKey).value_or(""));
+  std::erase_if(earlier, [floor = store_->status().history_floor](const EarlierConstants& one) {
+    return one.until_revision <= floor;
   });
+  earlier.push_back({revision, *gone});
+  set(kEarlierConstantsKey, text_of(earlier));
+  set(kConstantsKey, "");
+}
+
+std::optional<map::MapConstants> MapKeeper::constants_at(store::Revision revision) const {
+  for (const auto& [until, constants] : earlier_constants_of(store_->constant(kEarlierConstantsKey).value_or(""))) {
+    if (revision < until) return constants;
+  }
+  const auto text = store_->constant(kConstantsKey);
+  return text ? constants_of(*text) : std::nullopt;
 }
 
 MapKeeper::Page MapKeeper::page(std::string_view after, std::size_t limit) const {
@@ -678,11 +724,8 @@ void MapKeeper::read_at(store::StoreTime time, const std::string& id, PastDone d
     return done(
         net::BlockRefusal{404, "not_found", "id", "there was no block \"" + id + "\" at " + store::utc_text(time), ""});
   }
-  std::optional<base::Vec3d> origin;
-  {
-    const std::lock_guard lock(mutex_);
-    origin = origin_;
-  }
+  const auto constants = constants_at(facts.value()->revision);
+  const auto origin = constants ? std::optional(constants->origin) : std::nullopt;
   store_->read(facts.value()->revision,
                [&pool = pool_, origin, done = std::move(done)](store::StoreResult<store::StoredBlock> outcome) {
                  if (!outcome) return done(refusal_of(outcome.error()));
@@ -695,6 +738,11 @@ void MapKeeper::read_at(store::StoreTime time, const std::string& id, PastDone d
                      },
                      jobs::kExportPriority);
                });
+}
+
+bool MapKeeper::is_open() const {
+  const std::lock_guard lock(mutex_);
+  return is_open_;
 }
 
 bool MapKeeper::has(const std::string& id) const {

@@ -103,6 +103,8 @@ class MapKeeper {
   /// Those after `after`, at most `limit`.
   Page page(std::string_view after, std::size_t limit) const;
   bool has(const std::string& id) const;
+  /// False until restore() or open_with_file() is through: nothing is known of the map before.
+  bool is_open() const;
 
   /// The same as it was at a time. Refused where there is no store (409, no_history) and where the time is no longer kept (410,
   /// history_gone).
@@ -174,7 +176,10 @@ class MapKeeper {
   void publish(std::vector<Change> batch, const std::vector<store::Revision>& revisions);
   /// Publishes the map with a change; its coarse tiles follow.
   void change_map(map::MapChange change);
-  void keep_constants();
+  /// After a change up to that revision: the map has constants, or, empty, none any more.
+  void keep_constants(store::Revision revision);
+  /// Those that the map had when a revision was made. There is a store.
+  std::optional<map::MapConstants> constants_at(store::Revision revision) const;
   void mark(const Mark& wanted);
   static void refuse(Change& change, const net::BlockRefusal& refusal);
   static const std::string& id_of(const Change& change);
@@ -196,8 +201,8 @@ class MapKeeper {
   std::condition_variable is_read_;  ///< A job has ended.
   bool is_open_ = false;
   bool is_ending_ = false;
-  std::optional<base::Vec3d> origin_;  ///< Of the map, once it has one.
-  bool is_first_under_way_ = false;    ///< The block that may give the map its origin.
+  std::optional<map::MapConstants> constants_;  ///< Of the map, as long as there is anything in it.
+  bool is_first_under_way_ = false;             ///< The block that may give the map its origin.
   std::map<std::string, BlockEntry, std::less<>> entries_;
   std::uint64_t last_revision_ = 0;
 

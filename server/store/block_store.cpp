@@ -398,8 +398,9 @@ StoreResult<void> BlockStore::visit(std::optional<StoreTime> time, const std::fu
 StoreStatus BlockStore::status() const {
   const std::lock_guard lock(state_->mutex);
   const Catalogue& catalogue = state_->catalogue;
-  return {catalogue.last_revision(), catalogue.block_count(), catalogue.block_bytes(), catalogue.history_bytes(),
-          state_->log_bytes,         state_->waiting_count,   state_->waiting_bytes,   state_->trouble};
+  return {catalogue.last_revision(), catalogue.history_floor(), catalogue.block_count(),
+          catalogue.block_bytes(),   catalogue.history_bytes(), state_->log_bytes,
+          state_->waiting_count,     state_->waiting_bytes,     state_->trouble};
 }
 
 }  // namespace spectra::store

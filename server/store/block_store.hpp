@@ -28,6 +28,7 @@ struct StoreOptions {
 /// For operators: how the store is.
 struct StoreStatus {
   Revision last_revision = 0;
+  Revision history_floor = 0;  ///< Of what was before, nothing is told any more.
   std::uint64_t block_count = 0;
   std::uint64_t block_bytes = 0;
   std::uint64_t history_bytes = 0;

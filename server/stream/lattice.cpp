@@ -85,6 +85,17 @@ class Rounding {
   std::vector<bool> drawn_;
 };
 
+// Of a tile that lies within a box: whether floats tell its steps apart wherever in the box a vertex is.
+bool is_told_apart(const base::Bounds& box, double step_m, double most_steps) {
+  for (const auto member : {&base::Vec3f::x, &base::Vec3f::y, &base::Vec3f::z}) {
+    const auto low = static_cast<double>(box.min.*member), high = static_cast<double>(box.max.*member);
+    const double furthest = std::max(std::abs(low), std::abs(high));
+    if (!(furthest <= step_m * (most_steps - 2))) return false;
+    if (!(high - low <= step_m * (std::min(most_steps, kMostStepsOfTile) - 2))) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 float lattice_step(double wanted_m) {
@@ -99,6 +110,23 @@ float lattice_step(double wanted_m) {
 
 float position_step_in_force(float wanted_m, float suggested_m) {
   return lattice_step(static_cast<double>(wanted_m > 0 ? wanted_m : suggested_m));
+}
+
+float coarsest_step(const map::SceneSnapshot& scene, float step_m) {
+  const auto step = static_cast<double>(step_m);
+  const double most = most_steps(step_m);
+  double coarsest = step;
+  for (const auto& tile : scene.tiles()) {
+    if (is_told_apart(tile->bounds, step, most)) continue;
+    const Rounding rounding(*tile, step_m);
+    for (std::size_t v = 0; v < tile->positions.size(); ++v) {
+      if (!rounding.is_drawn(v)) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        coarsest = std::max(coarsest, rounding.step_m(rounding.halvings(v, axis)));
+      }
+    }
+  }
+  return static_cast<float>(coarsest);
 }
 
 float one_step_for_all(float step_m, const base::Bounds& bounds) {

@@ -11,6 +11,10 @@ namespace spectra::stream {
 /// The step that is in force when `wanted_m` (0: what the scene asks for) is to be the largest one. Always a lattice_step().
 float position_step_in_force(float wanted_m, float suggested_m);
 
+/// The coarsest step that a vertex of any tile of a scene has where `step_m` is to be the largest: larger than that where tiles reach so far
+/// that floats do not tell it apart.
+float coarsest_step(const map::SceneSnapshot& scene, float step_m);
+
 /// That step, doubled until every coordinate within `bounds` is fewer than 2^21 of them from the scene origin and from every
 /// other: for a file that has a single lattice.
 float one_step_for_all(float step_m, const base::Bounds& bounds);

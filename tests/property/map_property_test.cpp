@@ -184,7 +184,7 @@ RC_GTEST_PROP(LivingMap, IsTheMapThatIsBuiltAtOnce, ()) {
   // Of one block leaves may be larger than elsewhere.
   const LivingMap::Options options{.leaf_vertex_count = kLeafSize,
                                    .settled_block = *rc::gen::element(std::string(), name_of(0), name_of(1)),
-                                   .first_level = 6};
+                                   .first_level = *rc::gen::element(6, 9, 12)};
   LivingMap map(options);
   std::map<std::string, Patch> in_it;
   const int steps = *rc::gen::inRange(1, 9);

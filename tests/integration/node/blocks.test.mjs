@@ -113,6 +113,9 @@ test("how sure a temperature is reaches whoever asks, and every file", async () 
   let server = await begin();
   await put(server, "sure", patch(0, 0, { side: 11, sigma: 0.25, seen: 1700000123.5 }), "?observed_at=1700000200");
   await put(server, "plain", patch(1, 0, { side: 11 }));
+  const { notes } = await put(server, "ms", patch(20, 0, { side: 11, sigma: 0.25, seen: 1700000123500 }));
+  assert.deepEqual(notes.map(({ id, count }) => [id, count]), [["absurd_times", 121]]);
+  assert.equal((await ask(server, "DELETE", "ms")).status, 200);
   const check = async () => {
     const { origin } = await sceneOf(server);
     const client = await SpectraClient.connect(server.url);
@@ -170,9 +173,21 @@ test("what cannot be taken is refused with a reason, and the map stays as it was
     [400, "id", await ask(server, "PUT", "a%20b", { body: patch(0, 0, { side: 3 }) })],
     [400, "id", await ask(server, "PUT", "x".repeat(65), { body: patch(0, 0, { side: 3 }) })],
     [400, "observed_at", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?observed_at=now" })],
+    ...(await Promise.all(
+      ["1e300", "-5", String(Date.now())].map(async (time) => [
+        400,
+        "observed_at",
+        await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: `?observed_at=${time}` }),
+      ]),
+    )),
+    [422, "body", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3, scale: 4e29 }) })],
+    [422, "body", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3, at: [691000, 5334000, 0] }) })],
     [400, "sensor", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?sensor=1,2" })],
     [400, "colour", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?colour=red" })],
     [400, "temperature_unit", await ask(server, "PUT", "x", { body: "", query: "?temperature_unit=reaumur" })],
+    [400, "scale", await ask(server, "PUT", "x", { body: patch(0, 0, { side: 3 }), query: "?scale=1&scale=2" })],
+    [400, "at", await ask(server, "GET", "good", { query: "?at=1&at=2" })],
+    [400, "scale", await ask(server, "DELETE", "good", { query: "?scale=1" })],
     [404, "id", await ask(server, "DELETE", "x")],
     [404, "id", await ask(server, "GET", "x")],
   ];
@@ -182,7 +197,12 @@ test("what cannot be taken is refused with a reason, and the map stays as it was
     assert.ok(got.answer.error.code.length > 0 && got.answer.error.reason.length > 10, JSON.stringify(got));
     assert.doesNotMatch(got.answer.error.reason, /\/proc\//);
   }
-  assert.equal((await ask(server, "POST", "x", { body: "x" })).status, 405);
+  const unknown = await ask(server, "POST", "x", { body: "x" });
+  assert.equal(unknown.status, 405);
+  assert.equal(unknown.answer.error.code, "method_not_allowed");
+  const cut = await ask(server, "GET", "a%");
+  assert.equal(cut.status, 400);
+  assert.equal(cut.answer.error.field, "target");
   const foreign = await fetch(`${server.url}/api/v1/blocks/x`, {
     method: "PUT",
     body: patch(0, 0, { side: 3 }),
@@ -205,7 +225,19 @@ test("with a store the map is there again after the server was killed", async ()
   const before = { scene: await sceneOf(server), blocks: await list(server) };
   server.process.kill("SIGKILL");
   await once(server.process, "exit");
-  server = await serve(["--live", "--store", store]);
+  server = await serve(["--live", "--store", store], { ready: false });
+  // Until the map is open nothing is said of it.
+  for (;;) {
+    const reply = await fetch(`${server.url}/api/v1/blocks`);
+    const block = await fetch(`${server.url}/api/v1/blocks/b1`);
+    assert.ok([200, 503].includes(block.status), `${block.status}`);
+    if (reply.status === 200) {
+      assert.deepEqual(await reply.json(), before.blocks);
+      break;
+    }
+    assert.deepEqual([reply.status, reply.headers.get("retry-after")], [503, "1"]);
+  }
+  while ((await fetch(`${server.url}/readyz`)).status !== 200) await sleep(20);
   const scene = await sceneOf(server);
   for (const name of ["vertex_count", "triangle_count", "bounds", "origin", "position_step_m", "temperature", "tile_count"]) {
     assert.deepEqual(scene[name], before.scene[name], name);

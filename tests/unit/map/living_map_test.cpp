@@ -83,6 +83,94 @@ TEST_F(LivingMapTest, SharesTilesThatAreTheSameWithTheVersionBefore) {
   EXPECT_LT(same, after->tiles().size());
 }
 
+TEST_F(LivingMapTest, ABlockThatIsPutAgainAsItIsLeavesAllTilesAsTheyAre) {
+  apply(put("a", terrain(1, 0)));
+  apply(put("b", terrain(2, 39)));
+  const auto before = completed();
+  const auto again = apply(put("b", terrain(2, 39)));
+  EXPECT_TRUE(std::ranges::equal(again->tiles(), before->tiles()));
+  EXPECT_FALSE(map_.is_behind());
+  mesh::MultispectralMesh warmer = terrain(2, 39);
+  warmer.temperature_celsius()[5] += 1;
+  EXPECT_FALSE(std::ranges::equal(apply(put("b", std::move(warmer)))->tiles(), before->tiles()));
+  BlockPut later = put("a", terrain(1, 0));
+  later.observed_at = 17;
+  EXPECT_EQ(apply(std::move(later))->observed(), std::pair(17.0, 17.0));
+}
+
+TEST_F(LivingMapTest, TakesWhatIsEmptiedToAnotherPlace) {
+  MultispectralMesh far = terrain(2, 0);
+  far.origin = {691'000, 5'334'000, 0};
+  apply(put("a", terrain(1, 0)));
+  const auto first = *map_.constants();
+  apply(std::vector<BlockPut>{}, {"a"});
+  EXPECT_FALSE(map_.constants());
+  const std::vector<base::Vec3f> positions(far.positions().begin(), far.positions().end());
+  const auto scene = apply(put("b", std::move(far)));
+  EXPECT_EQ(scene->origin(), (base::Vec3d{691'000, 5'334'000, 0}));
+  EXPECT_NE(map_.constants()->grid.corner_m(), first.grid.corner_m());
+  EXPECT_TRUE(std::ranges::equal(scene->block_mesh("b")->positions(), positions));
+}
+
+// What is far away has tiles of its own, however little it is, and leaves all others as they are.
+TEST(LivingMapWithRoom, HasNoTileOfTheFullMeshThatReachesFromNearToFar) {
+  jobs::WorkerPool pool(2);
+  for (const std::uint32_t leaf_size : {400U, 32'000U}) {
+    LivingMap map({.leaf_vertex_count = leaf_size, .first_level = 12});
+    std::uint32_t revision = 0;
+    const auto with = [&](BlockPut block) {
+      MapChange change;
+      change.put.push_back(std::move(block));
+      return map.apply(std::move(change), ++revision, pool);
+    };
+    const auto before = with(put("near", terrain(1, 0)));
+    const auto after = with(put("stray", terrain(2, 60'000)));
+    std::size_t far_count = 0;
+    for (const auto& tile : after->tiles()) {
+      if (tile->child_mask != 0) continue;
+      EXPECT_LT(tile->bounds.max.x - tile->bounds.min.x, 100);
+      if (tile->bounds.min.x > 1000) ++far_count;
+    }
+    EXPECT_GT(far_count, 0U);
+    for (const auto& tile : before->tiles()) {
+      if (tile->child_mask != 0) continue;
+      EXPECT_EQ(std::ranges::count(after->tiles(), tile), 1) << "the same, not made again";
+    }
+  }
+}
+
+TEST_F(LivingMapTest, CoreIsWithoutTheFewBlocksThatLieFarAway) {
+  const auto surveyed = [](const std::string& id, std::uint32_t side, float x) {
+    MultispectralMesh mesh = testing::terrain({.columns = side, .rows = side, .seed = 3});
+    for (base::Vec3f& p : mesh.positions()) p.x += x;
+    BlockPut block = put(id, std::move(mesh));
+    block.scene.core_bounds = base::bounds_of(block.scene.mesh.positions());
+    return block;
+  };
+  const auto note = [](const SceneSnapshot& scene) {
+    const auto found = std::ranges::find(scene.notes(), "stray_blocks", &files::Note::id);
+    return found == scene.notes().end() ? std::string() : found->message;
+  };
+  apply(surveyed("a", 60, 0));
+  auto scene = apply(surveyed("b", 10, 100));
+  EXPECT_GT(scene->core_bounds().max.x, 100) << "it is near";
+  EXPECT_EQ(note(*scene), "");
+  scene = apply(surveyed("c", 10, 9000));
+  EXPECT_LT(scene->core_bounds().max.x, 200);
+  EXPECT_GT(scene->core_bounds().max.x, 100);
+  EXPECT_GT(scene->bounds().max.x, 9000);
+  EXPECT_TRUE(note(*scene).starts_with("Block c lies far from everything else, up to 8.8")) << note(*scene);
+  scene = apply(surveyed("d", 60, 9000));
+  EXPECT_GT(scene->core_bounds().max.x, 9000) << "half of the map is no stray";
+  EXPECT_EQ(note(*scene), "");
+  // Whichever of them came first, and however heavy: the others are the map.
+  std::vector<BlockPut> many;
+  for (int i = 0; i < 40; ++i) many.push_back(surveyed("m" + std::to_string(i), 30, static_cast<float>(30 * i)));
+  scene = apply(std::move(many), {"a", "b", "c"});
+  EXPECT_LT(scene->core_bounds().max.x, 1500);
+  EXPECT_TRUE(note(*scene).starts_with("Block d lies")) << note(*scene);
+}
+
 TEST_F(LivingMapTest, KeepsHowSureTemperaturesAreWhereThatIsKnown) {
   const auto sure = [](std::uint32_t seed, float x, float sigma, double at) {
     mesh::MultispectralMesh mesh = terrain(seed, x);
@@ -224,10 +312,12 @@ TEST_F(LivingMapTest, AutomaticValuesFollowWhenTheyHaveMovedFarEnough) {
   const auto hotter = apply(put("b3", terrain(3, 39 * 3, 20)));
   EXPECT_NE(hotter->reference_temperature(), first->reference_temperature());
   EXPECT_EQ(hotter->reference_temperature()->summary.maximum, hotter->temperature().summary.maximum);
-  // What is put again as it was moves nothing, until all of it was.
+  // What is put again nearly as it was moves nothing, until all of it was.
   auto last = hotter;
+  float warmer = 0;
   const auto put_again = [&](std::uint32_t i) {
-    last = apply(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i), i == 3 ? 20.0F : 0.0F)));
+    warmer += 0.001F;
+    last = apply(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i), warmer + (i == 3 ? 20 : 0))));
   };
   for (std::uint32_t i = 0; i < 5; ++i) put_again(i);
   EXPECT_EQ(last->reference_temperature(), hotter->reference_temperature());

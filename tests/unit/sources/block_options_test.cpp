@@ -26,6 +26,21 @@ TEST(BlockOptions, AreThoseOfTheCommandLine) {
   EXPECT_EQ(block.value().read.up, base::UpAxis::MinusY);
 }
 
+TEST(BlockOptions, TimesThatCannotBeMeantAreRefused) {
+  for (const std::string text : {"0", "1700000000.5", "1e11"}) {
+    EXPECT_TRUE(incoming_block("a", {{"observed_at", text}})) << text;
+  }
+  for (const std::string text : {"1e300", "-5", "-0.001", "1700000000000", "1.1e11"}) {
+    const auto block = incoming_block("a", {{"observed_at", text}});
+    ASSERT_FALSE(block) << text;
+    EXPECT_EQ(block.error().field, "observed_at");
+    EXPECT_EQ(block.error().message.find("milliseconds") != std::string::npos,
+              text == "1700000000000" || text == "1.1e11")
+        << block.error().message;
+  }
+  EXPECT_EQ(limits_of("observed_at"), "0 to 1e11 seconds since 1970");
+}
+
 TEST(BlockOptions, ComeBackFromTheTextThatIsKept) {
   const auto block = incoming_block(
       "a",

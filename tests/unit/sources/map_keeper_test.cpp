@@ -9,6 +9,7 @@
 #include <future>
 #include <limits>
 #include <thread>
+#include <variant>
 
 #include "server/sources/block_options.hpp"
 
@@ -50,7 +51,9 @@ class MapKeeperTest : public testing::Test {
  protected:
   explicit MapKeeperTest(std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max())
       : map_(scenes_, pool_, nullptr, std::nullopt, most_bytes) {
+    EXPECT_FALSE(map_.is_open());
     EXPECT_FALSE(map_.restore());
+    EXPECT_TRUE(map_.is_open());
   }
   ~MapKeeperTest() override {
     map_.end();
@@ -167,6 +170,101 @@ TEST_F(MapKeeperTest, WhatBlocksShareIsTheSameWhenAllComeAtOnceIntoAnEmptyMap) {
     ASSERT_EQ(left.size(), 81U);
     for (std::size_t row = 0; row < 9; ++row) EXPECT_EQ(left[9 * row + 8], right[9 * row]) << i;
   }
+}
+
+TEST_F(MapKeeperTest, RefusesWhatLiesWhereNothingOfTheMapCan) {
+  const auto answer = [this] { return answers().back(); };
+  put("unit", square(5, 0, 0, 0, 2e29));
+  EXPECT_EQ(answer(), "unit refused: absurd_extent");
+  put("place", square(5, 0, 1e12));
+  EXPECT_EQ(answer(), "place refused: absurd_extent");
+  put("utm", square(9, 0, 691'000, 5'334'000, 0.1));
+  EXPECT_EQ(answer(), "utm has 81");
+  put("local", square(9));
+  EXPECT_EQ(answer(), "local refused: too_far_away");
+  put("near", square(9, 0, 1'600'000, 5'334'000, 0.1));
+  EXPECT_EQ(answer(), "near has 81") << "909 km";
+  remove("utm");
+  remove("near");
+  EXPECT_EQ(answers().size(), 7U);
+  put("local", square(9));
+  EXPECT_EQ(answer(), "local has 81") << "an empty map begins anew";
+}
+
+// The map as it was is read by the constants of that time, also when it has been emptied and lies elsewhere now.
+TEST(MapKeeper, RemembersWhereAMapLayThatWasEmptied) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "spectra-map-emptied";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  int second = 0;
+  const auto open = [&] {
+    return store::BlockStore::open((folder / "map.sqlite").string(),
+                                   {.now = [&second] { return store::StoreTime(std::chrono::seconds(1000 + second)); }})
+        .value();
+  };
+  const auto change = [&second](MapKeeper& map, const std::string& id, const std::string& ply) {
+    ++second;
+    std::promise<bool> is_taken;
+    if (ply.empty()) {
+      map.remove(id,
+                 [&](const auto& outcome) { is_taken.set_value(std::holds_alternative<store::Revision>(outcome)); });
+    } else {
+      IncomingBlock block = incoming_block(id, std::string()).value();
+      block.ply = std::make_shared<const std::string>(ply);
+      map.put(std::move(block),
+              [&](const auto& outcome) { is_taken.set_value(std::holds_alternative<MapKeeper::Taken>(outcome)); });
+    }
+    ASSERT_TRUE(is_taken.get_future().get()) << id;
+  };
+  const std::string utm = square(9, 0, 691'000, 5'334'000, 0.1), local = square(9, 0, 0, 0, 0.1);
+  const auto serve = [&](const std::optional<store::StoreTime>& at, const auto& use) {
+    map::SceneStore scenes;
+    jobs::WorkerPool pool(2);
+    {
+      MapKeeper map(scenes, pool, open(), at);
+      ASSERT_EQ(map.restore(), std::nullopt);
+      use(map, scenes);
+      map.end();
+    }
+    pool.stop();
+  };
+  base::Vec3d origin_of_utm;
+  const auto positions_of = [](const map::SceneStore& scenes, const std::string& id) {
+    const auto mesh = scenes.current()->block_mesh(id);
+    return std::vector<base::Vec3f>(mesh->positions().begin(), mesh->positions().end());
+  };
+  std::vector<base::Vec3f> of_utm;
+  serve(std::nullopt, [&](MapKeeper& map, const map::SceneStore& scenes) {
+    change(map, "utm", utm);
+    origin_of_utm = scenes.current()->origin();
+    of_utm = positions_of(scenes, "utm");
+    change(map, "utm", "");
+    change(map, "local", local);
+    EXPECT_EQ(scenes.current()->origin(), base::Vec3d{});
+    change(map, "local", "");
+  });
+  EXPECT_NE(origin_of_utm, base::Vec3d{});
+  serve(std::nullopt, [&](MapKeeper& map, const map::SceneStore& scenes) {
+    change(map, "utm", utm);
+    EXPECT_EQ(scenes.current()->origin(), origin_of_utm) << "emptied before it was served again";
+    change(map, "utm", "");
+    change(map, "local", local);
+  });
+  serve(store::StoreTime(std::chrono::seconds(1001)), [&](MapKeeper&, const map::SceneStore& scenes) {
+    EXPECT_EQ(scenes.current()->origin(), origin_of_utm);
+    EXPECT_EQ(positions_of(scenes, "utm"), of_utm);
+  });
+  serve(std::nullopt, [&](MapKeeper& map, const map::SceneStore& scenes) {
+    EXPECT_EQ(scenes.current()->origin(), base::Vec3d{});
+    std::promise<std::vector<base::Vec3f>> past;
+    map.read_at(store::StoreTime(std::chrono::seconds(1001)), "utm", [&](const auto& outcome) {
+      const auto* scene = std::get_if<files::LoadedScene>(&outcome);
+      if (scene == nullptr) return past.set_value({});
+      past.set_value({scene->mesh.positions().begin(), scene->mesh.positions().end()});
+    });
+    EXPECT_EQ(past.get_future().get(), of_utm);
+  });
+  std::filesystem::remove_all(folder);
 }
 
 // Killed before the constants of its map were stored: the first block decides them again, and the others come to a map that is there.

@@ -56,6 +56,19 @@ TEST(PositionStep, OfAFileIsRaisedWhereTheSceneIsTooLargeForIt) {
   EXPECT_GT(2e6F / raised, 1 << 19);
 }
 
+TEST(PositionStep, OfAWholeSceneIsTheCoarsestThatItsTilesHave) {
+  const float step = lattice_step(0.0078125);
+  const auto near = testing::patch_tile({1, 0, 0, 0}, 20, 0, 20);
+  auto far = std::make_shared<map::Tile>(*testing::patch_tile({1, 1, 0, 0}, 20, 1, 20));
+  EXPECT_EQ(coarsest_step(*testing::scene_of({near, far}), step), step);
+  for (base::Vec3f& p : far->positions) p.x += 5e6F;
+  far->bounds.min.x += 5e6F;
+  far->bounds.max.x += 5e6F;
+  const float coarsest = coarsest_step(*testing::scene_of({near, far}), step);
+  EXPECT_EQ(coarsest, tile_lattice(*far, step).value().coarsest_step_m);
+  EXPECT_GT(coarsest, step);
+}
+
 TEST(TileLattice, IsWithinHalfAStepAndSharedByNeighbours) {
   const float step = lattice_step(0.003);
   const auto left = testing::patch_tile({1, 0, 0, 0}, 20, 0, 20);
