@@ -91,7 +91,6 @@ test("who does not speak the protocol is told so", async () => {
     [1002, next],
     [1002, Buffer.from("garbage that is longer than a header")],
     [1002, Buffer.alloc(0)],
-    [1002, Buffer.concat([message(1, "a", small(0)), Buffer.alloc(1)])],
     [1003, "a text"],
   ]) {
     const sender = await IngestSender.connect(server.url);
@@ -100,6 +99,13 @@ test("who does not speak the protocol is told so", async () => {
     assert.equal(closed.code, code);
     assert.ok(closed.reason.length > 10, closed.reason);
   }
+  const longer = await IngestSender.connect(server.url);
+  longer.socket.send(Buffer.concat([message(1, "a", small(0)), Buffer.alloc(1)]));
+  const told = await longer.answer(1);
+  assert.deepEqual([told.method, told.code, told.field], ["ingest.refused", "bad_request", "body"]);
+  longer.socket.send(message(2, "a", small(0)));
+  assert.equal((await longer.answer(2)).method, "ingest.acknowledged");
+  await longer.close();
   const sender = await IngestSender.connect(server.url);
   // None is answered before the first, which takes long.
   sender.sendAnyway("a", patch(0, 0, { side: 400 }));
