@@ -247,7 +247,8 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
   is_waiting_for_request_ = true;
   auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
   is_waiting_for_request_ = false;
-  co_await wait_for_turn();
+  // Who only ends the connection asks for nothing.
+  if (parser.got_some()) co_await wait_for_turn();
   if (is_stopping_) co_return false;
   const bool is_read_method = parser.get().method() == http::verb::get || parser.get().method() == http::verb::head;
   const bool is_change = is_block_change(parser.get());
