@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.error
 import urllib.request
 import zlib
 
@@ -131,8 +132,13 @@ class Frames(unittest.TestCase):
 
     @staticmethod
     def blocks(url):
-        with urllib.request.urlopen(url + "/api/v1/blocks?limit=1000") as answer:
-            return json.load(answer)["blocks"]
+        try:
+            with urllib.request.urlopen(url + "/api/v1/blocks?limit=1000") as answer:
+                return json.load(answer)["blocks"]
+        except urllib.error.HTTPError as refused:
+            if refused.code != 503:
+                raise
+            return []  # The map is not open yet.
 
     def wait_for_blocks(self, url, count):
         for _ in range(400):

@@ -115,7 +115,7 @@ test("every option of serve is in the sample, and every line of the sample is go
   writeFileSync(at("map_thermal.ply"), "");
   writeFileSync(at("map.store"), "");
   const here = (value) => value.replace(/"\/(?:[\w.]+\/)*([\w.]+)"/, (_, name) => `"${at(name)}"`);
-  const needed = { thermal: ["scene"], history: ["store"], at: ["store"], invite: ["tokens"], certificate: ["key"], key: ["certificate"] };
+  const needed = { thermal: ["scene"], history: ["store"], at: ["store"], invite: ["tokens"], certificate: ["key"], key: ["certificate"], track: ["map"], submaps: ["map"] };
   for (const key of settings.keys()) {
     const lines = [...(needed[key] ?? []), key].map((name) => `${name} = ${here(settings.get(name))}\n`);
     const { status, stderr } = spectra("check-config", config(`[serve]\n${lines.join("")}`));
