@@ -52,7 +52,7 @@ class TreeChange {
   ChangedTree run(const std::shared_ptr<const MapNode>& root, std::span<const BlockMesh> added,
                   jobs::WorkerPool& pool) {
     if (root && !removed_.empty()) find_touched(root, pool);
-    total_ = root ? root->content : CellContent{};
+    total_before_ = total_ = root ? root->content : CellContent{};
     if (root) total_ -= removed_content(root->id);
     std::vector<std::vector<Element>> parts(added.size());
     std::vector<std::uint32_t> numbers;
@@ -350,7 +350,10 @@ class TreeChange {
         const unsigned taken = branch.octants & group.octants & ~same_octants;
         if (taken != 0) take_all(branch.node, middle, taken, parts[g]);
       }
-      if (same && parts[g].empty() && !is_touched(id) && is_leaf(group.count, id.level) == same->is_leaf()) {
+      // What was all of the map and is not any more, or the other way round, is cut by another rule further down.
+      const bool is_other_rule = (group.count == total_) != (group.count == total_before_);
+      if (same && parts[g].empty() && !is_touched(id) && !is_other_rule &&
+          is_leaf(group.count, id.level) == same->is_leaf()) {
         node.branches.push_back({group.octants, same});
         continue;
       }
@@ -383,7 +386,8 @@ class TreeChange {
   const std::set<BlockNumber> removed_;
   const BlockLabels& labels_;
   const std::function<void(double)>& made_share_;
-  CellContent total_;  ///< Of the whole map, in the end.
+  CellContent total_;         ///< Of the whole map, in the end.
+  CellContent total_before_;  ///< The same before the change.
 
   Pieces pieces_;
   std::mutex mutex_;  ///< Of the next.
