@@ -351,7 +351,8 @@ class TreeChange {
         if (taken != 0) take_all(branch.node, middle, taken, parts[g]);
       }
       // What was all of the map and is not any more, or the other way round, is cut by another rule further down.
-      const bool is_other_rule = (group.count == total_) != (group.count == total_before_);
+      const bool is_other_rule = group.count.owned_count > sizes_.root_vertex_count &&
+                                 (group.count == total_) != (group.count == total_before_);
       if (same && parts[g].empty() && !is_touched(id) && !is_other_rule &&
           is_leaf(group.count, id.level) == same->is_leaf()) {
         node.branches.push_back({group.octants, same});
