@@ -40,7 +40,8 @@ namespace {
 
 void note_faults(const TrajectoryNotes& notes, const fs::path& file, FaultLog& faults) {
   if (notes.unreadable > 0) {
-    faults.add(FaultKind::UnreadablePose, file.string() + ": lines without a time, a place and a rotation",
+    faults.add(FaultKind::UnreadablePose,
+               file.string() + ": lines without a time, a place and a rotation, or 1,000 km or more from 0",
                notes.unreadable);
   }
   if (notes.backwards > 0) {

@@ -13,13 +13,16 @@ namespace {
 
 constexpr std::size_t kLeastEvidence = 200;   ///< Pixels of fit_of that match.
 constexpr double kLeastFit = 0.5;             ///< Of those where both have something.
-constexpr double kFarthestVoxels = 1 << 29;   ///< A place is counted in 32 bits; what a camera sees is added to it.
 constexpr double kLongestWaitSeconds = 1;     ///< Of a thermal picture, for the pose after it.
 constexpr std::size_t kEnoughSpreads = 4096;  ///< For their median to stand.
 
 std::string seconds_text(double seconds) {
   std::string text = std::to_string(seconds);
   return text.substr(0, text.size() - 3) + " s";
+}
+
+std::string far_text(double time_s) {
+  return "at " + seconds_text(time_s) + " the pose is 1,000 km or more from 0, where voxels are not counted";
 }
 
 /// The pose and motion of a camera that is rigidly beside another.
@@ -70,9 +73,8 @@ bool Mapper::find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& 
     faults.add(FaultKind::NoPose, "at " + seconds_text(time_s) + " no pose is known within 100 ms");
     return false;
   }
-  if (answer.state == PoseState::Known &&
-      !(answer.pose.translation().lpNorm<Eigen::Infinity>() < kFarthestVoxels * settings_.voxel_m)) {
-    faults.add(FaultKind::NoPose, "at " + seconds_text(time_s) + " the pose is farther from 0 than voxels are counted");
+  if (answer.state == PoseState::Known && !is_in_range(answer.pose)) {
+    faults.add(FaultKind::NoPose, far_text(time_s));
     return false;
   }
   if (answer.state == PoseState::Jumping || answer.jumps_before > jumps_seen_) {
@@ -133,8 +135,13 @@ std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFr
   TrackedMoment moment;
   moment.time_s = frame.time_s + calibration_.depth.delay_s;
   if (!tracker_->has_begun()) {
-    PoseAnswer first;
-    if (trajectory.size() > 0 && !find_pose(trajectory, moment.time_s, first, faults)) return std::nullopt;
+    // Whoever gives one pose need not give it at the moment of a picture.
+    PoseAnswer first = trajectory.at(moment.time_s);
+    if (first.state != PoseState::Known && trajectory.size() > 0) first.pose = trajectory.nearest(moment.time_s);
+    if (!is_in_range(first.pose)) {
+      faults.add(FaultKind::NoPose, far_text(moment.time_s));
+      return std::nullopt;
+    }
     tracker_->begin(moment.time_s, first.pose);
     return first.pose;
   }

@@ -47,7 +47,7 @@ std::optional<Eigen::Isometry3d> placement(const StampedPoses& told, const Stamp
   std::optional<Eigen::Isometry3d> found;
   std::pair<bool, double> best{true, INFINITY};
   for (const auto& [time_s, pose] : corrected) {
-    const auto at = told_at(told, time_s);
+    const auto at = is_in_range(pose) ? told_at(told, time_s) : std::nullopt;
     if (!at) continue;
     const std::pair<bool, double> rank{!at->is_exact, std::abs(time_s - middle_s)};
     if (!(rank < best)) continue;
@@ -131,6 +131,8 @@ CorrectionReport Submaps::correct(const StampedPoses& corrected) {
       world_from_grid = *last * part.world_from_grid;
     }
     if (!world_from_grid || is_same_place(*world_from_grid, part.world_from_grid, voxel_m_)) continue;
+    // One that goes with another that was turned far away from it.
+    if (!is_in_range(*world_from_grid * part.told.front().second)) continue;
     ++report.moved;
     const auto reaches = [&](const Eigen::Isometry3d& to) {
       for (std::int32_t block = 0; block < part.map->block_end(); ++block) {

@@ -43,7 +43,8 @@ class Submaps {
   /// A depth picture is about to be fused with that pose: begins another submap where it is time.
   void step(double time_s, const Eigen::Isometry3d& world_from_camera);
 
-  /// Moves each submap by the corrected pose nearest to the middle of its time (of a moment at which a pose was told, where there is one); one without any goes with the one before it. Poses that are told from
+  /// Moves each submap by the corrected pose nearest to the middle of its time (of a moment at which a pose was told, where there is one); one without any goes with the one before it. What would
+  /// stand out of range (is_in_range) stays. Poses that are told from
   /// now on are those of the corrected world: a submap of their own begins.
   CorrectionReport correct(const StampedPoses& corrected);
 

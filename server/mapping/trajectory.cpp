@@ -51,13 +51,13 @@ Trajectory Trajectory::from_text(const std::string& text) {
     std::array<double, 8> v{};
     const bool is_read = parse_line(line, v);
     const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
-    if (!is_read || std::abs(rotation.norm() - 1) > 0.05) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
+    if (!is_read || !is_in_range(pose) || std::abs(rotation.norm() - 1) > 0.05) {
       ++trajectory.notes_.unreadable;
       continue;
     }
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.linear() = rotation.normalized().toRotationMatrix();
-    pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
     trajectory.add(v[0], pose);
   }
   return trajectory;
@@ -88,6 +88,13 @@ StampedPoses Trajectory::stamped() const {
   StampedPoses all;
   for (std::size_t i = 0; i < times_.size(); ++i) all.emplace_back(times_[i], poses_[i]);
   return all;
+}
+
+const Eigen::Isometry3d& Trajectory::nearest(double time_s) const {
+  const auto after = static_cast<std::size_t>(std::lower_bound(times_.begin(), times_.end(), time_s) - times_.begin());
+  if (after == 0) return poses_.front();
+  if (after == times_.size()) return poses_.back();
+  return poses_[time_s - times_[after - 1] <= times_[after] - time_s ? after - 1 : after];
 }
 
 void Trajectory::forget_before(double time_s) {

@@ -28,12 +28,20 @@ struct PoseAnswer {
       Eigen::Vector3d::Zero();  ///< In the world; both 0 where neighbours are too far away in time.
 };
 
+/// A place farther from 0 is not mapped: in voxels of 1 mm, the smallest, it still counts in 32 bits with what a camera sees from there, wherever it
+/// is turned to.
+inline constexpr double kFarthestPoseM = 1e6;
+/// False of what is no number, too.
+inline bool is_in_range(const Eigen::Isometry3d& pose) {
+  return pose.translation().norm() < kFarthestPoseM;
+}
+
 /// Poses by their time.
 using StampedPoses = std::vector<std::pair<double, Eigen::Isometry3d>>;
 
 /// Lines that were left out of a trajectory, by reason.
 struct TrajectoryNotes {
-  std::size_t unreadable = 0;  ///< Not eight finite numbers, or no rotation.
+  std::size_t unreadable = 0;  ///< Not eight finite numbers, or no rotation, or farther away than is_in_range().
   std::size_t backwards = 0;   ///< Not later than the line before.
 };
 
@@ -59,6 +67,9 @@ class Trajectory {
   /// The pose at a moment: the rotation by slerp, the translation linearly, between neighbours at most 100 ms apart; or that of a
   /// pose of exactly this moment, within a microsecond.
   PoseAnswer at(double time_s) const;
+
+  /// The pose of the moment nearest to one. Of a trajectory with any.
+  const Eigen::Isometry3d& nearest(double time_s) const;
 
   /// Takes out what is earlier; the last one before stays, so that what is between can be told.
   void forget_before(double time_s);

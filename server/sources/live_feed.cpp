@@ -66,10 +66,10 @@ std::optional<Eigen::Isometry3d> pose_of(const std::vector<double>& v) {
   if (v.size() != 8) return std::nullopt;
   const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
   const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
-  if (!is_finite || !(std::abs(rotation.norm() - 1) <= 0.05)) return std::nullopt;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = rotation.normalized().toRotationMatrix();
   pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
+  if (!is_finite || !mapping::is_in_range(pose) || !(std::abs(rotation.norm() - 1) <= 0.05)) return std::nullopt;
+  pose.linear() = rotation.normalized().toRotationMatrix();
   return pose;
 }
 
@@ -201,8 +201,9 @@ net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
   for (const auto& values : frame.head.poses) {
     const auto pose = pose_of(values);
     if (!pose) {
-      refusal = refused(FaultKind::UnreadablePose, "bad_pose", "poses",
-                        "a pose is not eight finite numbers with a rotation in the last four");
+      refusal =
+          refused(FaultKind::UnreadablePose, "bad_pose", "poses",
+                  "a pose is not eight finite numbers with a rotation in the last four, less than 1,000 km from 0");
       continue;
     }
     const double time_s = on_own_clock(values[0]);
@@ -233,10 +234,13 @@ net::FrameOutcome LiveFeed::take_corrections(const net::IncomingFrame& frame) {
     const auto pose = pose_of(values);
     // Half a correction would tear the map.
     if (!pose) {
-      return refused(FaultKind::UnreadablePose, "bad_pose", "poses",
-                     "a corrected pose is not eight finite numbers with a rotation in the last four; none was taken");
+      return refused(
+          FaultKind::UnreadablePose, "bad_pose", "poses",
+          "a corrected pose is not eight finite numbers with a rotation in the last four, less than 1,000 km from "
+          "0; none was taken");
     }
-    news.poses.emplace_back(on_own_clock(values[0]), depth_pose(*calibration_, *pose));
+    // They speak of what was, and say nothing of the clock of what comes.
+    news.poses.emplace_back(values[0] + shift_s_.value_or(0), depth_pose(*calibration_, *pose));
   }
   new_poses_.push_back(std::move(news));
   return net::FrameTaken{};
@@ -254,7 +258,7 @@ std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::Fr
     return refused(FaultKind::NoCalibration, "no_calibration", "sensor",
                    "the calibration has no " + name_of(*head.sensor) + " camera");
   }
-  if (pose_end_s_ && std::abs(time_s - *pose_end_s_) > kFarthestStampS) {
+  if (!settings_.is_tracking && pose_end_s_ && std::abs(time_s - *pose_end_s_) > kFarthestStampS) {
     return refused(FaultKind::NoPose, "no_pose", "time", name + "has a stamp more than 10 s from the newest pose");
   }
   return std::nullopt;

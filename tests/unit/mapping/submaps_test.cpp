@@ -187,5 +187,27 @@ TEST_F(SubmapsTest, WithoutAPoseOfTheirOwnTheyGoWithTheOneBefore) {
   EXPECT_EQ(mapper.correct({{100, away}}).moved, 0U);
 }
 
+TEST_F(SubmapsTest, NothingMovesToWhereVoxelsAreNotCounted) {
+  Mapper mapper(calibration_, settings_, pool_);
+  fuse_all(mapper, drifted_poses_);
+  const UnitMesh before = mapper.whole_mesh();
+  for (const double far : {1e8, 1e308, std::nan("")}) {
+    Eigen::Isometry3d away = drifted_pose(1.8);
+    away.translation().y() = far;
+    EXPECT_EQ(mapper.correct({{1.8, away}}).moved, 0U) << far;
+  }
+  // The second in range, and the third half the world away from it beyond.
+  Eigen::Isometry3d edge = drifted_pose(1.8);
+  edge.translation().x() = 0.9999999 * kFarthestPoseM;
+  EXPECT_EQ(mapper.correct({{1.8, edge}}).moved + 1, mapper.submap_count());
+  Eigen::Isometry3d turned = edge;
+  turned.translation().x() *= -1;
+  turned.linear() = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()).toRotationMatrix() * edge.linear();
+  mapper.correct({{0.3, turned}});
+  EXPECT_EQ(mapper.correct(drifted_poses_.stamped()).moved, mapper.submap_count());
+  EXPECT_NEAR(static_cast<double>(mapper.whole_mesh().positions.size()), static_cast<double>(before.positions.size()),
+              0.1 * static_cast<double>(before.positions.size()));
+}
+
 }  // namespace
 }  // namespace spectra::mapping

@@ -32,6 +32,22 @@ TEST(Trajectory, DoesNotReachAcrossGaps) {
   EXPECT_EQ(trajectory.at(std::nan("")).state, PoseState::Unknown);
 }
 
+TEST(Trajectory, LeavesOutPosesThatAreTooFarAway) {
+  const Trajectory read =
+      Trajectory::from_text("0 0 0 0 0 0 0 1\n1 0 1e6 0 0 0 0 1\n2 0 0 1e308 0 0 0 1\n3 0 0 999999 0 0 0 1\n");
+  EXPECT_EQ(read.size(), 2U);
+  EXPECT_EQ(read.notes().unreadable, 2U);
+}
+
+TEST(Trajectory, KnowsTheNearestPose) {
+  Trajectory trajectory;
+  for (int i = 0; i < 3; ++i) trajectory.add(i, looking_ahead(i, 0, 0));
+  EXPECT_EQ(trajectory.nearest(-5).translation().x(), 0);
+  EXPECT_EQ(trajectory.nearest(0.9).translation().x(), 1);
+  EXPECT_EQ(trajectory.nearest(1.4).translation().x(), 1);
+  EXPECT_EQ(trajectory.nearest(9).translation().x(), 2);
+}
+
 TEST(Trajectory, TakesOnePoseThatJumpsAwayAndBackForWrong) {
   Trajectory trajectory;
   for (int i = 0; i < 10; ++i) trajectory.add(0.033 * i, looking_ahead(i == 5 ? 3 : 0.01 * i, 0, 0));

@@ -205,6 +205,62 @@ TEST_F(LiveFeedTest, TracksWithoutPosesAndSaysThatItIsLost) {
   EXPECT_TRUE(poses_.back().is_lost);
 }
 
+TEST_F(LiveFeedTest, TracksOnAfterTheOnlyPose) {
+  mapping::MapperSettings tracking = settings();
+  tracking.is_tracking = true;
+  own_ = feed_of(tracking);
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  EXPECT_EQ(code_of(pose(0, 2)), "taken");
+  // Not of the moment of that pose.
+  EXPECT_EQ(code_of(depth(0.04)), "taken");
+  EXPECT_EQ(code_of(depth(5)), "lost_track") << "a bare wall";
+  EXPECT_EQ(code_of(depth(10.5)), "lost_track") << "of later poses nothing is wanted";
+  const std::lock_guard lock(mutex_);
+  ASSERT_FALSE(poses_.empty());
+  EXPECT_NEAR(poses_.back().position.x, 2, 0.01);
+}
+
+TEST_F(LiveFeedTest, RefusesPosesThatCannotBeMeant) {
+  mapping::MapperSettings in_parts = settings();
+  in_parts.submaps.emplace();
+  own_ = feed_of(in_parts);
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  EXPECT_EQ(code_of(pose(0, 1e308)), "bad_pose");
+  EXPECT_EQ(code_of(pose(0.01, 1e6)), "bad_pose");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
+  EXPECT_EQ(code_of(depth(0.05)), "taken");
+  FrameHead corrected;
+  corrected.kind = FramesKind::CorrectedPoses;
+  for (const double far : {1e8, 1e308}) {
+    corrected.poses = {{0.05, 0, far, 0, 0, 0, 0, 1}};
+    EXPECT_EQ(code_of(send(corrected)), "bad_pose") << far;
+  }
+  EXPECT_EQ(code_of(depth(0.1)), "taken") << "mapping goes on";
+}
+
+TEST_F(LiveFeedTest, CorrectionsOfBeforeTheLinkBrokeSpeakOfThatTime) {
+  mapping::MapperSettings in_parts = settings();
+  in_parts.submaps.emplace();
+  own_ = feed_of(in_parts);
+  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(code_of(calibrate()), "taken");
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
+  EXPECT_EQ(code_of(depth(0.05)), "taken");
+  EXPECT_GT(units_within(5s), 0U);
+  own_->end();
+  EXPECT_TRUE(own_->begin());
+  FrameHead corrected;
+  corrected.kind = FramesKind::CorrectedPoses;
+  corrected.poses = {{0.05, 1, 0, 0, 0, 0, 0, 1}};
+  EXPECT_EQ(code_of(send(corrected)), "taken");
+  EXPECT_GT(units_within(5s), 1U) << "the submap of that moment moves";
+  // The clock of what comes is told by what comes.
+  for (int i = 4; i < 7; ++i) EXPECT_EQ(code_of(pose(0.05 * i, 1)), "taken");
+  EXPECT_EQ(code_of(depth(0.25)), "taken");
+}
+
 TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
   mapping::MapperSettings in_parts = settings();
   in_parts.submaps.emplace();
