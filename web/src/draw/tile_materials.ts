@@ -118,7 +118,7 @@ export class TileMaterials {
 
   /** Lines, dark on what is bright and bright on what is dark, where a temperature is less sure than that. */
   setHatch(kelvin: number | null): void {
-    this.#uniforms.hatch.value.x = kelvin === null ? 2 : sigmaStep(kelvin) / UNKNOWN_SIGMA;
+    this.#uniforms.hatch.value.x = kelvin === null ? 2 : (sigmaStep(kelvin) + 0.5) / UNKNOWN_SIGMA; // between steps
   }
 
   /** The points drawn next have this diameter in metres; `pixel_ratio`: pixels of the drawing buffer per CSS pixel. */
@@ -140,7 +140,7 @@ export class TileMaterials {
   }
 
   #material(defines: Record<string, string>): RawShaderMaterial {
-    return new RawShaderMaterial({
+    const material = new RawShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
@@ -149,5 +149,8 @@ export class TileMaterials {
       side: DoubleSide,
       toneMapped: false,
     });
+    // Of a tile whose sigma has not come nobody knows here.
+    material.defaultAttributeValues = { sigma: [1] };
+    return material;
   }
 }

@@ -147,6 +147,15 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(store.fusingPlace).toBe('robot');
     expect(fusing.leftToRobot).toContain('steps of 1 °C');
     expect(fusing.channels).toEqual(['fused']);
+    // When what stood out is gone, it is tried again.
+    store.scene = { temperature: { min: 10, max: 30 }, live: false } as never;
+    expect(fusing.channels).toEqual(['fused']);
+    counts.step_celsius = 0.01;
+    fusing.consider();
+    expect(fusing.channels).toContain('temperature');
+    counts.step_celsius = 1;
+    fusing.consider();
+    expect(store.fusingPlace).toBe('robot');
     // A range that is wide enough for them may be made here.
     store.fusionInForce = { ...FUSION, range: { mode: 'manual', min: 0, max: 600 } };
     fusing.consider();

@@ -61,8 +61,9 @@ export class Fusing {
   /** Colours come from the robot again, and are still on their way. */
   #isLeaving = false;
   #isOfferedRaw = false;
-  /** The coarsest in which temperatures of the picture have come. */
+  /** The coarsest in which temperatures of the picture have come, and of which scene and span that was. */
   #step_celsius = 0;
+  #stepOf = '';
 
   constructor(
     private readonly store: Store,
@@ -128,6 +129,10 @@ export class Fusing {
   consider(): void {
     const { store } = this;
     if (!store.connected || store.scene == null || !this.#isOfferedRaw) return;
+    const { name, temperature } = store.scene;
+    const scene = `${name} ${temperature?.min} ${temperature?.max}`;
+    if (scene !== this.#stepOf) this.#step_celsius = 0;
+    this.#stepOf = scene;
     const counts = this.tiles.rawCounts();
     if (this.#wantsRaw && counts.raw > 0) this.#step_celsius = counts.step_celsius;
     if (!this.#isWanted()) {

@@ -151,7 +151,8 @@ export class Session {
           // A refused upgrade looks like a broken link to a page.
           if (state.phase === 'waiting') void mustLogIn().then((must) => must && location.replace('./login'));
         },
-        expectsMuch: () => !store.settled || store.fusingPlace === 'coming' || store.methods.length === 0,
+        expectsMuch: () =>
+          !store.settled || store.fusingPlace === 'coming' || store.hatchAbove_kelvin !== null || store.methods.length === 0,
         onProtocolError: (error) => console.warn('left out:', error.message),
         onRoundTrip: (round_trip_ms) => {
           const before = store.round_trip_ms;

@@ -47,7 +47,7 @@ interface Shown {
   rank: number;
   /** Rank of what was asked for that they answer: what they may hide, and be hidden by, is decided by it. */
   answer: number;
-  /** The drawing side has both raw layers of this geometry. */
+  /** In which its temperatures came, where the drawing side has both raw layers of this geometry; null: it lacks them. */
   rawStep_celsius: number | null;
   /** The server that is or was connected knows that this geometry is held here. */
   isKnownToServer: boolean;

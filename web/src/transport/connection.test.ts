@@ -117,6 +117,19 @@ describe('Connection', () => {
     }
   });
 
+  it('leaves a silent link in a hidden page, whose timers run once a second', async () => {
+    const { sockets, last } = setUp();
+    const real = performance.now.bind(performance);
+    let skipped_ms = 0;
+    vi.spyOn(performance, 'now').mockImplementation(() => real() + skipped_ms);
+    last().receive(helloText);
+    for (let i = 0; i < 6; i += 1) {
+      skipped_ms += 800;
+      await vi.advanceTimersByTimeAsync(250);
+    }
+    expect(sockets[0]?.closed).toBe(true);
+  });
+
   it('does not take a link for dead because the page slept', async () => {
     const { sockets, last } = setUp();
     const awake = performance.now.bind(performance);

@@ -52,8 +52,8 @@ export type SocketLike = Pick<WebSocket, 'binaryType' | 'readyState' | 'send' | 
 const OPEN = 1;
 const HELLO_TIMEOUT_MS = 6_000;
 const CHECK_INTERVAL_MS = 250;
-/** A page that has not checked for so long has slept, or stalled. */
-const SLEPT_MS = 1_000;
+/** A page that has not checked for so long has slept, or stalled; in a hidden one timers run once a second. */
+const SLEPT_MS = 2_000;
 /** Silence after which the server, which says something every second, is asked for a sign of life. */
 export const QUIET_MS = 1_500;
 /** Time it has to give one. A cut TCP connection takes seconds to resume; a new one is there at once. */
