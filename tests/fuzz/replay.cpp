@@ -19,18 +19,32 @@
 /// Runs a fuzz target without a fuzzer: over files as they are, every argument a file or a folder of files, and then over so many
 /// inputs that are made of them by chance, the same in every run.
 ///   fuzz_NAME [--mutations N] FILE|FOLDER ...
-/// Ends with an error when there was nothing to run. An input that ends the program is left behind as ./crash-input.
+/// Ends with an error when there was nothing to run. An input that ends the program is left behind as ./crash-fuzz_NAME.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+/// There in a program with a sanitizer.
+extern "C" __attribute__((weak)) void __sanitizer_set_death_callback(void (*callback)());
 
 namespace {
 
 std::string current;
+std::string kept_as;
 
-extern "C" void keep_input(int number) {
-  const int file = open("crash-input", O_WRONLY | O_CREAT | O_TRUNC, 0644);
+void keep_input() {
+  const int file = open(kept_as.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   if (file >= 0 && write(file, current.data(), current.size()) >= 0) close(file);
+}
+
+extern "C" void on_signal(int number) {
+  keep_input();
   std::signal(number, SIG_DFL);
   std::raise(number);
+}
+
+/// A sanitizer ends the program by itself, with a report that handlers of signals would take from it.
+void keep_what_ends_the_program() {
+  std::signal(SIGABRT, on_signal);
+  if (__sanitizer_set_death_callback != nullptr) return __sanitizer_set_death_callback(keep_input);
+  for (const int number : {SIGSEGV, SIGFPE, SIGILL, SIGBUS}) std::signal(number, on_signal);
 }
 
 void run(std::string input) {
@@ -100,7 +114,8 @@ class Mutator {
 }  // namespace
 
 int main(int argument_count, char** arguments) {
-  for (const int number : {SIGABRT, SIGSEGV, SIGFPE, SIGILL, SIGBUS}) std::signal(number, keep_input);
+  kept_as = "crash-" + std::filesystem::path(arguments[0]).filename().string();
+  keep_what_ends_the_program();
   std::vector<std::filesystem::path> files;
   std::size_t mutation_count = 0;
   for (int i = 1; i < argument_count; ++i) {

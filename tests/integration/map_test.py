@@ -132,19 +132,17 @@ class Frames(unittest.TestCase):
 
     @staticmethod
     def blocks(url):
-        try:
-            with urllib.request.urlopen(url + "/api/v1/blocks?limit=1000") as answer:
-                return json.load(answer)["blocks"]
-        except urllib.error.HTTPError as refused:
-            if refused.code != 503:
-                raise
-            return []  # The map is not open yet.
+        with urllib.request.urlopen(url + "/api/v1/blocks?limit=1000") as answer:
+            return json.load(answer)["blocks"]
 
     def wait_for_blocks(self, url, count):
         for _ in range(400):
-            found = self.blocks(url)
-            if len(found) >= count:
-                return found
+            try:
+                found = self.blocks(url)
+                if len(found) >= count:
+                    return found
+            except urllib.error.HTTPError as refused:
+                self.assertEqual(refused.code, 503, "the map is not open yet")
             time.sleep(0.05)
         self.fail("the map stays empty")
 

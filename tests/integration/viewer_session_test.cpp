@@ -178,7 +178,11 @@ TEST_F(ViewerSessionTest, TakesBlocksWhenTheMapIsOpen) {
                                        std::to_string(body.size()) + "\r\n\r\n" + body));
   };
   EXPECT_EQ(put(), 503) << "nothing is lost in a map that is replaced by the file that is still being read";
+  EXPECT_EQ(status_of(get("/api/v1/blocks")), 503) << "nobody knows yet what is there";
+  EXPECT_EQ(status_of(get("/api/v1/blocks/a")), 503);
   ASSERT_EQ(map_.restore(), std::nullopt);
+  EXPECT_EQ(status_of(get("/api/v1/blocks")), 200);
+  EXPECT_EQ(status_of(get("/api/v1/blocks/a")), 404);
   EXPECT_EQ(put(), 200);
   EXPECT_EQ(served_.scenes.current()->vertex_count(), 1U);
   map_.end();

@@ -227,7 +227,8 @@ test("with a store the map is there again after the server was killed", async ()
   await once(server.process, "exit");
   server = await serve(["--live", "--store", store], { ready: false });
   // Until the map is open nothing is said of it.
-  for (;;) {
+  for (const deadline = Date.now() + 60_000; ; ) {
+    assert.ok(Date.now() < deadline, "the map opens");
     const reply = await fetch(`${server.url}/api/v1/blocks`);
     const block = await fetch(`${server.url}/api/v1/blocks/b1`);
     assert.ok([200, 503].includes(block.status), `${block.status}`);

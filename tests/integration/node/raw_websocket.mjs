@@ -24,9 +24,9 @@ function behindMessages(bytes) {
  * connection ends without one. An upgrade that is refused for now (503: one robot at a time) is asked for again.
  */
 export async function closeCodeAfter(url, frames, options = {}) {
-  for (;;) {
+  for (let tries = 0; ; tries += 1) {
     const answer = await answerTo(url, frames, options);
-    if (answer !== 503) return answer;
+    if (answer !== 503 || tries === 500) return answer;
     await new Promise((resolve) => setTimeout(resolve, 20));
   }
 }
