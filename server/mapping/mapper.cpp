@@ -104,7 +104,11 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
     }
     is_doubtful_ = false;
   }
-  if (submaps_) submaps_->step(frame.time_s + calibration_.depth.delay_s, pose.pose);
+  if (submaps_ && !submaps_->step(frame.time_s + calibration_.depth.delay_s, pose.pose,
+                                  most_bytes_of_fused() > fused().block_bytes())) {
+    faults.add(FaultKind::MapFull, full_text(frame.time_s));
+    return false;
+  }
   fuse_prepared(frame, look, trajectory, faults);
   return true;
 }
@@ -119,15 +123,23 @@ void Mapper::fuse_prepared(const Frame& frame, const DepthLook& look, const Traj
       ++figures_.colour_frames;
     }
   }
-  const std::size_t not_made = fuse_depth(fused(), look, colour ? &*colour : nullptr, pool_, settings_.most_bytes);
-  if (not_made > 0) {
-    faults.add(FaultKind::MapFull, "at " + seconds_text(frame.time_s) + " the voxels of the map take " +
-                                       std::to_string(settings_.most_bytes) +
-                                       " bytes, as many as they may: nothing new is mapped, what is known goes on; map "
-                                       "with larger voxels, or with "
-                                       "another --limit scene-bytes");
-  }
+  const std::size_t not_made = fuse_depth(fused(), look, colour ? &*colour : nullptr, pool_, most_bytes_of_fused());
+  if (not_made > 0) faults.add(FaultKind::MapFull, full_text(frame.time_s));
   ++figures_.depth_frames;
+}
+
+std::uint64_t Mapper::most_bytes_of_fused() {
+  if (!submaps_) return settings_.most_bytes;
+  // What is new in a submap is soon in the map that is made of all of them, too.
+  const std::uint64_t taken = map_.block_bytes() + submaps_->block_bytes() + submaps_->unbaked_bytes();
+  const std::uint64_t rest = settings_.most_bytes > taken ? settings_.most_bytes - taken : 0;
+  return fused().block_bytes() + rest / 2;
+}
+
+std::string Mapper::full_text(double time_s) const {
+  return "at " + seconds_text(time_s) + " the voxels of the map take " + std::to_string(settings_.most_bytes) +
+         " bytes, as many as they may: nothing new is mapped, what is known goes on; map with larger voxels, or with "
+         "another --limit scene-bytes";
 }
 
 std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFrame& depth,

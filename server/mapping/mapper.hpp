@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "fusion/base/error.hpp"
@@ -27,7 +28,8 @@ struct MapperSettings {
   bool use_thermal = true;
   bool is_tracking = false;  ///< Poses are found from what is seen; of those that are given only the first counts.
   std::optional<SubmapRules> submaps;  ///< Of given poses: the map is made in parts, which correct() moves.
-  /// Of the blocks of voxels, of each submap where there are some. A map that has taken them maps nothing new, says so (MapFull), and goes on with what it has.
+  /// Of the blocks of voxels, of all submaps and the map that is made of them together. A map that has taken them maps nothing new, begins no submap, says so (MapFull), and
+  /// goes on with what it has. Submaps that are turned may reach some more blocks than before.
   std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
   HeatRules heat;
   MeshRules mesh;
@@ -94,6 +96,9 @@ class Mapper {
 
  private:
   MeshRules mesh_rules() const;
+  /// What the blocks of fused() may take.
+  std::uint64_t most_bytes_of_fused();
+  std::string full_text(double time_s) const;
   VoxelMap& fused() { return submaps_ ? submaps_->newest() : map_; }
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);

@@ -33,12 +33,7 @@ std::optional<ToldPose> told_at(const StampedPoses& told, double time_s) {
   const auto& [begin_s, begin] = *(after - 1);
   const auto& [end_s, end] = *after;
   if (end_s - begin_s > Submaps::kLongestGapSeconds) return std::nullopt;
-  const double share = (time_s - begin_s) / (end_s - begin_s);
-  const Eigen::Quaterniond a(begin.linear()), b(end.linear());
-  ToldPose between{Eigen::Isometry3d::Identity(), false};
-  between.pose.linear() = a.slerp(share, b).normalized().toRotationMatrix();
-  between.pose.translation() = (1 - share) * begin.translation() + share * end.translation();
-  return between;
+  return ToldPose{pose_between(begin, end, (time_s - begin_s) / (end_s - begin_s)), false};
 }
 
 /// The placement that the corrected pose nearest to the middle of its time gives; one of a moment at which a pose was told goes before all others.
@@ -89,11 +84,6 @@ void take_back_notes(VoxelMap& map, std::size_t unit_index) {
   }
 }
 
-std::uint64_t key_of(GridPlace at) {
-  const auto part = [](std::int32_t value) { return static_cast<std::uint64_t>(value) & 0x1fffff; };
-  return part(at.x) << 42 | part(at.y) << 21 | part(at.z);
-}
-
 }  // namespace
 
 Submaps::Submaps(double voxel_m, const SubmapRules& rules) : voxel_m_(voxel_m), rules_(rules) {
@@ -106,17 +96,19 @@ void Submaps::begin() {
   parts_.push_back(std::move(part));
 }
 
-void Submaps::step(double time_s, const Eigen::Isometry3d& world_from_camera) {
+bool Submaps::step(double time_s, const Eigen::Isometry3d& world_from_camera, bool may_begin) {
   const StampedPoses& told = parts_.back().told;
   if (!told.empty()) {
     const auto& [key_s, key] = told.front();
     if (parts_.back().has_moved || time_s - key_s >= rules_.seconds ||
         (key.translation() - world_from_camera.translation()).norm() >= rules_.metres ||
         turn_between(key, world_from_camera) >= rules_.radians) {
+      if (!may_begin) return is_open();
       begin();
     }
   }
   parts_.back().told.emplace_back(time_s, world_from_camera);
+  return true;
 }
 
 CorrectionReport Submaps::correct(const StampedPoses& corrected) {
@@ -134,16 +126,8 @@ CorrectionReport Submaps::correct(const StampedPoses& corrected) {
     // One that goes with another that was turned far away from it.
     if (!is_in_range(*world_from_grid * part.told.front().second)) continue;
     ++report.moved;
-    const auto reaches = [&](const Eigen::Isometry3d& to) {
-      for (std::int32_t block = 0; block < part.map->block_end(); ++block) {
-        if (part.map->head(block).unit < 0) continue;
-        for_each_reached(to, part.map->head(block).at, voxel_m_, [&](GridPlace at) { stale_.push_back(at); });
-      }
-    };
-    reaches(part.world_from_grid);
     part.world_from_grid = *world_from_grid;
     part.has_moved = true;
-    reaches(part.world_from_grid);
   }
   if (last) report.newest = *last;
   return report;
@@ -153,13 +137,16 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
   std::vector<GridPlace> wanted;
   boost::unordered_flat_set<std::uint64_t> known;
   const auto want = [&](GridPlace at) {
-    if (known.insert(key_of(at)).second) wanted.push_back(at);
+    if (known.insert(VoxelMap::key_of(at)).second) wanted.push_back(at);
   };
   for (Part& part : parts_) {
     VoxelMap& map = *part.map;
+    const bool is_elsewhere =
+        part.has_moved != part.had_moved || part.baked_from_grid.matrix() != part.world_from_grid.matrix();
     const auto want_of = [&](GridPlace block) {
-      if (!part.has_moved) return want(block);
-      for_each_reached(part.world_from_grid, block, voxel_m_, want);
+      if (!part.had_moved) want(block);
+      if (part.had_moved) for_each_reached(part.baked_from_grid, block, voxel_m_, want);
+      if (is_elsewhere) for_each_reached(part.world_from_grid, block, voxel_m_, want);
     };
     for (std::size_t u = 0; u < map.units().size(); ++u) {
       const MapUnit& unit = map.units()[u];
@@ -168,16 +155,19 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
         const bool is_noted =
             block >= 0 && (map.head(block).moved > 0 || map.head(block).warmed > 0 || map.head(block).recoloured > 0);
         // Of a block that was taken out the unit alone knows.
-        if (!is_noted && !(all && block >= 0) && !(unit.moved > 0)) continue;
+        if (!is_noted && !((all || is_elsewhere) && block >= 0) && !(unit.moved > 0)) continue;
         const auto k = static_cast<std::int32_t>(i);
         want_of({unit.at.x * kUnitBlocks + (k & 3), unit.at.y * kUnitBlocks + (k >> 2 & 3),
                  unit.at.z * kUnitBlocks + (k >> 4)});
       }
       take_back_notes(map, u);
     }
+    part.baked_from_grid = part.world_from_grid;
+    part.had_moved = part.has_moved;
+    part.baked_bytes = map.block_bytes();
   }
-  for (const GridPlace at : stale_) want(at);
-  stale_.clear();
+  // What is left empty makes room first.
+  std::stable_partition(wanted.begin(), wanted.end(), [&](GridPlace at) { return world.find(at) >= 0; });
 
   std::vector<Eigen::Isometry3d> grids_from_world;
   for (const Part& part : parts_) grids_from_world.push_back(part.world_from_grid.inverse());
@@ -203,6 +193,18 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
     });
     for (std::size_t i = 0; i < count; ++i) put(world, wanted[first + i], baked[i]);
   }
+}
+
+std::size_t Submaps::block_bytes() const {
+  std::size_t sum = 0;
+  for (const Part& part : parts_) sum += part.map->block_bytes();
+  return sum;
+}
+
+std::size_t Submaps::unbaked_bytes() const {
+  std::size_t sum = 0;
+  for (const Part& part : parts_) sum += part.map->block_bytes() - std::min(part.map->block_bytes(), part.baked_bytes);
+  return sum;
 }
 
 std::size_t Submaps::size_bytes() const {

@@ -40,8 +40,9 @@ class Submaps {
   VoxelMap& newest() { return *parts_.back().map; }
   /// False: it has been moved, and what is seen waits for the step() that begins another.
   bool is_open() const { return !parts_.back().has_moved; }
-  /// A depth picture is about to be fused with that pose: begins another submap where it is time.
-  void step(double time_s, const Eigen::Isometry3d& world_from_camera);
+  /// A depth picture is about to be fused with that pose: begins another submap where it is time and may be. False: nothing may be fused before one
+  /// has begun.
+  bool step(double time_s, const Eigen::Isometry3d& world_from_camera, bool may_begin = true);
 
   /// Moves each submap by the corrected pose nearest to the middle of its time (of a moment at which a pose was told, where there is one); one without any goes with the one before it. What would
   /// stand out of range (is_in_range) stays. Poses that are told from
@@ -53,6 +54,10 @@ class Submaps {
   void bake(VoxelMap& world, bool all, jobs::WorkerPool& pool);
 
   std::size_t size() const { return parts_.size(); }
+  /// As VoxelMap::block_bytes, of all of them.
+  std::size_t block_bytes() const;
+  /// The same, of blocks that bake() has not seen yet.
+  std::size_t unbaked_bytes() const;
   std::size_t size_bytes() const;
 
  private:
@@ -60,14 +65,16 @@ class Submaps {
     std::unique_ptr<VoxelMap> map;
     StampedPoses told;  ///< With which it was made.
     Eigen::Isometry3d world_from_grid = Eigen::Isometry3d::Identity();
-    bool has_moved = false;  ///< It has ever.
+    bool has_moved = false;                                             ///< It has ever.
+    Eigen::Isometry3d baked_from_grid = Eigen::Isometry3d::Identity();  ///< Where bake() has seen it last.
+    bool had_moved = false;                                             ///< It had then.
+    std::size_t baked_bytes = 0;                                        ///< Its block_bytes() then.
   };
   void begin();
 
   const double voxel_m_;
   const SubmapRules rules_;
   std::vector<Part> parts_;
-  std::vector<GridPlace> stale_;  ///< Blocks of the world where something was before it moved, or is now.
 };
 
 }  // namespace spectra::mapping

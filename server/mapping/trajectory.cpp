@@ -28,6 +28,14 @@ bool parse_line(const std::string& line, std::array<double, 8>& values) {
 
 }  // namespace
 
+Eigen::Isometry3d pose_between(const Eigen::Isometry3d& first, const Eigen::Isometry3d& second, double share) {
+  const Eigen::Quaterniond a(first.linear()), b(second.linear());
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = a.slerp(share, b).normalized().toRotationMatrix();
+  pose.translation() = (1 - share) * first.translation() + share * second.translation();
+  return pose;
+}
+
 base::Result<Trajectory> Trajectory::read(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return base::failure(base::ErrorCode::FileNotFound, file.string() + ": the poses cannot be read");
@@ -159,10 +167,8 @@ PoseAnswer Trajectory::at(double time_s) const {
     return answer;
   }
   const double share = (time_s - times_[i - 1]) / (times_[i] - times_[i - 1]);
-  const Eigen::Quaterniond a(poses_[i - 1].linear()), b(poses_[i].linear());
   answer.state = PoseState::Known;
-  answer.pose.linear() = a.slerp(share, b).normalized().toRotationMatrix();
-  answer.pose.translation() = (1 - share) * poses_[i - 1].translation() + share * poses_[i].translation();
+  answer.pose = pose_between(poses_[i - 1], poses_[i], share);
   set_speed(i - 1, i, answer);
   return answer;
 }

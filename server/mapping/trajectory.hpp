@@ -36,6 +36,9 @@ inline bool is_in_range(const Eigen::Isometry3d& pose) {
   return pose.translation().norm() < kFarthestPoseM;
 }
 
+/// The rotation by slerp, the translation linearly; share 0 is the first.
+Eigen::Isometry3d pose_between(const Eigen::Isometry3d& first, const Eigen::Isometry3d& second, double share);
+
 /// Poses by their time.
 using StampedPoses = std::vector<std::pair<double, Eigen::Isometry3d>>;
 

@@ -57,9 +57,7 @@ std::int32_t VoxelMap::ensure(GridPlace block) {
 }
 
 bool VoxelMap::would_be_beyond(GridPlace block, std::uint64_t most_bytes) const {
-  // Room that was given back is free; temperatures come to most blocks.
-  const std::uint64_t bytes = block_count_ * (sizeof(VoxelBlock) + sizeof(HeatBlock) + sizeof(BlockHead));
-  return bytes >= most_bytes && find(block) < 0;
+  return block_bytes() >= most_bytes && find(block) < 0;
 }
 
 void VoxelMap::add_heat(std::int32_t block) {

@@ -82,6 +82,9 @@ class VoxelMap {
 
   double voxel_m() const { return voxel_m_; }
 
+  /// Of a place in blocks or units, for a hash: 21 bits of each number.
+  static std::uint64_t key_of(GridPlace at);
+
   /// Index of a block, -1 when there is none.
   std::int32_t find(GridPlace block) const;
   std::int32_t find_unit(GridPlace unit) const;
@@ -89,7 +92,7 @@ class VoxelMap {
   std::int32_t ensure(GridPlace block);
   /// Gives a block temperatures; all unseen.
   void add_heat(std::int32_t block);
-  /// Whether ensure() would make a block of that place although the map has taken `most_bytes` or more.
+  /// Whether ensure() would make a block of that place although block_bytes() are `most_bytes` or more.
   bool would_be_beyond(GridPlace block, std::uint64_t most_bytes) const;
   /// Takes out a block; its room is used again.
   void remove(std::int32_t block);
@@ -108,6 +111,10 @@ class VoxelMap {
 
   std::size_t block_count() const { return block_count_; }
   std::size_t heat_count() const { return heat_count_; }
+  /// What its blocks take; temperatures are counted for all of them, which most come to have. Room that was given back is free.
+  std::size_t block_bytes() const {
+    return block_count_ * (sizeof(VoxelBlock) + sizeof(HeatBlock) + sizeof(BlockHead));
+  }
   /// All that the map has taken.
   std::size_t size_bytes() const;
 
@@ -132,8 +139,6 @@ class VoxelMap {
     std::vector<std::int32_t> free_;
     std::size_t used_ = 0;
   };
-
-  static std::uint64_t key_of(GridPlace at);
 
   double voxel_m_;
   boost::unordered_flat_map<std::uint64_t, std::int32_t> unit_by_place_;

@@ -187,6 +187,72 @@ TEST_F(SubmapsTest, WithoutAPoseOfTheirOwnTheyGoWithTheOneBefore) {
   EXPECT_EQ(mapper.correct({{100, away}}).moved, 0U);
 }
 
+TEST_F(SubmapsTest, AllOfThemHaveOneBound) {
+  UnitPublisher publisher;
+  const auto map_all = [&](Mapper& mapper) {
+    for (int i = 0; i < kFrames; ++i) {
+      Frame frame;
+      frame.time_s = 0.1 * i;
+      frame.depth = world_.depth(calibration_.depth.camera, true_pose(frame.time_s));
+      frame.thermal = world_.thermal(calibration_.thermal->camera, true_pose(frame.time_s));
+      mapper.fuse(frame, true_poses_, faults_);
+      if (i % 3 == 0) mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_, 1);
+    }
+    mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_, 1);
+  };
+  Mapper free(calibration_, settings_, pool_);
+  map_all(free);
+  EXPECT_EQ(faults_.of(FaultKind::MapFull).count, 0U);
+  settings_.most_bytes = free.size_bytes() / 2;
+  publisher = {};
+  Mapper mapper(calibration_, settings_, pool_);
+  map_all(mapper);
+  // Room comes in chunks of 64 blocks.
+  EXPECT_LT(static_cast<double>(mapper.size_bytes()), 1.1 * static_cast<double>(settings_.most_bytes));
+  EXPECT_GT(static_cast<double>(mapper.size_bytes()), 0.7 * static_cast<double>(settings_.most_bytes));
+  EXPECT_LT(mapper.submap_count(), free.submap_count()) << "none begins that has no room";
+  EXPECT_GT(faults_.of(FaultKind::MapFull).count, 10U);
+  EXPECT_EQ(mapper.figures().depth_frames, static_cast<std::size_t>(kFrames)) << "what is known goes on";
+
+  // After a correction nothing fits to be fused any more, and that is said.
+  Eigen::Isometry3d away = Eigen::Isometry3d::Identity();
+  away.translation() = Eigen::Vector3d(0, 1, 0);
+  EXPECT_EQ(mapper.correct({{0.3, away * true_pose(0.3)}}).moved, mapper.submap_count());
+  const std::size_t said = faults_.of(FaultKind::MapFull).count, submaps = mapper.submap_count();
+  Frame frame;
+  frame.time_s = 0.1 * kFrames;
+  frame.depth = world_.depth(calibration_.depth.camera, true_pose(frame.time_s));
+  Trajectory after;
+  for (int i = -5; i <= 5; ++i) after.add(frame.time_s + 0.02 * i, true_pose(frame.time_s + 0.02 * i));
+  mapper.fuse(frame, after, faults_);
+  EXPECT_EQ(faults_.of(FaultKind::MapFull).count, said + 1);
+  EXPECT_EQ(mapper.submap_count(), submaps);
+  EXPECT_EQ(mapper.figures().depth_frames, static_cast<std::size_t>(kFrames));
+}
+
+TEST_F(SubmapsTest, OnlyTheLastOfManyCorrectionsCounts) {
+  const auto map_of = [&](int corrections, std::vector<base::Vec3f>& positions) {
+    Mapper mapper(calibration_, settings_, pool_);
+    UnitPublisher publisher;
+    fuse_all(mapper, drifted_poses_);
+    mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_);
+    for (int i = 1; i < corrections; ++i) {
+      StampedPoses away = true_poses_.stamped();
+      for (auto& [time_s, pose] : away) pose.translation().x() += i;
+      mapper.correct(away);
+    }
+    mapper.correct(true_poses_.stamped());
+    mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_);
+    const std::size_t blocks = mapper.map().block_count();
+    positions = mapper.whole_mesh().positions;
+    EXPECT_EQ(mapper.map().block_count(), blocks) << "nothing was left where it was";
+    return blocks;
+  };
+  std::vector<base::Vec3f> once, often;
+  EXPECT_EQ(map_of(1, once), map_of(50, often));
+  EXPECT_EQ(once, often);
+}
+
 TEST_F(SubmapsTest, NothingMovesToWhereVoxelsAreNotCounted) {
   Mapper mapper(calibration_, settings_, pool_);
   fuse_all(mapper, drifted_poses_);
