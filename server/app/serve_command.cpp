@@ -236,9 +236,10 @@ int run_serve(const ServeOptions& options) {
   mapping.most_bytes = options.limits.scene_bytes;
   mapping.is_tracking = options.is_tracking;
   if (options.has_submaps) mapping.submaps.emplace();
+  const auto mapping_ended = [&served](const std::string& why) { served->mapping_trouble.set(why); };
   if (frames) {
-    feed = std::make_unique<sources::MapFeed>(std::move(*frames), mapping, map, served->robot,
-                                              [&loader] { return loader.is_done(); });
+    feed = std::make_unique<sources::MapFeed>(
+        std::move(*frames), mapping, map, served->robot, [&loader] { return loader.is_done(); }, mapping_ended);
   }
   std::optional<sources::UnitHandOver> hand_over;
   std::unique_ptr<sources::LiveFeed> live;
@@ -249,7 +250,7 @@ int run_serve(const ServeOptions& options) {
         sources::LiveFeed::Sinks{
             [&hand_over](auto units, const auto& moment) { return (*hand_over)(std::move(units), moment); },
             [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); },
-            [&hand_over] { return hand_over->room(); }},
+            [&hand_over] { return hand_over->room(); }, mapping_ended},
         [&loader] { return loader.is_done(); });
     server->set_frame_receiver(*live);
   }

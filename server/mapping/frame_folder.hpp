@@ -44,9 +44,10 @@ enum class FaultKind {
   NoCalibration,  ///< A picture of a camera that the calibration does not have.
   UnreadablePose,
   BackwardPose,
-  MapFull,  ///< Something new was not mapped: the map takes all the memory that it may.
+  MapFull,   ///< Something new was not mapped: the map takes all the memory that it may.
+  FarStamp,  ///< A stamp of a stream that cannot be meant.
 };
-inline constexpr std::size_t kFaultKinds = 13;
+inline constexpr std::size_t kFaultKinds = 14;
 
 /// The account of what was wrong.
 class FaultLog {

@@ -210,6 +210,10 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
     if (!waits(held)) fuse_heat(held, tracked_, faults);
   }
   std::erase_if(held_, [&](const Frame& held) { return !waits(held); });
+  if (held_.size() <= kMostHeld) return;
+  faults.add(FaultKind::NoPose, "at " + seconds_text(held_.front().time_s) + " more than " + std::to_string(kMostHeld) +
+                                    " thermal pictures wait for the pose of a depth picture: the oldest are left out");
+  held_.erase(held_.begin());
 }
 
 void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {

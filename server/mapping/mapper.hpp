@@ -64,6 +64,9 @@ class Mapper {
   /// submaps.
   CorrectionReport correct(const StampedPoses& poses);
 
+  /// Tracking: thermal pictures that wait for the depth picture after them; with more the oldest is left out.
+  static constexpr std::size_t kMostHeld = 64;
+
   /// The surface of everything, as one mesh. A sigma is at least kSystematic of what pictures differ from the map in the middle: the part
   /// of their errors that is in all of them does not become less with more looks. `progress` is told of kMeshingPhase.
   UnitMesh whole_mesh(const base::Progress& progress = {});
@@ -124,7 +127,7 @@ class Mapper {
   bool is_doubtful_ = false;  ///< Poses have jumped, and none has been found to fit since.
   std::optional<Tracker> tracker_;
   Trajectory tracked_;
-  std::vector<Frame> held_;                 ///< Thermal pictures that wait for a pose after them.
+  std::vector<Frame> held_;                 ///< Thermal pictures that wait for a pose after them, at most kMostHeld.
   Picture16 newest_thermal_;                ///< That differs from the one before.
   std::optional<double> newest_thermal_s_;  ///< When it was taken.
   double residual_squares_ = 0;

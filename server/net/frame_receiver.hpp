@@ -29,8 +29,8 @@ struct IncomingFrame {
 class FrameReceiver {
  public:
   virtual ~FrameReceiver() = default;
-  /// A sender has come. False: another one is there, or the map is not open yet.
-  virtual bool begin() = 0;
+  /// A sender has come. Refused (503): another one is there, the map is not open yet (busy), or nothing is mapped any more (not_mapping).
+  virtual std::optional<BlockRefusal> begin() = 0;
   /// `done` is called once, now or later, from any thread. Never refuses because too much waits: the caller bounds what it hands over.
   virtual void take(IncomingFrame frame, std::function<void(FrameOutcome)> done) = 0;
   /// The sender has gone: what waits for poses waits no longer.

@@ -389,9 +389,8 @@ asio::awaitable<void> HttpConnection::serve_sender(Request request) {
 
 asio::awaitable<void> HttpConnection::serve_frames(Request request) {
   auto refused = upgrade_refusal_of(request, protocol::kFramesProtocol);
-  if (!refused && !context_.frames->begin()) {
-    refused = text_reply(503, "another robot sends frames already, or the map is not open yet\n");
-    refused->headers.emplace_back("Retry-After", "1");
+  if (!refused) {
+    if (const auto refusal = context_.frames->begin()) refused = net::refused(*refusal);
   }
   if (refused) {
     co_await refuse_upgrade(request, *refused);

@@ -43,9 +43,10 @@ struct ServedScene {
       : cache(cache_capacity_bytes), pool(worker_count) {}
 
   map::SceneStore scenes;
-  SharedMessage progress;       ///< What is being done about the scene; nothing when it is served.
-  SharedMessage store_trouble;  ///< Why the store takes nothing; for operators, for it may name the file.
-  sources::RobotTrack robot;    ///< Of the robot that maps the scene, if one does.
+  SharedMessage progress;         ///< What is being done about the scene; nothing when it is served.
+  SharedMessage store_trouble;    ///< Why the store takes nothing; for operators, for it may name the file.
+  SharedMessage mapping_trouble;  ///< Why nothing is mapped any more; for operators.
+  sources::RobotTrack robot;      ///< Of the robot that maps the scene, if one does.
   const SessionIds session_ids;
   const Catalogue catalogue;
   /// MapKeeper::mark_baseline() of the map; whoever makes the keeper sets it before there are sessions.

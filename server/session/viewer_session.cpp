@@ -78,6 +78,9 @@ void ViewerSession::opened() {
     store_subscription_ = served_.store_trouble.subscribe([post](const std::optional<std::string>& message) {
       post([message](ViewerSession& self) { self.tell_store_trouble(message); });
     });
+    mapping_subscription_ = served_.mapping_trouble.subscribe([post](const std::optional<std::string>& message) {
+      post([message](ViewerSession& self) { self.tell_mapping_trouble(message); });
+    });
   }
   robot_subscription_ = served_.robot.subscribe([post] { post([](ViewerSession& self) { self.tell_robot(); }); });
 
@@ -105,7 +108,10 @@ void ViewerSession::opened() {
   if (const auto message = served_.progress.message()) {
     statuses_.set("scene_loading", protocol::StatusLevel::Info, message);
   }
-  if (may_operate) tell_store_trouble(served_.store_trouble.message());
+  if (may_operate) {
+    tell_store_trouble(served_.store_trouble.message());
+    tell_mapping_trouble(served_.mapping_trouble.message());
+  }
   tell_robot();
 }
 
@@ -113,11 +119,16 @@ void ViewerSession::tell_store_trouble(const std::optional<std::string>& message
   statuses_.set("map_not_stored", protocol::StatusLevel::Error, message);
 }
 
+void ViewerSession::tell_mapping_trouble(const std::optional<std::string>& message) {
+  statuses_.set("mapping_ended", protocol::StatusLevel::Error, message);
+}
+
 void ViewerSession::closed() {
   if (stream_) stream_->close();
   scene_subscription_ = {};
   progress_subscription_.reset();
   store_subscription_.reset();
+  mapping_subscription_.reset();
   robot_subscription_.reset();
   served_.viewer_count -= 1;
 }

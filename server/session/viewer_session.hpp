@@ -89,6 +89,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   /// Says what was noticed while the scene was read, and takes back what was said of the one before.
   void tell_notes();
   void tell_store_trouble(const std::optional<std::string>& message);
+  void tell_mapping_trouble(const std::optional<std::string>& message);
   /// Says where the robot is now, and of its way what the viewer does not know.
   void tell_robot();
   /// What the method of now cannot show in the scene of now, and what palette does not suit it.
@@ -107,7 +108,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
 
   map::SceneStore::Subscription scene_subscription_;
   std::shared_ptr<const SharedMessage::Listener> progress_subscription_;
-  std::shared_ptr<const SharedMessage::Listener> store_subscription_;  ///< Of operators.
+  std::shared_ptr<const SharedMessage::Listener> store_subscription_, mapping_subscription_;  ///< Of operators.
   std::shared_ptr<const sources::RobotTrack::Listener> robot_subscription_;
   sources::RobotTrack::Told robot_told_;
   std::shared_ptr<const map::SceneSnapshot> scene_;

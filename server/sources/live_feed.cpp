@@ -28,8 +28,6 @@ constexpr double kPublishEveryS = 0.2;
 constexpr double kOverloadS = 2;
 /// Of what it could do that is asked for, so that it catches up.
 constexpr double kAskedShare = 0.9;
-/// A clock of another sender that is behind goes on so much later.
-constexpr double kNewClockGapS = 1;
 constexpr double kLostAfterS = 1;
 constexpr std::size_t kManyPoses = 4096;
 
@@ -115,7 +113,7 @@ LiveFeed::LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::fu
         try {
           work();
         } catch (const std::exception& error) {
-          spdlog::error("mapping ended: {}", error.what());
+          end_mapping(error.what());
         }
       }) {}
 
@@ -128,16 +126,40 @@ LiveFeed::~LiveFeed() {
   thread_.join();
 }
 
-bool LiveFeed::begin() {
-  if (!may_begin_()) return false;
+void LiveFeed::end_mapping(const std::string& why) {
+  const std::string text = ended_text(why);
+  Answers answers;
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = text;
+    const auto answer = [&](Done& done) { answers.emplace_back(std::move(done), not_mapping()); };
+    if (picture_in_hand_) answer(picture_in_hand_->second.done);
+    for (auto* news : {&poses_in_hand_, &new_poses_}) {
+      for (PoseNews& some : *news) answer(some.done);
+      news->clear();
+    }
+    for (auto& [key, item] : waiting_) answer(item.done);
+    waiting_.clear();
+  }
+  spdlog::error("{}", text);
+  for (auto& [answer, outcome] : answers) {
+    if (answer) answer(std::move(outcome));
+  }
+  sinks_.ended(text);
+}
+
+std::optional<net::BlockRefusal> LiveFeed::begin() {
+  const auto busy = [](const char* reason) { return net::BlockRefusal{503, "busy", "", reason, ""}; };
+  if (!may_begin_()) return busy("the map is not open yet");
   const std::lock_guard lock(mutex_);
-  if (has_sender_ || is_over_) return false;
+  if (ended_) return not_mapping();
+  if (has_sender_ || is_over_) return busy("another robot sends frames already");
   has_sender_ = true;
   is_flushing_ = false;
-  shift_s_.reset();
+  clock_.begin_sender();
   pose_end_s_.reset();
   last_s_ = {};
-  return true;
+  return std::nullopt;
 }
 
 void LiveFeed::end() {
@@ -173,9 +195,24 @@ net::BlockRefusal LiveFeed::refused(FaultKind kind, std::string code, std::strin
   return {400, std::move(code), std::move(field), reason, ""};
 }
 
-double LiveFeed::on_own_clock(double stamp_s) {
-  if (!shift_s_) shift_s_ = newest_s_ && stamp_s < *newest_s_ ? *newest_s_ + kNewClockGapS - stamp_s : 0;
-  return stamp_s + *shift_s_;
+std::optional<net::BlockRefusal> LiveFeed::refusal_of_stamp(double stamp_s, const std::string& whose, bool may_jump) {
+  switch (clock_.look(stamp_s, steady_s(), may_jump)) {
+    case SenderClock::Verdict::NotInSeconds:
+      return refused(FaultKind::FarStamp, "far_stamp", "time",
+                     "the stamp of " + whose + " is no number of seconds less than 1e11");
+    case SenderClock::Verdict::Ahead:
+      return refused(
+          FaultKind::FarStamp, "far_stamp", "time",
+          "the stamp of " + whose + " is more than 10 s ahead of all before it; the third such in a row is taken");
+    case SenderClock::Verdict::BegunAnew:
+      spdlog::warn("stamps are far behind those before them: the clock of whoever sends frames is taken to begin anew");
+      pose_end_s_.reset();
+      last_s_ = {};
+      break;
+    case SenderClock::Verdict::Taken:
+      break;
+  }
+  return std::nullopt;
 }
 
 net::FrameOutcome LiveFeed::take_calibration(const net::IncomingFrame& frame) {
@@ -192,7 +229,7 @@ net::FrameOutcome LiveFeed::take_calibration(const net::IncomingFrame& frame) {
   return net::FrameTaken{};
 }
 
-net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
+std::optional<net::FrameOutcome> LiveFeed::take_poses(const net::IncomingFrame& frame, Done& done) {
   if (!calibration_) {
     return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
   }
@@ -206,21 +243,27 @@ net::FrameOutcome LiveFeed::take_poses(const net::IncomingFrame& frame) {
                   "a pose is not eight finite numbers with a rotation in the last four, less than 1,000 km from 0");
       continue;
     }
-    const double time_s = on_own_clock(values[0]);
+    // Stills are taken minutes apart, and their poses say so.
+    if (auto stray = refusal_of_stamp(values[0], "a pose", !settings_.is_tracking)) {
+      refusal = std::move(stray);
+      continue;
+    }
+    const double time_s = clock_.on_own_clock(values[0]);
     if (pose_end_s_ && !(time_s > *pose_end_s_)) {
       refusal = refused(FaultKind::BackwardPose, "backward_pose", "poses", "a pose is not later than the one before");
       continue;
     }
     pose_end_s_ = time_s;
-    newest_s_ = std::max(newest_s_.value_or(time_s), time_s);
+    clock_.accept(values[0], steady_s());
     news.poses.emplace_back(time_s, depth_pose(*calibration_, *pose));
   }
+  if (refusal) news.outcome = *refusal;
+  news.done = std::move(done);
   new_poses_.push_back(std::move(news));
-  if (refusal) return *refusal;
-  return net::FrameTaken{};
+  return std::nullopt;
 }
 
-net::FrameOutcome LiveFeed::take_corrections(const net::IncomingFrame& frame) {
+std::optional<net::FrameOutcome> LiveFeed::take_corrections(const net::IncomingFrame& frame, Done& done) {
   if (!settings_.submaps) {
     return refused(FaultKind::UnreadablePose, "no_submaps", "kind",
                    "this map is made in one piece, which does not move; start the server with --submaps");
@@ -240,10 +283,11 @@ net::FrameOutcome LiveFeed::take_corrections(const net::IncomingFrame& frame) {
           "0; none was taken");
     }
     // They speak of what was, and say nothing of the clock of what comes.
-    news.poses.emplace_back(values[0] + shift_s_.value_or(0), depth_pose(*calibration_, *pose));
+    news.poses.emplace_back(clock_.moment_before(values[0]), depth_pose(*calibration_, *pose));
   }
+  news.done = std::move(done);
   new_poses_.push_back(std::move(news));
-  return net::FrameTaken{};
+  return std::nullopt;
 }
 
 std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::FrameHead& head, double time_s) {
@@ -266,18 +310,22 @@ std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::Fr
 
 std::optional<net::FrameOutcome> LiveFeed::take_picture(net::IncomingFrame& frame, Done& done, Answers& answers) {
   const protocol::FrameHead& head = frame.head;
-  const double time_s = on_own_clock(*head.time);
+  const std::string name = "a " + name_of(*head.sensor) + " picture";
+  // Poses tell the time where there are any.
+  if (settings_.is_tracking || !pose_end_s_) {
+    if (auto refusal = refusal_of_stamp(*head.time, name, false)) return std::move(*refusal);
+  }
+  const double time_s = clock_.on_own_clock(*head.time);
   if (auto refusal = refusal_of_picture(head, time_s)) return std::move(*refusal);
   const Rank rank = *head.sensor == FrameSensor::Color   ? Rank::Colour
                     : *head.sensor == FrameSensor::Depth ? Rank::Depth
                                                          : Rank::Thermal;
   auto& last_s = last_s_[static_cast<std::size_t>(rank)];
   if (last_s && !(time_s > *last_s)) {
-    return refused(FaultKind::BackwardClock, "backward_clock", "time",
-                   "a " + name_of(*head.sensor) + " picture is not later than the one before");
+    return refused(FaultKind::BackwardClock, "backward_clock", "time", name + " is not later than the one before");
   }
   last_s = time_s;
-  newest_s_ = std::max(newest_s_.value_or(time_s), time_s);
+  clock_.accept(*head.time, steady_s());
   waiting_.emplace(Key{time_s, rank}, Waiting{std::move(frame), std::move(done)});
   if (waiting_.size() <= kMostWaiting) return std::nullopt;
   // The picture itself is not lost among those of another sensor: the one that sends most gives way.
@@ -300,30 +348,30 @@ std::optional<double> LiveFeed::wanted_rate() const {
   return kAskedShare / picture_s_;
 }
 
+std::optional<net::FrameOutcome> LiveFeed::take_kind(net::IncomingFrame& frame, Done& done, Answers& answers) {
+  if (ended_) return not_mapping();
+  switch (frame.head.kind) {
+    case FramesKind::Calibration:
+      return take_calibration(frame);
+    case FramesKind::Poses:
+      return take_poses(frame, done);
+    case FramesKind::CorrectedPoses:
+      return take_corrections(frame, done);
+    case FramesKind::Picture:
+      return take_picture(frame, done, answers);
+    case FramesKind::End:
+      is_flushing_ = true;
+      break;
+  }
+  return net::FrameTaken{};
+}
+
 void LiveFeed::take(net::IncomingFrame frame, Done done) {
   Answers answers;
   {
     const std::lock_guard lock(mutex_);
-    std::optional<net::FrameOutcome> outcome;
     last_arrival_s_ = steady_s();
-    switch (frame.head.kind) {
-      case FramesKind::Calibration:
-        outcome = take_calibration(frame);
-        break;
-      case FramesKind::Poses:
-        outcome = take_poses(frame);
-        break;
-      case FramesKind::CorrectedPoses:
-        outcome = take_corrections(frame);
-        break;
-      case FramesKind::Picture:
-        outcome = take_picture(frame, done, answers);
-        break;
-      case FramesKind::End:
-        is_flushing_ = true;
-        outcome = net::FrameTaken{};
-        break;
-    }
+    auto outcome = take_kind(frame, done, answers);
     if (outcome) answers.emplace_back(std::move(done), std::move(*outcome));
   }
   has_work_.notify_all();
@@ -340,7 +388,7 @@ bool LiveFeed::is_ready() const {
                          : rank == Rank::Thermal && calibration_->thermal ? calibration_->thermal->delay_s
                                                                           : 0;
   return (!settings_.is_tracking && pose_end_s_ && *pose_end_s_ >= time_s + delay_s) ||
-         (newest_s_ && *newest_s_ - time_s > kPatienceS);
+         (clock_.newest_s() && *clock_.newest_s() - time_s > kPatienceS);
 }
 
 void LiveFeed::correct(const mapping::StampedPoses& poses) {
@@ -350,6 +398,19 @@ void LiveFeed::correct(const mapping::StampedPoses& poses) {
   // What comes is of the corrected world; what is there is brought along, so that nothing jumps between.
   trajectory_.move(report.newest);
   has_changed_ = true;
+}
+
+void LiveFeed::apply_poses() {
+  for (const PoseNews& some : poses_in_hand_) {
+    if (some.is_correction) {
+      correct(some.poses);
+    } else {
+      for (const auto& [time_s, pose] : some.poses) trajectory_.add(time_s, pose);
+    }
+  }
+  std::vector<PoseNews> applied;
+  applied.swap(poses_in_hand_);
+  for (PoseNews& some : applied) some.done(std::move(some.outcome));
 }
 
 void LiveFeed::tell_found_pose() {
@@ -368,33 +429,25 @@ void LiveFeed::tell_found_pose() {
 void LiveFeed::work() {
   double last_published_s = steady_s();
   for (;;) {
-    std::optional<std::pair<Key, Waiting>> next;
     std::optional<double> pose_end_s, newest_s;
-    std::vector<PoseNews> news;
     {
       std::unique_lock lock(mutex_);
-      has_work_.wait_for(lock, kLookEvery, [&] { return is_over_ || is_ready(); });
+      has_work_.wait_for(lock, kLookEvery, [&] { return is_over_ || is_ready() || !new_poses_.empty(); });
       if (is_over_) return;
       if (!mapper_ && calibration_) {
         mapper_.emplace(*calibration_, settings_, pool_);
       }
-      news.swap(new_poses_);
+      poses_in_hand_.swap(new_poses_);
       pose_end_s = pose_end_s_;
-      newest_s = newest_s_;
+      newest_s = clock_.newest_s();
       if (is_ready()) {
-        next.emplace(waiting_.begin()->first, std::move(waiting_.begin()->second));
+        picture_in_hand_.emplace(waiting_.begin()->first, std::move(waiting_.begin()->second));
         waiting_.erase(waiting_.begin());
       } else if (waiting_.empty() && has_sender_) {
         is_flushing_ = false;
       }
     }
-    for (const PoseNews& some : news) {
-      if (some.is_correction) {
-        correct(some.poses);
-      } else {
-        for (const auto& [time_s, pose] : some.poses) trajectory_.add(time_s, pose);
-      }
-    }
+    apply_poses();
     // Of pictures that wait the oldest may be as far from the newest pose as one may come, and wait as long.
     if (pose_end_s && trajectory_.size() > kManyPoses) trajectory_.forget_before(*pose_end_s - 2 * kFarthestStampS);
     if (mapper_ && settings_.is_tracking) tell_found_pose();
@@ -406,22 +459,26 @@ void LiveFeed::work() {
       robot.is_lost = newest_s && *newest_s - *pose_end_s > kLostAfterS;
       if (latest.state != mapping::PoseState::Unknown) sinks_.moved(robot, false);
     }
-    if (next) {
+    const bool had_picture = picture_in_hand_.has_value();
+    if (had_picture) {
       const double begun_s = steady_s();
-      net::FrameOutcome outcome = map_picture(next->first, next->second.frame);
+      net::FrameOutcome outcome = map_picture(picture_in_hand_->first, picture_in_hand_->second.frame);
       {
         const std::lock_guard lock(mutex_);
         const double took_s = steady_s() - begun_s;
         picture_s_ = picture_s_ > 0 ? 0.9 * picture_s_ + 0.1 * took_s : took_s;
         if (auto* taken = std::get_if<net::FrameTaken>(&outcome)) taken->pictures_per_s = wanted_rate();
       }
-      next->second.done(std::move(outcome));
+      const Done done = std::move(picture_in_hand_->second.done);
+      picture_in_hand_.reset();
+      done(std::move(outcome));
     }
-    const bool is_due = steady_s() - last_published_s >= kPublishEveryS;
-    if (!mapper_ || !is_due || !(has_changed_ || publisher_.waiting_count() > 0)) continue;
+    if (!mapper_) continue;
     // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
-    const std::size_t room = sinks_.room();
-    if (room == 0) continue;
+    const std::size_t room = sinks_.room(), waiting_units = publisher_.waiting_count();
+    const bool is_due = steady_s() - last_published_s >= kPublishEveryS && (has_changed_ || waiting_units > 0);
+    const bool is_idle = !had_picture && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
+    if (room == 0 || !(is_due || is_idle)) continue;
     last_published_s = steady_s();
     has_changed_ = false;
     if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_)) return;

@@ -18,6 +18,7 @@
 #include "server/net/frame_receiver.hpp"
 #include "server/sources/map_feed.hpp"
 #include "server/sources/robot_track.hpp"
+#include "server/sources/sender_clock.hpp"
 #include "server/sources/unit_hand_over.hpp"
 
 namespace spectra::sources {
@@ -30,7 +31,7 @@ class LiveFeed final : public net::FrameReceiver {
   static constexpr double kPatienceS = 0.3;
   static constexpr std::size_t kMostWaiting = 24;
   /// A stamp that is farther than this from every pose cannot be meant.
-  static constexpr double kFarthestStampS = 10;
+  static constexpr double kFarthestStampS = SenderClock::kFarS;
   /// A depth picture takes its colours from one that is at most so much older.
   static constexpr double kColourAgeS = 0.15;
 
@@ -40,6 +41,8 @@ class LiveFeed final : public net::FrameReceiver {
     std::function<void(const RobotPose& pose, bool is_last)> moved;
     /// Units that can be handed over without waiting.
     std::function<std::size_t()> room = [] { return mapping::UnitPublisher::kAll; };
+    /// Mapping has ended by itself, and why, in a sentence; from the thread that maps.
+    std::function<void(const std::string& why)> ended = [](const std::string&) {};
   };
 
   /// Takes nobody's frames before `may_begin`.
@@ -48,7 +51,7 @@ class LiveFeed final : public net::FrameReceiver {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
-  bool begin() override;
+  std::optional<net::BlockRefusal> begin() override;
   void take(net::IncomingFrame frame, std::function<void(net::FrameOutcome)> done) override;
   void end() override;
 
@@ -69,18 +72,22 @@ class LiveFeed final : public net::FrameReceiver {
 
   // Under the lock.
   net::FrameOutcome take_calibration(const net::IncomingFrame& frame);
-  net::FrameOutcome take_corrections(const net::IncomingFrame& frame);
-  net::FrameOutcome take_poses(const net::IncomingFrame& frame);
-  /// Nothing: it waits.
+  /// Nothing: it is answered when it is applied or mapped, so that credit bounds what waits.
+  std::optional<net::FrameOutcome> take_kind(net::IncomingFrame& frame, Done& done, Answers& answers);
+  std::optional<net::FrameOutcome> take_corrections(const net::IncomingFrame& frame, Done& done);
+  std::optional<net::FrameOutcome> take_poses(const net::IncomingFrame& frame, Done& done);
   std::optional<net::FrameOutcome> take_picture(net::IncomingFrame& frame, Done& done, Answers& answers);
   std::optional<net::BlockRefusal> refusal_of_picture(const protocol::FrameHead& head, double time_s);
+  std::optional<net::BlockRefusal> refusal_of_stamp(double stamp_s, const std::string& whose, bool may_jump);
+  net::BlockRefusal not_mapping() const { return {503, "not_mapping", "", *ended_, ""}; }
   net::BlockRefusal refused(mapping::FaultKind kind, std::string code, std::string field, const std::string& reason);
   void note(mapping::FaultKind kind, const std::string& what);
-  double on_own_clock(double stamp_s);
   bool is_ready() const;
   std::optional<double> wanted_rate() const;
 
   void work();
+  void end_mapping(const std::string& why);
+  void apply_poses();
   void tell_found_pose();
   void correct(const mapping::StampedPoses& poses);
   net::FrameOutcome map_picture(const Key& key, const net::IncomingFrame& frame);
@@ -93,6 +100,7 @@ class LiveFeed final : public net::FrameReceiver {
   mutable std::mutex mutex_;
   std::condition_variable has_work_;
   bool is_over_ = false;
+  std::optional<std::string> ended_;  ///< Why nothing is mapped any more.
   bool has_sender_ = false;
   bool is_flushing_ = false;  ///< Nobody is waited for any more.
   std::string calibration_text_;
@@ -102,10 +110,11 @@ class LiveFeed final : public net::FrameReceiver {
   struct PoseNews {
     mapping::StampedPoses poses;
     bool is_correction = false;
+    Done done;
+    net::FrameOutcome outcome;  ///< To answer with.
   };
   std::vector<PoseNews> new_poses_;
-  std::optional<double> shift_s_;                ///< Added to the stamps of this sender, once it has said one.
-  std::optional<double> newest_s_;               ///< Of all stamps.
+  SenderClock clock_;
   std::optional<double> pose_end_s_;             ///< Of this sender.
   std::array<std::optional<double>, 3> last_s_;  ///< Of this sender's sensors, by rank.
   mapping::FaultLog faults_;
@@ -115,6 +124,8 @@ class LiveFeed final : public net::FrameReceiver {
   double picture_s_ = 0;       ///< What a picture takes, in the mean of the last ones.
 
   // Of the thread.
+  std::vector<PoseNews> poses_in_hand_;
+  std::optional<std::pair<Key, Waiting>> picture_in_hand_;
   jobs::WorkerPool pool_{1};
   std::optional<mapping::Mapper> mapper_;
   mapping::Trajectory trajectory_;

@@ -56,6 +56,10 @@ RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_
           vector(-world_from_camera.linear().col(1)), false};
 }
 
+std::string ended_text(const std::string& why) {
+  return "Mapping has ended (" + why + "): the map stays as it is; start the server anew to map on.";
+}
+
 void TrackTeller::tell(const mapping::Mapper& mapper) {
   if (!mapper.is_tracking() || mapper.tracked().size() == 0) return;
   const bool is_lost = mapper.found_pose().state != mapping::PoseState::Known;
@@ -106,16 +110,18 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
 }
 
 MapFeed::MapFeed(FrameStream frames, const mapping::MapperSettings& settings, MapKeeper& map, RobotTrack& robot,
-                 std::function<bool()> may_begin)
+                 std::function<bool()> may_begin, std::function<void(const std::string&)> ended)
     : frames_(std::move(frames)),
       settings_(settings),
       hand_over_(map, frames_.up),
       robot_(robot),
-      thread_([this, may_begin = std::move(may_begin)] {
+      thread_([this, may_begin = std::move(may_begin), ended = std::move(ended)] {
         try {
           work(may_begin);
         } catch (const std::exception& error) {
-          spdlog::error("mapping ended: {}", error.what());
+          const std::string text = ended_text(error.what());
+          spdlog::error("{}", text);
+          ended(text);
         }
       }) {}
 

@@ -47,6 +47,9 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
 /// The pose of a depth camera (x to the right and y down in its picture) as that of the robot.
 RobotPose robot_pose(const Eigen::Isometry3d& world_from_camera, double at_unix_s);
 
+/// What is said when mapping has ended by itself, because of an exception.
+std::string ended_text(const std::string& why);
+
 /// Says in the log when tracking loses the cameras, and when it has found them again.
 class TrackTeller {
  public:
@@ -59,9 +62,9 @@ class TrackTeller {
 /// Maps frames in a thread of its own and puts what has changed into a map. Says in the log what was wrong, and when it is done.
 class MapFeed {
  public:
-  /// Begins when `may_begin`, and says in `robot` where the cameras are.
+  /// Begins when `may_begin`, and says in `robot` where the cameras are. `ended`: as of LiveFeed::Sinks.
   MapFeed(FrameStream frames, const mapping::MapperSettings& settings, MapKeeper& map, RobotTrack& robot,
-          std::function<bool()> may_begin);
+          std::function<bool()> may_begin, std::function<void(const std::string& why)> ended);
   ~MapFeed();  ///< Ends it after the frame that is being fused.
   MapFeed(const MapFeed&) = delete;
   MapFeed& operator=(const MapFeed&) = delete;

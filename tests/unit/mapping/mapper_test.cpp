@@ -97,6 +97,20 @@ TEST_F(MapperTest, SaysThatAPoseIsFartherThanItCounts) {
   EXPECT_EQ(faults_.all()[static_cast<std::size_t>(FaultKind::NoPose)].count, 2U);
 }
 
+TEST_F(MapperTest, HoldsSoManyThermalPicturesAndSaysWhatItLeavesOut) {
+  settings_.is_tracking = true;
+  Mapper mapper(calibration_, settings_, pool_);
+  Frame thermal = frame_at(0);
+  thermal.depth = {};
+  for (std::size_t i = 0; i < Mapper::kMostHeld + 5; ++i) {
+    thermal.time_s = 0.001 * static_cast<double>(i);
+    mapper.fuse(thermal, {}, faults_);
+  }
+  const FrameFault& fault = faults_.of(FaultKind::NoPose);
+  EXPECT_EQ(fault.count, 5U);
+  EXPECT_NE(fault.what.find("at 0.000 s more than 64 thermal pictures wait"), std::string::npos) << fault.what;
+}
+
 TEST_F(MapperTest, FusesNothingWithoutAPose) {
   Mapper mapper(calibration_, settings_, pool_);
   mapper.fuse(frame_at(7), trajectory_, faults_);

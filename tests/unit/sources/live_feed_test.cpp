@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -74,18 +77,26 @@ class LiveFeedTest : public ::testing::Test {
     settings.voxel_m = 0.02;
     return settings;
   }
+  LiveFeed::Sinks sinks() {
+    LiveFeed::Sinks sinks;
+    sinks.hand_over = [this](auto units, const FeedMoment&) {
+      const std::lock_guard lock(mutex_);
+      unit_count_ += units.size();
+      return true;
+    };
+    sinks.moved = [this](const RobotPose& pose, bool) {
+      const std::lock_guard lock(mutex_);
+      poses_.push_back(pose);
+    };
+    return sinks;
+  }
   std::unique_ptr<LiveFeed> feed_of(const mapping::MapperSettings& settings) {
-    return std::make_unique<LiveFeed>(settings,
-                                      LiveFeed::Sinks{[this](auto units, const FeedMoment&) {
-                                                        const std::lock_guard lock(mutex_);
-                                                        unit_count_ += units.size();
-                                                        return true;
-                                                      },
-                                                      [this](const RobotPose& pose, bool) {
-                                                        const std::lock_guard lock(mutex_);
-                                                        poses_.push_back(pose);
-                                                      }},
-                                      [] { return true; });
+    return std::make_unique<LiveFeed>(settings, sinks(), [] { return true; });
+  }
+  /// What begin() says.
+  std::string begun() {
+    const auto refusal = own_->begin();
+    return refusal ? std::to_string(refusal->status) + " " + refusal->code : "begun";
   }
   std::size_t units_within(std::chrono::milliseconds patience) {
     for (const auto end = std::chrono::steady_clock::now() + patience; std::chrono::steady_clock::now() < end;
@@ -100,14 +111,14 @@ class LiveFeedTest : public ::testing::Test {
 };
 
 TEST_F(LiveFeedTest, TakesOneSenderAtATime) {
-  EXPECT_TRUE(own_->begin());
-  EXPECT_FALSE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
+  EXPECT_EQ(begun(), "503 busy");
   own_->end();
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
 }
 
 TEST_F(LiveFeedTest, WaitsForThePoseOfAPictureAndMapsInTheOrderOfTime) {
-  ASSERT_TRUE(own_->begin());
+  ASSERT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   EXPECT_EQ(code_of(pose(10)), "taken");
   Answer early = depth(10.05);
@@ -131,7 +142,7 @@ TEST_F(LiveFeedTest, WaitsForThePoseOfAPictureAndMapsInTheOrderOfTime) {
 }
 
 TEST_F(LiveFeedTest, WaitsForNoPoseLongerThanItsPatience) {
-  ASSERT_TRUE(own_->begin());
+  ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
   EXPECT_EQ(code_of(depth(5)), "no_pose") << "when nothing else comes";
   Answer waiting = depth(6);
@@ -145,7 +156,7 @@ TEST_F(LiveFeedTest, WaitsForNoPoseLongerThanItsPatience) {
 }
 
 TEST_F(LiveFeedTest, SkipsTheOldestWhenTooManyWait) {
-  ASSERT_TRUE(own_->begin());
+  ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
   code_of(pose(100));
   std::vector<Answer> answers;
@@ -162,7 +173,7 @@ TEST_F(LiveFeedTest, SkipsTheOldestWhenTooManyWait) {
 }
 
 TEST_F(LiveFeedTest, GoesOnWithAClockThatIsBehindAndKeepsItsCalibration) {
-  ASSERT_TRUE(own_->begin());
+  ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
   code_of(pose(100));
   EXPECT_EQ(code_of(depth(100)), "taken");
@@ -172,7 +183,7 @@ TEST_F(LiveFeedTest, GoesOnWithAClockThatIsBehindAndKeepsItsCalibration) {
   code_of(pose(100.1));
   EXPECT_EQ(code_of(depth(100.1)), "taken");
   own_->end();
-  ASSERT_TRUE(own_->begin());
+  ASSERT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate(R"(,"delay_s":0.5)")), "other_calibration");
   EXPECT_EQ(code_of(calibrate()), "taken");
   code_of(pose(1));
@@ -183,7 +194,7 @@ TEST_F(LiveFeedTest, TracksWithoutPosesAndSaysThatItIsLost) {
   mapping::MapperSettings tracking = settings();
   tracking.is_tracking = true;
   own_ = feed_of(tracking);
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   Answer first = depth(0), second = depth(0.1);
   FrameHead end;
@@ -209,7 +220,7 @@ TEST_F(LiveFeedTest, TracksOnAfterTheOnlyPose) {
   mapping::MapperSettings tracking = settings();
   tracking.is_tracking = true;
   own_ = feed_of(tracking);
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   EXPECT_EQ(code_of(pose(0, 2)), "taken");
   // Not of the moment of that pose.
@@ -225,7 +236,7 @@ TEST_F(LiveFeedTest, RefusesPosesThatCannotBeMeant) {
   mapping::MapperSettings in_parts = settings();
   in_parts.submaps.emplace();
   own_ = feed_of(in_parts);
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   EXPECT_EQ(code_of(pose(0, 1e308)), "bad_pose");
   EXPECT_EQ(code_of(pose(0.01, 1e6)), "bad_pose");
@@ -244,13 +255,13 @@ TEST_F(LiveFeedTest, CorrectionsOfBeforeTheLinkBrokeSpeakOfThatTime) {
   mapping::MapperSettings in_parts = settings();
   in_parts.submaps.emplace();
   own_ = feed_of(in_parts);
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
   EXPECT_EQ(code_of(depth(0.05)), "taken");
   EXPECT_GT(units_within(5s), 0U);
   own_->end();
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   FrameHead corrected;
   corrected.kind = FramesKind::CorrectedPoses;
   corrected.poses = {{0.05, 1, 0, 0, 0, 0, 0, 1}};
@@ -265,7 +276,7 @@ TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
   mapping::MapperSettings in_parts = settings();
   in_parts.submaps.emplace();
   own_ = feed_of(in_parts);
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
   EXPECT_EQ(code_of(depth(0.05)), "taken");
@@ -287,8 +298,137 @@ TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
   EXPECT_EQ(own_->faults().of(mapping::FaultKind::JumpingPose).count, 0U);
 }
 
+TEST_F(LiveFeedTest, PosesAreAnsweredWhenTheyAreApplied) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  EXPECT_EQ(code_of(pose(0)), "taken");
+  std::vector<Answer> answers;
+  {
+    // Who maps waits for this, with at most the first of them.
+    const std::lock_guard lock(mutex_);
+    answers.push_back(pose(0.01));
+    std::this_thread::sleep_for(200ms);
+    for (int i = 2; i < 20; ++i) answers.push_back(pose(0.01 * i));
+    for (std::size_t i = 1; i < answers.size(); ++i) {
+      EXPECT_EQ(answers[i].wait_for(0ms), std::future_status::timeout)
+          << "credit does not bound what is answered at once";
+    }
+  }
+  for (Answer& answer : answers) EXPECT_EQ(code_of(std::move(answer)), "taken");
+}
+
+TEST_F(LiveFeedTest, StampsThatCannotBeMeantDoNotEndMapping) {
+  mapping::MapperSettings tracking = settings();
+  tracking.is_tracking = true;
+  own_ = feed_of(tracking);
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  EXPECT_EQ(code_of(depth(1e12)), "far_stamp");
+  EXPECT_EQ(code_of(depth(0)), "taken");
+  EXPECT_EQ(code_of(depth(1e12)), "far_stamp");
+  EXPECT_EQ(code_of(depth(1e9)), "far_stamp");
+  EXPECT_EQ(code_of(depth(0.1)), "lost_track") << "a bare wall, of which it was looked where it is";
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::FarStamp).count, 3U);
+}
+
+TEST_F(LiveFeedTest, PosesFarAheadDoNotEndMapping) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  EXPECT_EQ(code_of(pose(1e12)), "far_stamp");
+  EXPECT_EQ(code_of(pose(0)), "taken");
+  EXPECT_EQ(code_of(depth(0)), "taken");
+  EXPECT_EQ(code_of(pose(1e9)), "taken") << "stills may be far apart";
+  EXPECT_EQ(code_of(pose(0.1)), "backward_pose");
+  EXPECT_EQ(code_of(pose(0.15)), "backward_pose");
+  EXPECT_EQ(code_of(pose(0.2)), "taken") << "the third in a row: the clock was set back";
+  EXPECT_EQ(code_of(pose(0.25)), "taken");
+  EXPECT_EQ(code_of(depth(0.22)), "taken");
+}
+
+TEST_F(LiveFeedTest, WhenMappingEndsEverybodyIsTold) {
+  std::promise<std::string> ended;
+  LiveFeed::Sinks failing = sinks();
+  failing.hand_over = [](auto, const FeedMoment&) -> bool { throw std::runtime_error("no memory"); };
+  failing.ended = [&](const std::string& why) { ended.set_value(why); };
+  own_ = std::make_unique<LiveFeed>(settings(), failing, [] { return true; });
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  code_of(pose(0));
+  EXPECT_EQ(code_of(depth(0)), "taken");
+  auto why = ended.get_future();
+  ASSERT_EQ(why.wait_for(10s), std::future_status::ready);
+  EXPECT_NE(why.get().find("no memory"), std::string::npos);
+  EXPECT_EQ(code_of(pose(0.1)), "not_mapping");
+  EXPECT_EQ(code_of(depth(0.1)), "not_mapping");
+  own_->end();
+  EXPECT_EQ(begun(), "503 not_mapping");
+}
+
+TEST_F(LiveFeedTest, WhatWaitsIsAnsweredWhenMappingEnds) {
+  LiveFeed::Sinks failing = sinks();
+  failing.moved = [this](const RobotPose&, bool) {
+    const std::lock_guard lock(mutex_);
+    throw std::runtime_error("broken");
+  };
+  own_ = std::make_unique<LiveFeed>(settings(), failing, [] { return true; });
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  std::vector<Answer> answers;
+  {
+    const std::lock_guard lock(mutex_);
+    answers.push_back(pose(0));
+    std::this_thread::sleep_for(100ms);
+    answers.push_back(pose(0.1));
+    answers.push_back(depth(0.05));
+  }
+  EXPECT_EQ(code_of(std::move(answers[0])), "taken");
+  EXPECT_EQ(code_of(std::move(answers[1])), "not_mapping");
+  EXPECT_EQ(code_of(std::move(answers[2])), "not_mapping");
+}
+
+TEST_F(LiveFeedTest, AMapThatIsBehindIsNotWaitedFor) {
+  std::atomic<std::size_t> room = 0;
+  LiveFeed::Sinks behind = sinks();
+  behind.room = [&] { return room.load(); };
+  own_ = std::make_unique<LiveFeed>(settings(), behind, [] { return true; });
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  for (int i = 0; i < 6; ++i) code_of(pose(0.1 * i));
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(code_of(depth(0.1 * i)), "taken") << "mapping goes on";
+  EXPECT_EQ(units_within(400ms), 0U);
+  room = 32;
+  EXPECT_GT(units_within(5s), 0U);
+}
+
+TEST_F(LiveFeedTest, WhatIsLeftIsHandedOverAtOnceWhenThereIsNothingElseToDo) {
+  std::vector<std::chrono::steady_clock::time_point> calls;
+  LiveFeed::Sinks small = sinks();
+  small.room = [] { return UnitHandOver::kUnderWay / 2; };
+  small.hand_over = [&](auto units, const FeedMoment&) {
+    const std::lock_guard lock(mutex_);
+    if (!units.empty()) calls.push_back(std::chrono::steady_clock::now());
+    unit_count_ += units.size();
+    return true;
+  };
+  mapping::MapperSettings fine = settings();
+  fine.voxel_m = 0.005;  // some 90 units
+  own_ = std::make_unique<LiveFeed>(fine, small, [] { return true; });
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  code_of(pose(0));
+  EXPECT_EQ(code_of(depth(0)), "taken");
+  std::size_t count = 0;
+  for (std::size_t more = 1; more > 0; count += more) more = units_within(1s);
+  EXPECT_GT(count, 60U);
+  const std::lock_guard lock(mutex_);
+  ASSERT_GT(calls.size(), 3U);
+  auto least = calls[1] - calls[0];
+  for (std::size_t i = 2; i < calls.size(); ++i) least = std::min(least, calls[i] - calls[i - 1]);
+  EXPECT_LT(least, 190ms) << "what is done five times a second while pictures come";
+}
+
 TEST_F(LiveFeedTest, AMapInOnePieceTakesNoCorrections) {
-  EXPECT_TRUE(own_->begin());
+  EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   FrameHead corrected;
   corrected.kind = FramesKind::CorrectedPoses;

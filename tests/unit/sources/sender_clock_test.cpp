@@ -1,0 +1,75 @@
+#include "server/sources/sender_clock.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace spectra::sources {
+namespace {
+
+using Verdict = SenderClock::Verdict;
+
+/// A clock that has heard stamps 0 to 1, a tenth of a second apart; the steady one shows the same.
+SenderClock running_clock() {
+  SenderClock clock;
+  for (int i = 0; i <= 10; ++i) clock.accept(0.1 * i, 0.1 * i);
+  return clock;
+}
+
+TEST(SenderClock, TakesNoStampThatIsNotInSeconds) {
+  for (SenderClock clock : {SenderClock(), running_clock()}) {
+    for (const double absurd : {1e11, 1.7e12, -1e300, std::numeric_limits<double>::quiet_NaN()}) {
+      for (int i = 0; i < 5; ++i) EXPECT_EQ(clock.look(absurd, 1, true), Verdict::NotInSeconds) << absurd;
+    }
+    EXPECT_EQ(clock.look(1.1, 1.1, false), Verdict::Taken);
+  }
+}
+
+TEST(SenderClock, OneStampFarAheadChangesNothing) {
+  SenderClock clock = running_clock();
+  EXPECT_EQ(clock.look(1e9, 1, false), Verdict::Ahead);
+  EXPECT_EQ(clock.look(1.1, 1.1, false), Verdict::Taken);
+  EXPECT_EQ(clock.on_own_clock(1.1), 1.1);
+  EXPECT_EQ(clock.newest_s(), 1);
+}
+
+TEST(SenderClock, StraysAreInARowWhenNothingElseIsBetween) {
+  SenderClock clock = running_clock();
+  EXPECT_EQ(clock.look(1e9, 1, false), Verdict::Ahead);
+  EXPECT_EQ(clock.look(1e9 + 0.1, 1.1, false), Verdict::Ahead);
+  clock.accept(1.1, 1.1);
+  EXPECT_EQ(clock.look(1e9 + 0.2, 1.2, false), Verdict::Ahead);
+  EXPECT_EQ(clock.look(1e6, 1.3, false), Verdict::Ahead) << "another far away place";
+  EXPECT_EQ(clock.look(1e6 + 0.1, 1.4, false), Verdict::Ahead);
+  EXPECT_EQ(clock.look(1e6 + 0.2, 1.5, false), Verdict::Taken) << "the clock was set";
+}
+
+TEST(SenderClock, WhoWasSilentHasStampsAsMuchLater) {
+  SenderClock clock = running_clock();
+  EXPECT_EQ(clock.look(61, 61, false), Verdict::Taken);
+  EXPECT_EQ(clock.look(61, 1, true), Verdict::Taken) << "stills";
+}
+
+TEST(SenderClock, AClockThatIsSetBackGoesOnLater) {
+  SenderClock clock;
+  clock.accept(1e9, 0);
+  EXPECT_EQ(clock.look(5, 0.1, false), Verdict::Taken) << "whoever asks compares it with those before";
+  EXPECT_LT(clock.on_own_clock(5), 1e9);
+  EXPECT_EQ(clock.look(5.1, 0.2, false), Verdict::Taken);
+  EXPECT_EQ(clock.look(5.2, 0.3, false), Verdict::BegunAnew);
+  clock.accept(5.2, 0.3);
+  EXPECT_EQ(clock.on_own_clock(5.2), 1e9 + SenderClock::kNewClockGapS);
+  EXPECT_NEAR(clock.on_own_clock(5.3) - clock.on_own_clock(5.2), 0.1, 1e-6);
+}
+
+TEST(SenderClock, MomentsBeforeAreThoseOfTheSenderBefore) {
+  SenderClock clock = running_clock();
+  clock.begin_sender();
+  clock.accept(0, 2);
+  EXPECT_EQ(clock.on_own_clock(0), 1 + SenderClock::kNewClockGapS);
+  clock.begin_sender();
+  EXPECT_EQ(clock.moment_before(0), 1 + SenderClock::kNewClockGapS);
+}
+
+}  // namespace
+}  // namespace spectra::sources
