@@ -169,18 +169,23 @@ int run_map(const MapOptions& options) {
     }
     base::report(progress, kMappingPhase, static_cast<double>(row + 1) / static_cast<double>(count));
   }
+  const std::string nothing_written = sender && sender->sent_count() > 0
+                                          ? "no file was written, and " + std::to_string(sender->sent_count()) +
+                                                " units of the map stay where they were sent"
+                                          : "nothing was written";
   if (options.corrected_poses && moved_count == 0) {
     line.end();
     print_faults(faults);
     return fail(kJobFailed, options.corrected_poses->string() +
                                 ": none of its poses differs from what the map was made with, at a time when there "
-                                "were frames; nothing was written");
+                                "were frames; " +
+                                nothing_written);
   }
   const mapping::UnitMesh mesh = mapper.whole_mesh(progress);
   if (mesh.triangles.empty()) {
     line.end();
     print_faults(faults);
-    return fail(kJobFailed, options.frames.string() + ": none of its frames gives a surface; nothing was written");
+    return fail(kJobFailed, options.frames.string() + ": none of its frames gives a surface; " + nothing_written);
   }
   const auto written = options.output.empty()
                            ? base::Result<void>(base::success())

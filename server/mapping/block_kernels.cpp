@@ -6,21 +6,12 @@
 #include <algorithm>
 
 #include "server/mapping/block_kernels.hpp"
+#include "server/mapping/lens_lanes-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace spectra::mapping::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using FloatTag = hn::CappedTag<float, 16>;
-using IntTag = hn::RebindToSigned<FloatTag>;
-using Floats = hn::Vec<FloatTag>;
-using Ints = hn::Vec<IntTag>;
 
 constexpr float kNearest = 0.05F;  ///< Metres before the camera.
-
-HWY_INLINE Floats all(float value) {
-  return hn::Set(FloatTag(), value);
-}
 
 template <class Narrow>
 HWY_INLINE Floats load_narrow(const Narrow* from) {
@@ -44,14 +35,7 @@ HWY_INLINE Ints project(const KernelCamera& camera, const std::array<float, 3>& 
   Floats x = hn::Mul(hn::Add(all(corner[0]), hn::LoadU(d, &camera.x[voxel])), inverse);
   Floats y = hn::Mul(hn::Add(all(corner[1]), hn::LoadU(d, &camera.y[voxel])), inverse);
   const Lens& lens = camera.lens;
-  if (camera.is_distorted) {
-    const Floats xx = hn::Mul(x, x), yy = hn::Mul(y, y), xy2 = hn::Mul(all(2), hn::Mul(x, y)), rr = hn::Add(xx, yy);
-    const Floats radial = hn::Add(all(1), hn::Mul(rr, hn::Add(all(lens.k1), hn::Mul(rr, all(lens.k2)))));
-    const Floats bent_x = hn::Add(hn::Mul(all(lens.p1), xy2), hn::Mul(all(lens.p2), hn::Add(rr, hn::Add(xx, xx))));
-    const Floats bent_y = hn::Add(hn::Mul(all(lens.p1), hn::Add(rr, hn::Add(yy, yy))), hn::Mul(all(lens.p2), xy2));
-    x = hn::Add(hn::Mul(x, radial), bent_x);
-    y = hn::Add(hn::Mul(y, radial), bent_y);
-  }
+  if (camera.is_distorted) distort(lens, x, y);
   // Half a pixel more, so that cutting off the fraction rounds; what is outside is brought to the border first.
   const Floats across = all(static_cast<float>(camera.width)), down = all(static_cast<float>(camera.height));
   const Floats u = hn::Min(hn::Max(hn::Add(hn::Mul(all(lens.fx), x), all(lens.cx + 0.5F)), all(-1)), across);

@@ -22,22 +22,6 @@ std::optional<fs::path> inside(const std::string& word) {
   return path;
 }
 
-}  // namespace
-
-void FaultLog::add(FaultKind kind, const std::string& what, std::size_t count) {
-  FrameFault& fault = faults_[static_cast<std::size_t>(kind)];
-  if (fault.count == 0) fault.what = what;
-  fault.count += count;
-}
-
-void FaultLog::add(const FaultLog& other) {
-  for (std::size_t i = 0; i < kFaultKinds; ++i) {
-    if (other.faults_[i].count > 0) add(static_cast<FaultKind>(i), other.faults_[i].what, other.faults_[i].count);
-  }
-}
-
-namespace {
-
 void note_faults(const TrajectoryNotes& notes, const fs::path& file, FaultLog& faults) {
   if (notes.unreadable > 0) {
     faults.add(FaultKind::UnreadablePose,
@@ -51,6 +35,18 @@ void note_faults(const TrajectoryNotes& notes, const fs::path& file, FaultLog& f
 }
 
 }  // namespace
+
+void FaultLog::add(FaultKind kind, const std::string& what, std::size_t count) {
+  FrameFault& fault = faults_[static_cast<std::size_t>(kind)];
+  if (fault.count == 0) fault.what = what;
+  fault.count += count;
+}
+
+void FaultLog::add(const FaultLog& other) {
+  for (std::size_t i = 0; i < kFaultKinds; ++i) {
+    if (other.faults_[i].count > 0) add(static_cast<FaultKind>(i), other.faults_[i].what, other.faults_[i].count);
+  }
+}
 
 Result<Trajectory> FrameFolder::read_poses(const fs::path& file, FaultLog& faults) const {
   BOOST_OUTCOME_TRY(auto poses, Trajectory::read(file));

@@ -58,21 +58,39 @@ bool is_same_place(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, doubl
   return (a.translation() - b.translation()).norm() < kVoxels * voxel_m && turn_between(a, b) < kRadians;
 }
 
-/// Blocks of one grid that a block of another reaches, with the voxel beside it.
-template <class Visit>
-void for_each_reached(const Eigen::Isometry3d& to_from, GridPlace block, double voxel_m, const Visit& visit) {
+using VoxelBox = Eigen::AlignedBox3d;  ///< In voxels of a grid.
+
+/// What a block of another grid reaches, with the voxel beside it.
+VoxelBox reached_box(const Eigen::Isometry3d& to_from, GridPlace block, double voxel_m) {
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * kBlockEdge);
   const Eigen::Vector3d centre =
       to_from * (voxel_m * (kBlockEdge * Eigen::Vector3d(block.x, block.y, block.z) + half)) / voxel_m;
   const Eigen::Vector3d reach =
       to_from.linear().cwiseAbs() * (half + Eigen::Vector3d::Ones()) + Eigen::Vector3d::Ones();
+  return {centre - reach, centre + reach};
+}
+
+/// The blocks that a box has a part in.
+template <class Visit>
+void for_each_block(const VoxelBox& box, const Visit& visit) {
   const auto block_of = [](double voxel) { return static_cast<std::int32_t>(std::floor(voxel / kBlockEdge)); };
-  const Eigen::Vector3d low = centre - reach, high = centre + reach;
+  const Eigen::Vector3d &low = box.min(), &high = box.max();
   for (std::int32_t z = block_of(low.z()); z <= block_of(high.z()); ++z) {
     for (std::int32_t y = block_of(low.y()); y <= block_of(high.y()); ++y) {
       for (std::int32_t x = block_of(low.x()); x <= block_of(high.x()); ++x) visit(GridPlace{x, y, z});
     }
   }
+}
+
+/// All units of a map.
+VoxelBox box_of(const VoxelMap& map) {
+  VoxelBox box;
+  for (const MapUnit& unit : map.units()) {
+    const Eigen::Vector3d low = kUnitEdge * Eigen::Vector3d(unit.at.x, unit.at.y, unit.at.z);
+    box.extend(low);
+    box.extend(Eigen::Vector3d(low + Eigen::Vector3d::Constant(kUnitEdge)));
+  }
+  return box;
 }
 
 /// Whatever has changed since was seen to.
@@ -143,10 +161,13 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
     VoxelMap& map = *part.map;
     const bool is_elsewhere =
         part.has_moved != part.had_moved || part.baked_from_grid.matrix() != part.world_from_grid.matrix();
+    // Nothing is fused into one that another has followed.
+    if (part.is_settled && !is_elsewhere && !all) continue;
+    part.is_settled = &part != &parts_.back();
     const auto want_of = [&](GridPlace block) {
       if (!part.had_moved) want(block);
-      if (part.had_moved) for_each_reached(part.baked_from_grid, block, voxel_m_, want);
-      if (is_elsewhere) for_each_reached(part.world_from_grid, block, voxel_m_, want);
+      if (part.had_moved) for_each_block(reached_box(part.baked_from_grid, block, voxel_m_), want);
+      if (is_elsewhere) for_each_block(reached_box(part.world_from_grid, block, voxel_m_), want);
     };
     for (std::size_t u = 0; u < map.units().size(); ++u) {
       const MapUnit& unit = map.units()[u];
@@ -170,7 +191,11 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
   std::stable_partition(wanted.begin(), wanted.end(), [&](GridPlace at) { return world.find(at) >= 0; });
 
   std::vector<Eigen::Isometry3d> grids_from_world;
-  for (const Part& part : parts_) grids_from_world.push_back(part.world_from_grid.inverse());
+  std::vector<VoxelBox> boxes;
+  for (const Part& part : parts_) {
+    grids_from_world.push_back(part.world_from_grid.inverse());
+    boxes.push_back(box_of(*part.map));
+  }
   std::vector<BakedBlock> baked(std::min(kBakedAtOnce, wanted.size()));
   for (std::size_t first = 0; first < wanted.size(); first += kBakedAtOnce) {
     const std::size_t count = std::min(kBakedAtOnce, wanted.size() - first);
@@ -184,9 +209,11 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
           if (block >= 0) sums.add(map, block);
           continue;
         }
+        const VoxelBox reached = reached_box(grids_from_world[p], at, voxel_m_);
+        // Most submaps are elsewhere altogether.
+        if (!boxes[p].intersects(reached)) continue;
         bool is_reached = false;
-        for_each_reached(grids_from_world[p], at, voxel_m_,
-                         [&](GridPlace block) { is_reached = is_reached || map.find(block) >= 0; });
+        for_each_block(reached, [&](GridPlace block) { is_reached = is_reached || map.find(block) >= 0; });
         if (is_reached) sums.add(map, grids_from_world[p], at);
       }
       baked[i] = sums.take();

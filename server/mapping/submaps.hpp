@@ -68,6 +68,7 @@ class Submaps {
     bool has_moved = false;                                             ///< It has ever.
     Eigen::Isometry3d baked_from_grid = Eigen::Isometry3d::Identity();  ///< Where bake() has seen it last.
     bool had_moved = false;                                             ///< It had then.
+    bool is_settled = false;                                            ///< Another had followed it then.
     std::size_t baked_bytes = 0;                                        ///< Its block_bytes() then.
   };
   void begin();

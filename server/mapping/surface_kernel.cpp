@@ -3,16 +3,11 @@
 #include <hwy/foreach_target.h>  // compiles this file once per instruction set
 #include <hwy/highway.h>
 
+#include "server/mapping/lens_lanes-inl.hpp"
 #include "server/mapping/surface_kernel.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace spectra::mapping::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using FloatTag = hn::CappedTag<float, 16>;
-using IntTag = hn::RebindToSigned<FloatTag>;
-using Floats = hn::Vec<FloatTag>;
-using Ints = hn::Vec<IntTag>;
 
 constexpr float kSurfaceNearest = 0.1F;  ///< Metres before the camera.
 constexpr std::size_t kMargin = 64;      ///< Voxels to the farthest neighbour, in the order of a block.
@@ -41,7 +36,6 @@ void see(const KernelCamera& camera, const VoxelBlock& block, const std::array<f
   const IntTag di;
   const hn::Rebind<std::int16_t, FloatTag> narrow;
   const hn::Rebind<std::uint16_t, FloatTag> narrow_weight;
-  const auto all = [d](float value) HWY_ATTR { return hn::Set(d, value); };
   const std::size_t lanes = hn::Lanes(d);
   Padded padded;
   for (std::size_t i = 0; i < kMargin; i += lanes) {
@@ -90,14 +84,7 @@ void see(const KernelCamera& camera, const VoxelBlock& block, const std::array<f
     const Floats lengths = hn::Sqrt(hn::Mul(dot(nx, ny, nz, nx, ny, nz), dot(px, py, pz, px, py, pz)));
     const Floats inverse = hn::Div(all(1), pz);
     Floats x = hn::Mul(px, inverse), y = hn::Mul(py, inverse);
-    if (camera.is_distorted) {
-      const Floats xx = hn::Mul(x, x), yy = hn::Mul(y, y), xy2 = hn::Mul(all(2), hn::Mul(x, y)), rr = hn::Add(xx, yy);
-      const Floats radial = hn::Add(all(1), hn::Mul(rr, hn::Add(all(lens.k1), hn::Mul(rr, all(lens.k2)))));
-      const Floats bent_x = hn::Add(hn::Mul(all(lens.p1), xy2), hn::Mul(all(lens.p2), hn::Add(rr, hn::Add(xx, xx))));
-      const Floats bent_y = hn::Add(hn::Mul(all(lens.p1), hn::Add(rr, hn::Add(yy, yy))), hn::Mul(all(lens.p2), xy2));
-      x = hn::Add(hn::Mul(x, radial), bent_x);
-      y = hn::Add(hn::Mul(y, radial), bent_y);
-    }
+    if (camera.is_distorted) distort(lens, x, y);
     const Floats u = hn::Add(hn::Mul(all(lens.fx), x), all(lens.cx));
     const Floats v = hn::Add(hn::Mul(all(lens.fy), y), all(lens.cy));
     // The square reaches its neighbours' even where they are apart by a diagonal.

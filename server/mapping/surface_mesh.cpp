@@ -262,10 +262,6 @@ class Mesher {
   bool has_left_out_ = false;
 };
 
-}  // namespace
-
-namespace {
-
 /// Leaves out vertices that no triangle has: those of triangles without area.
 void drop_unused(UnitMesh& mesh) {
   std::vector<std::uint32_t> place(mesh.positions.size(), 0);

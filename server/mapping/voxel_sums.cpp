@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "server/mapping/depth_fusion.hpp"
+
 namespace spectra::mapping {
 namespace {
 
@@ -49,32 +51,73 @@ bool differ(const BakedBlock& baked, const VoxelMap& map, std::int32_t block) {
          baked.heat->seen_s != heat.seen_s;
 }
 
+/// More than it takes to be looked at again, in every unit.
+constexpr float kNew = 1000;
+
+/// Adds to the notes of a head what its voxels are about to differ by, as fusing would.
+void note_surface(const VoxelBlock& before, const VoxelBlock& after, BlockHead& head) {
+  constexpr float kPerVoxel = static_cast<float>(kTruncationVoxels) / kDistanceOne;
+  float moved = 0, recoloured = 0;
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    const auto old = static_cast<float>(before.distance[v]), now = static_cast<float>(after.distance[v]);
+    if (std::min(std::abs(old), std::abs(now)) >= 0.5F * kDistanceOne) continue;
+    const bool is_new = (before.weight[v] == 0) != (after.weight[v] == 0);
+    moved = std::max(moved, is_new ? kNew : kPerVoxel * std::abs(now - old));
+    if (before.colour_weight[v] == 0 && after.colour_weight[v] == 0) continue;
+    for (const auto channel : {&VoxelBlock::red, &VoxelBlock::green, &VoxelBlock::blue}) {
+      recoloured =
+          std::max(recoloured,
+                   std::abs(static_cast<float>((before.*channel)[v]) - static_cast<float>((after.*channel)[v])) / 256);
+    }
+  }
+  head.moved += moved;
+  head.recoloured += recoloured;
+}
+
+void note_heat(const HeatBlock* before, const HeatBlock& after, BlockHead& head) {
+  float warmed = 0;
+  for (std::size_t v = 0; v < kBlockVoxels; ++v) {
+    const bool was = before != nullptr && std::isfinite(before->variance[v]), is = std::isfinite(after.variance[v]);
+    if (!was && !is) continue;
+    if (was && is && before->celsius[v] == after.celsius[v] && before->seen_s[v] == after.seen_s[v]) continue;
+    warmed = std::max(warmed, was && is ? std::abs(after.celsius[v] - before->celsius[v]) : kNew);
+    if (is) head.hottest = std::max(head.hottest, after.celsius[v]);
+  }
+  head.warmed += warmed;
+}
+
 }  // namespace
 
 void put(VoxelMap& map, GridPlace at, const BakedBlock& block) {
-  constexpr float kMoved = 1;  // More than it takes to be looked at again.
   std::int32_t index = map.find(at);
   if (block.is_empty) {
     if (index < 0) return;
-    map.head(index).moved = kMoved;
+    if (map.head(index).has_surface) map.head(index).moved = kNew;
     map.remove(index);
     return;
   }
   if (index >= 0 && !differ(block, map, index)) return;
   if (index >= 0 && map.head(index).heat >= 0 && !block.heat) {
-    map.head(index).moved = kMoved;
+    map.head(index).moved = kNew;
     map.remove(index);
     index = -1;
   }
   if (index < 0) index = map.ensure(at);
-  if (block.heat && map.head(index).heat < 0) map.add_heat(index);
   BlockHead& head = map.head(index);
-  const BlockHead before = head;
-  head = block.head;
-  head.at = before.at;
-  head.unit = before.unit;
-  head.heat = before.heat;
-  head.moved = kMoved;
+  BlockHead next = block.head;
+  next.at = head.at;
+  next.unit = head.unit;
+  next.moved = head.moved;
+  next.warmed = head.warmed;
+  next.recoloured = head.recoloured;
+  next.hottest = head.hottest;
+  note_surface(map.voxels(index), block.voxels, next);
+  if (block.heat) {
+    note_heat(head.heat >= 0 ? &map.heat(index) : nullptr, *block.heat, next);
+    if (head.heat < 0) map.add_heat(index);
+  }
+  next.heat = head.heat;
+  head = next;
   map.voxels(index) = block.voxels;
   if (block.heat) map.heat(index) = *block.heat;
 }
@@ -189,7 +232,6 @@ BakedBlock VoxelSums::take() {
     baked.head = single_map_->head(single_block_);
     baked.voxels = single_map_->voxels(single_block_);
     if (baked.head.heat >= 0) baked.heat = single_map_->heat(single_block_);
-    baked.head.warmed = baked.head.recoloured = 0;
     return baked;
   }
   if (!sums_) return baked;

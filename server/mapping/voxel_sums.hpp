@@ -13,12 +13,12 @@ namespace spectra::mapping {
 /// A block made of others.
 struct BakedBlock {
   bool is_empty = true;  ///< Nothing is known of any voxel, and of none was.
-  BlockHead head;        ///< What it says of its voxels; not where it is.
+  BlockHead head;        ///< What it says of its voxels; not where it is, nor what has changed.
   VoxelBlock voxels;
   std::optional<HeatBlock> heat;
 };
 
-/// Puts it in the place of what is there; notes where something is another.
+/// Puts it in the place of what is there, and notes by how much that differs, as fusing does.
 void put(VoxelMap& map, GridPlace at, const BakedBlock& block);
 
 /// Gathers what several maps know of the voxels of one block: distances by weight, colours by theirs, temperatures by variance.

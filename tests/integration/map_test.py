@@ -160,6 +160,18 @@ class Frames(unittest.TestCase):
         self.assertEqual(sum(block["triangle_count"] for block in blocks), mesh["triangle_count"])
         self.assertEqual(subprocess.run([SPECTRA, "map", self.folder], capture_output=True).returncode, 2)
 
+    def test_says_what_was_sent_when_no_file_is_written(self):
+        self.write("index.html", "")
+        url = self.server("--live")
+        poses = self.path("poses.txt")
+        done = subprocess.run([SPECTRA, "map", self.folder, self.output, "--to", url, "--voxel", "0.02", "--corrected-poses", poses],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1, done.stdout)
+        count = len(self.blocks(url))
+        self.assertGreater(count, 0)
+        self.assertRegex(done.stderr, r"no file was written, and \d+ units of the map stay where they were sent")
+        self.assertFalse(os.path.exists(self.output))
+
     def test_tracking_says_where_it_is_lost_and_needs_no_poses(self):
         os.remove(self.path("poses.txt"))
         poses = self.path("found.txt")

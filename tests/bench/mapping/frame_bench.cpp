@@ -128,6 +128,8 @@ int main(int argc, char** argv) {
       frame_count, threads, unit_count, static_cast<double>(byte_count) / 1e6, checksum, mapper.map().block_count(),
       static_cast<double>(mapper.map().size_bytes()) /
           static_cast<double>(std::max<std::size_t>(1, mapper.map().block_count()) * kBlockVoxels));
+  std::printf("kept of what was told of %zu units: %.1f MB\n", publisher.told_count(),
+              static_cast<double>(publisher.size_bytes()) / 1e6);
   std::printf("%-28s %8s %8s %8s %8s\n", "ms a frame", "wall", "p95", "cpu", "p95");
   for (const Stage* stage : stages) stage->print();
   whole.print();

@@ -25,6 +25,15 @@ float mean_after(float mean, float value, float share) {
   return mean + (rounded == 0 ? std::trunc(std::clamp(value - mean, -1.0F, 1.0F)) : rounded);
 }
 
+void distort(const Lens& lens, float& x, float& y) {
+  const float xx = x * x, yy = y * y, xy2 = 2 * (x * y), rr = xx + yy;
+  const float radial = 1 + rr * (lens.k1 + rr * lens.k2);
+  const float bent_x = lens.p1 * xy2 + lens.p2 * (rr + (xx + xx));
+  const float bent_y = lens.p1 * (rr + (yy + yy)) + lens.p2 * xy2;
+  x = x * radial + bent_x;
+  y = y * radial + bent_y;
+}
+
 /// A wall that is nearer on one side, with holes, seen by a camera whose lens bends; a block that has seen something else.
 class BlockKernels : public testing::TestWithParam<bool> {
  protected:
@@ -72,20 +81,13 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
   const ColourKernel colours{kernel.camera, false, pixels_.data(), weight_.data()};
   const auto wanted = copy();
   NearPixels wanted_near{};
-  float recoloured = 0;
+  float recoloured = 0, moved = 0, nearest = kDistanceOne;
   const std::int32_t outside = camera_.width * camera_.height;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const KernelCamera& c = kernel.camera;
     const float z = corner_[2] + c.z[i], inverse = 1 / std::max(z, 0.05F);
     float x = (corner_[0] + c.x[i]) * inverse, y = (corner_[1] + c.y[i]) * inverse;
-    if (c.is_distorted) {
-      const float xx = x * x, yy = y * y, xy2 = 2 * (x * y), rr = xx + yy;
-      const float radial = 1 + rr * (c.lens.k1 + rr * c.lens.k2);
-      const float bent_x = c.lens.p1 * xy2 + c.lens.p2 * (rr + (xx + xx));
-      const float bent_y = c.lens.p1 * (rr + (yy + yy)) + c.lens.p2 * xy2;
-      x = x * radial + bent_x;
-      y = y * radial + bent_y;
-    }
+    if (c.is_distorted) distort(c.lens, x, y);
     const float u = c.lens.fx * x + (c.lens.cx + 0.5F), v = c.lens.fy * y + (c.lens.cy + 0.5F);
     const bool is_inside = u >= 0 && v >= 0 && u < static_cast<float>(c.width) && v < static_cast<float>(c.height);
     const std::int32_t pixel =
@@ -100,6 +102,8 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
     const float target = std::clamp(metres * (kDistanceOne / kernel.truncation_m), -kDistanceOne, kDistanceOne);
     wanted->distance[i] = static_cast<std::int16_t>(mean_after(old, target, w / std::max(1.0F, sum)));
     wanted->weight[i] = static_cast<std::uint16_t>(std::min(kWeightMost, sum));
+    const float now = wanted->distance[i];
+    if (std::min(std::abs(old), std::abs(now)) < 0.5F * kDistanceOne) moved = std::max(moved, std::abs(now - old));
     if (std::abs(metres) >= 2 * kernel.voxel_m) continue;
     wanted_near[i] = pixel;
     const float own = std::max(1.0F, std::trunc(16 * std::sqrt(trust * (1 / kWeightOne)) + 0.5F));
@@ -114,6 +118,11 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
     }
     wanted->colour_weight[i] = static_cast<std::uint8_t>(std::min(255.0F, all));
   }
+  for (std::size_t i = 0; i < kBlockVoxels; ++i) {
+    for (const std::int16_t distance : {before_->distance[i], wanted->distance[i]})
+      nearest = std::min(nearest, std::abs(static_cast<float>(distance)));
+  }
+  ASSERT_GT(moved, 0);
   ASSERT_GT(std::count_if(wanted_near.begin(), wanted_near.end(), [](std::int32_t p) { return p >= 0; }), 50);
   for (const std::int64_t target : fusion::test::instruction_sets()) {
     const fusion::test::UsingInstructionSet using_it(target);
@@ -122,14 +131,99 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
     NearPixels near;
     const BlockChange change = fuse_distances(kernel, corner_, *block, near);
     EXPECT_EQ(near, wanted_near) << name;
-    EXPECT_EQ(change.has_inside, std::any_of(block->distance.begin(), block->distance.end(),
-                                             [](std::int16_t distance) { return distance < 0; }));
+    const auto has = [&](auto is) { return std::any_of(block->distance.begin(), block->distance.end(), is); };
+    EXPECT_EQ(change.moved, moved) << name;
+    EXPECT_EQ(change.has_surface, nearest < 0.5F * kDistanceOne) << name;
+    EXPECT_EQ(change.is_free, !has([](std::int16_t distance) { return distance < 0.5F * kDistanceOne; })) << name;
+    EXPECT_EQ(change.has_inside, has([](std::int16_t distance) { return distance < 0; })) << name;
+    EXPECT_EQ(change.has_outside, has([](std::int16_t distance) { return distance >= 0; })) << name;
     EXPECT_EQ(fuse_colours(colours, corner_, *block, near), recoloured) << name;
     EXPECT_TRUE(are_same(*block, *wanted)) << name;
   }
 }
 
-TEST_P(BlockKernels, EveryInstructionSetSeesTheSameVoxels) {
+TEST_P(BlockKernels, EveryInstructionSetSaysTheSameOfBlocksOfEveryKind) {
+  const DistanceKernel kernel{
+      KernelCamera(camera_, pose_, kVoxel), depth_.data(), weight_.data(), 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
+  constexpr std::int16_t kHalf = 16384;  // The first whole number that is not within half of the truncation.
+  for (const std::int16_t lone : {std::int16_t{32767}, kHalf, std::int16_t{kHalf - 1}, std::int16_t{0},
+                                  std::int16_t{-1}, std::int16_t{-kHalf}, std::int16_t{-32767}}) {
+    for (const std::int16_t rest : {std::int16_t{32767}, std::int16_t{-32767}}) {
+      before_->distance.fill(rest);
+      before_->distance[300] = lone;
+      // Far behind the camera: nothing of it is seen.
+      for (const std::int64_t target : fusion::test::instruction_sets()) {
+        const fusion::test::UsingInstructionSet using_it(target);
+        const std::string name =
+            fusion::test::name_of(target) + " " + std::to_string(lone) + " in " + std::to_string(rest);
+        const auto block = copy();
+        NearPixels near;
+        const BlockChange change = fuse_distances(kernel, {0, 0, -3}, *block, near);
+        EXPECT_TRUE(are_same(*block, *before_)) << name;
+        EXPECT_EQ(change.moved, 0) << name;
+        EXPECT_EQ(change.has_surface, std::abs(lone) < kHalf) << name;
+        EXPECT_EQ(change.is_free, rest > 0 && lone >= kHalf) << name;
+        EXPECT_EQ(change.has_inside, rest < 0 || lone < 0) << name;
+        EXPECT_EQ(change.has_outside, rest >= 0 || lone >= 0) << name;
+      }
+    }
+  }
+}
+
+/// What see_voxels() is to find, voxel by voxel.
+std::unique_ptr<SeenVoxels> seen_one_by_one(const KernelCamera& camera, const VoxelBlock& block,
+                                            const std::array<float, 3>& corner, float voxel_m, float beside,
+                                            float off_per_step) {
+  auto out = std::make_unique<SeenVoxels>();
+  for (int i = 0; i < static_cast<int>(kBlockVoxels); ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    const float own = block.distance[index];
+    if (std::abs(own) > beside || block.weight[index] == 0) continue;
+    const auto slope = [&](int place, int stride) {
+      const auto at = [&](int k) { return static_cast<std::size_t>(i + k * stride); };
+      const bool has_low = place > 0 && block.weight[at(-1)] > 0, has_high = place < 7 && block.weight[at(1)] > 0;
+      const float low = has_low ? static_cast<float>(block.distance[at(-1)]) : own;
+      const float high = has_high ? static_cast<float>(block.distance[at(1)]) : own;
+      return has_low && has_high ? 0.5F * (high - low) : high - low;
+    };
+    const std::array gradient{slope(i & 7, 1), slope(i >> 3 & 7, 8), slope(i >> 6, 64)};
+    const float squared = gradient[0] * gradient[0] + (gradient[1] * gradient[1] + gradient[2] * gradient[2]);
+    if (!(squared > 0)) continue;
+    const float most = 2 / std::sqrt(squared), back = std::clamp(-(own / squared), -most, most);
+    std::array<float, 3> n{}, p{};
+    const std::array<float, 3> within{camera.x[index], camera.y[index], camera.z[index]};
+    for (std::size_t k = 0; k < 3; ++k) {
+      n[k] = gradient[0] * camera.view.step(0)[k] +
+             (gradient[1] * camera.view.step(1)[k] + gradient[2] * camera.view.step(2)[k]);
+      p[k] = corner[k] + within[k] + back * n[k];
+    }
+    const auto dot = [](const auto& a, const auto& b) { return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]); };
+    const float along = -dot(n, p);
+    if (p[2] < 0.1F || !(along > 0)) continue;
+    const float inverse = 1 / p[2];
+    float x = p[0] * inverse, y = p[1] * inverse;
+    if (camera.is_distorted) distort(camera.lens, x, y);
+    const float u = camera.lens.fx * x + camera.lens.cx, v = camera.lens.fy * y + camera.lens.cy;
+    const float half = 0.75F * voxel_m * camera.lens.fx * inverse;
+    if (!(u + half > 0 && u - half < static_cast<float>(camera.width) && v + half > 0 &&
+          v - half < static_cast<float>(camera.height)))
+      continue;
+    const float bend = p[2] * p[2] / along;
+    const std::size_t at = out->count++;
+    out->voxel[at] = i;
+    out->u[at] = u;
+    out->v[at] = v;
+    out->z_m[at] = p[2];
+    out->cosine[at] = std::min(1.0F, along / std::sqrt(dot(n, n) * dot(p, p)));
+    out->per_u[at] = n[0] * bend * (1 / camera.lens.fx);
+    out->per_v[at] = n[1] * bend * (1 / camera.lens.fy);
+    out->half[at] = half;
+    out->off_m[at] = std::abs(own) * off_per_step;
+  }
+  return out;
+}
+
+TEST_P(BlockKernels, EveryInstructionSetSeesTheVoxelsThatTheFormulaSays) {
   // A wall askew through the block, of which a part was never seen.
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
     const auto x = static_cast<float>(i % 8), y = static_cast<float>(i / 8 % 8), z = static_cast<float>(i / 64);
@@ -139,6 +233,7 @@ TEST_P(BlockKernels, EveryInstructionSetSeesTheSameVoxels) {
   }
   const KernelCamera camera(camera_, Eigen::Isometry3d::Identity(), kVoxel);
   std::vector<std::unique_ptr<SeenVoxels>> all;
+  all.push_back(seen_one_by_one(camera, *before_, corner_, 0.01F, 12287, 0.04F / kDistanceOne));
   for (const std::int64_t target : fusion::test::instruction_sets()) {
     const fusion::test::UsingInstructionSet using_it(target);
     all.push_back(std::make_unique<SeenVoxels>());

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "box_world.hpp"
 #include "server/mapping/mapper.hpp"
+#include "server/mapping/voxel_sums.hpp"
 
 namespace spectra::mapping {
 namespace {
@@ -133,6 +135,84 @@ TEST_F(SubmapsTest, ASubmapAloneIsTheMapAsItWas) {
     ASSERT_TRUE(is_same(one.sigma_kelvin[i], other.sigma_kelvin[i]));
     ASSERT_TRUE(one.colours[i] == other.colours[i]);
   }
+}
+
+TEST_F(SubmapsTest, WhatChangesByLittleIsNotMeshedAgain) {
+  settings_.submaps->radians = 7;
+  Mapper mapper(calibration_, settings_, pool_);
+  settings_.submaps.reset();
+  Mapper plain(calibration_, settings_, pool_);
+  UnitPublisher publisher, plain_publisher;
+  const auto see = [&](double time_s) {
+    Frame frame;
+    frame.time_s = time_s;
+    frame.depth = world_.depth(calibration_.depth.camera, true_pose(0));
+    frame.thermal = world_.thermal(calibration_.thermal->camera, true_pose(0));
+    Trajectory poses;
+    poses.add(time_s, true_pose(0));
+    for (Mapper* one : {&mapper, &plain}) one->fuse(frame, poses, faults_);
+  };
+  const auto told = [&](Mapper& of, UnitPublisher& by) {
+    return of.changed_units(by, Eigen::Vector3d::Zero(), pool_).size();
+  };
+  for (int i = 0; i < 10; ++i) see(0.1 * i);
+  EXPECT_GT(told(mapper, publisher), 3U);
+  EXPECT_GT(told(plain, plain_publisher), 3U);
+  // Weights grow, means stay.
+  see(1);
+  mapper.changed_units(publisher, Eigen::Vector3d::Zero(), pool_, 0);
+  plain.changed_units(plain_publisher, Eigen::Vector3d::Zero(), pool_, 0);
+  EXPECT_EQ(plain_publisher.waiting_count(), 0U);
+  EXPECT_EQ(publisher.waiting_count(), 0U);
+}
+
+TEST(BakedBlocks, NoteByHowMuchTheyDifferFromWhatWasThere) {
+  constexpr float kStepsAVoxel = kDistanceOne / 4;
+  VoxelMap map(0.01);
+  BakedBlock block;
+  block.is_empty = false;
+  block.head.has_surface = true;
+  block.voxels = {};
+  block.voxels.distance.fill(1000);
+  block.voxels.weight.fill(50);
+  block.voxels.colour_weight.fill(20);
+  block.heat.emplace();
+  block.heat->celsius.fill(20);
+  block.heat->variance.fill(0.01F);
+  block.heat->celsius[5] = 40;
+  const GridPlace at{1, 2, 3};
+  put(map, at, block);
+  BlockHead& head = map.head(map.find(at));
+  EXPECT_GT(head.moved, 1);
+  EXPECT_GT(head.warmed, 1);
+  EXPECT_EQ(head.hottest, 40);
+  const auto take_back = [&] {
+    head.moved = head.warmed = head.recoloured = 0;
+    head.hottest = -1000;
+  };
+  take_back();
+  put(map, at, block);
+  block.voxels.weight.fill(60);
+  put(map, at, block);
+  EXPECT_EQ(map.voxels(map.find(at)).weight[0], 60);
+  EXPECT_EQ(std::max({head.moved, head.warmed, head.recoloured}), 0) << "surer, and not another";
+  for (int i = 1; i <= 2; ++i) {
+    block.voxels.distance[7] = static_cast<std::int16_t>(1000 + 0.05F * kStepsAVoxel * static_cast<float>(i));
+    block.voxels.green[8] = static_cast<std::uint16_t>(256 * i);
+    block.heat->celsius[9] += 0.25F;
+    put(map, at, block);
+    EXPECT_NEAR(head.moved, 0.05 * i, 1e-3);
+    EXPECT_EQ(head.recoloured, static_cast<float>(i));
+    EXPECT_EQ(head.warmed, 0.25F * static_cast<float>(i));
+    EXPECT_EQ(head.hottest, 20 + 0.25F * static_cast<float>(i)) << "of what has changed";
+  }
+  take_back();
+  block.voxels.weight[3] = 0;
+  put(map, at, block);
+  EXPECT_GT(head.moved, 1) << "no longer seen";
+  put(map, at, BakedBlock{});
+  EXPECT_EQ(map.find(at), -1);
+  EXPECT_GT(map.units()[0].moved, 1);
 }
 
 TEST_F(SubmapsTest, SubmapsThatStayWhereTheyAreMakeTheSameSurface) {
