@@ -194,23 +194,26 @@ void BlockApi::give(const std::string& id, const std::vector<std::pair<std::stri
   if (!map_.is_open()) return reply(net::refused(not_open()));
   const net::BlockRefusal unknown{404, "not_found", "id", "there is no block \"" + id + "\"", ""};
   if (!at && !map_.has(id)) return reply(net::refused(unknown));
-  const exports::ExportShelf::Slot slot = exports_.take();
+  exports::ExportShelf::Slot slot = exports_.take();
   if (!slot) {
     return reply(net::refused(
         {503, "busy", "", "too many files are being made", std::to_string(exports_.most()) + " at a time"}));
   }
   if (at) {
-    return map_.read_at(*at, id,
-                        [this, slot, reply](const std::variant<files::LoadedScene, net::BlockRefusal>& outcome) {
-                          if (const auto* refusal = std::get_if<net::BlockRefusal>(&outcome))
-                            return reply(net::refused(*refusal));
-                          reply(ply_of(std::get<files::LoadedScene>(outcome).mesh, exports_));
-                        });
+    return map_.read_at(
+        *at, id, [this, slot, reply](const std::variant<files::LoadedScene, net::BlockRefusal>& outcome) mutable {
+          if (const auto* refusal = std::get_if<net::BlockRefusal>(&outcome)) return reply(net::refused(*refusal));
+          auto file = ply_of(std::get<files::LoadedScene>(outcome).mesh, exports_);
+          slot.reset();
+          reply(std::move(file));
+        });
   }
   served_.pool.post(
-      [this, slot, scene = served_.scenes.current(), id, unknown, reply] {
+      [this, slot = std::move(slot), scene = served_.scenes.current(), id, unknown, reply]() mutable {
         const auto mesh = scene->block_mesh(id);
-        reply(mesh ? ply_of(*mesh, exports_) : net::refused(unknown));
+        auto file = mesh ? ply_of(*mesh, exports_) : net::refused(unknown);
+        slot.reset();
+        reply(std::move(file));
       },
       jobs::kExportPriority);
 }

@@ -150,19 +150,21 @@ void HttpApi::handle_export(net::RequestTarget target, const std::function<void(
   if (!scene) return reply(no_scene_reply());
   const std::string key = key_of(asked, *scene);
   if (const auto file = exports_.find(key)) return reply(reply_of(file, asked, *format));
-  const exports::ExportShelf::Slot slot = exports_.take();
+  exports::ExportShelf::Slot slot = exports_.take();
   if (!slot) {
     auto busy = json_error(503, "", "other exports are being made already, or too much is being sent");
     busy.headers.emplace_back("Retry-After", "5");
     return reply(std::move(busy));
   }
   served_.pool.post(
-      [this, slot, scene, settings = settings.value(), options = file_options.value(), reply, asked, key] {
+      [this, slot = std::move(slot), scene, settings = settings.value(), options = file_options.value(), reply, asked,
+       key]() mutable {
         try {
           auto file = fused_export(*scene, settings, options);
           if (!file) return reply(json_error(400, file.error().field, file.error().message));
           std::string losses = losses_of(file.value());
           const auto kept = exports_.keep(key, {std::move(file.value().bytes), std::move(losses)});
+          slot.reset();  // Whoever asks for another as soon as this one is there is not told that it is being made.
           reply(reply_of(kept, asked, options.format));
         } catch (const std::exception& error) {
           spdlog::error("an export failed: {}", error.what());

@@ -1,13 +1,13 @@
 import { readFileSync } from 'node:fs';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { backoffDelay, Connection, ConnectionLost, type LinkState, RpcError, type SocketLike } from './connection';
+import { backoffDelay, Connection, ConnectionLost, type LinkState, openPatience, RpcError, type SocketLike } from './connection';
 
 const helloText = readFileSync(new URL('../../../protocol/golden/messages/hello.notification.json', import.meta.url), 'utf8');
 
 class FakeSocket implements SocketLike {
   binaryType: BinaryType = 'blob';
   readyState = 1;
-  onopen = null;
+  onopen: ((event: Event) => void) | null = null;
   onclose: ((event: CloseEvent) => void) | null = null;
   onerror = null;
   onmessage: ((event: MessageEvent) => void) | null = null;
@@ -34,6 +34,7 @@ function setUp(expectsMuch = false) {
   const frames: ArrayBuffer[] = [];
   const notes: string[] = [];
   const problems: string[] = [];
+  const link = { isSilent: false };
   let hellos = 0;
   const connection = new Connection(
     'ws://robot/ws',
@@ -48,13 +49,14 @@ function setUp(expectsMuch = false) {
     },
     () => {
       const socket = new FakeSocket();
+      socket.readyState = link.isSilent ? 0 : 1;
       sockets.push(socket);
       return socket;
     },
   );
   connection.start();
   const last = () => sockets.at(-1) as FakeSocket;
-  return { connection, sockets, states, frames, notes, problems, last, hellos: () => hellos };
+  return { connection, link, sockets, states, frames, notes, problems, last, hellos: () => hellos };
 }
 
 describe('Connection', () => {
@@ -207,6 +209,44 @@ describe('Connection', () => {
     expect(delays[0]).toBe(250);
     expect(delays.at(-1)).toBe(5000);
     for (let i = 1; i < delays.length; i += 1) expect(delays[i]).toBeGreaterThanOrEqual(delays[i - 1] ?? 0);
+  });
+
+  it('asks a silent link anew every two seconds or so once it was there, and gives every fourth attempt more time', async () => {
+    const { link, sockets, last } = setUp();
+    last().receive(helloText);
+    link.isSilent = true;
+    const begun: number[] = [];
+    for (let passed = 0; passed < 25_000; passed += 50) {
+      const before = sockets.length;
+      await vi.advanceTimersByTimeAsync(50);
+      if (sockets.length > before) begun.push(passed);
+    }
+    expect(begun.length).toBeGreaterThanOrEqual(7);
+    for (let attempt = 1; attempt < begun.length; attempt += 1) {
+      const apart = (begun[attempt] ?? 0) - (begun[attempt - 1] ?? 0);
+      expect(apart).toBeGreaterThanOrEqual(openPatience(attempt, true) + 150);
+      expect(apart).toBeLessThanOrEqual(openPatience(attempt, true) + 400);
+    }
+  });
+
+  it('gives a socket that has opened time to say hello', async () => {
+    const { sockets, last } = setUp();
+    last().receive(helloText);
+    last().onclose?.({} as CloseEvent);
+    await vi.advanceTimersByTimeAsync(400);
+    expect(sockets).toHaveLength(2);
+    last().onopen?.({} as Event);
+    await vi.advanceTimersByTimeAsync(5_500);
+    expect(last().closed).toBe(false);
+    last().receive(helloText);
+    await vi.advanceTimersByTimeAsync(1_000);
+    expect(sockets).toHaveLength(2);
+  });
+
+  it('is patient with a link that it has never had, and with one that has long been gone', () => {
+    expect(openPatience(1, false)).toBe(6_000);
+    expect([1, 2, 3, 4, 8].map((attempt) => openPatience(attempt, true))).toEqual([2_000, 2_000, 2_000, 4_500, 4_500]);
+    expect(openPatience(9, true)).toBe(6_000);
   });
 
   it('opens nothing after stop', async () => {

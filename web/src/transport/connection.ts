@@ -51,6 +51,12 @@ export type SocketLike = Pick<WebSocket, 'binaryType' | 'readyState' | 'send' | 
 
 const OPEN = 1;
 const HELLO_TIMEOUT_MS = 6_000;
+/** Of a link that was there a moment ago, for a socket to open. In a silent one TCP asks again after 1, 3 and 7 s: a new socket asks sooner. */
+const RETURN_PATIENCE_MS = 2_000;
+/** The same for every fourth attempt, for a link that has become slow. */
+const LONG_RETURN_PATIENCE_MS = 4_500;
+/** Attempts with that patience. Browsers hold sockets back after a dozen that came to nothing, for longer than it. */
+const HASTY_ATTEMPTS = 8;
 const CHECK_INTERVAL_MS = 250;
 /** A page that has not checked for so long has slept, or stalled; in a hidden one timers run once a second. */
 const SLEPT_MS = 2_000;
@@ -63,9 +69,15 @@ const ANSWER_BEHIND_MUCH_MS = 3_000;
 const BACKOFF_FIRST_MS = 250;
 const BACKOFF_LAST_MS = 5_000;
 
-/** Wait before attempt `attempt` (from 1), without jitter. */
+/** Wait before the next attempt after attempt `attempt` (from 1) was refused or cut, without jitter. */
 export function backoffDelay(attempt: number): number {
   return Math.min(BACKOFF_LAST_MS, BACKOFF_FIRST_MS * 2 ** (attempt - 1));
+}
+
+/** How long attempt `attempt` (from 1) may take to open a socket, on a link that was there a moment ago or not. */
+export function openPatience(attempt: number, wasThere: boolean): number {
+  if (!wasThere || attempt > HASTY_ATTEMPTS) return HELLO_TIMEOUT_MS;
+  return attempt % 4 === 0 ? LONG_RETURN_PATIENCE_MS : RETURN_PATIENCE_MS;
 }
 
 interface OpenRequest {
@@ -78,6 +90,8 @@ interface OpenRequest {
 export class Connection {
   #socket: SocketLike | null = null;
   #attempt = 0;
+  #attemptAt = 0;
+  #wasGreeted = false;
   #greeted = false;
   #nextId = 1;
   #requests = new Map<number, OpenRequest>();
@@ -138,6 +152,7 @@ export class Connection {
 
   #open(): void {
     this.#attempt += 1;
+    this.#attemptAt = performance.now();
     this.#greeted = false;
     this.events.onState({ phase: 'connecting', attempt: this.#attempt });
     let socket: SocketLike;
@@ -152,7 +167,13 @@ export class Connection {
     socket.onmessage = (event) => this.#receive(event.data);
     socket.onclose = () => this.#lost();
     socket.onerror = null;
-    this.#helloTimer = setTimeout(() => this.#lost(), HELLO_TIMEOUT_MS);
+    socket.onopen = () => this.#expectHello(HELLO_TIMEOUT_MS);
+    this.#expectHello(socket.readyState === OPEN ? HELLO_TIMEOUT_MS : openPatience(this.#attempt, this.#wasGreeted));
+  }
+
+  #expectHello(patience_ms: number): void {
+    clearTimeout(this.#helloTimer);
+    if (!this.#greeted) this.#helloTimer = setTimeout(() => this.#lost(), patience_ms);
   }
 
   #receive(data: unknown): void {
@@ -187,6 +208,7 @@ export class Connection {
   #greet(message: Hello): void {
     clearTimeout(this.#helloTimer);
     this.#greeted = true;
+    this.#wasGreeted = true;
     this.#attempt = 0;
     this.#lastCheckAt = performance.now();
     clearInterval(this.#checkTimer);
@@ -227,6 +249,7 @@ export class Connection {
     this.#greeted = false;
     this.#askedAt = null;
     if (socket !== null) {
+      socket.onopen = null;
       socket.onmessage = null;
       socket.onclose = null;
       socket.close();
@@ -238,7 +261,9 @@ export class Connection {
 
   #retryLater(): void {
     const attempt = Math.max(1, this.#attempt);
-    const delay = backoffDelay(attempt) * (0.75 + 0.5 * Math.random());
+    // An attempt that nobody answered has been a wait itself.
+    const hasWaited = this.#attempt > 0 && performance.now() - this.#attemptAt >= RETURN_PATIENCE_MS;
+    const delay = (hasWaited ? BACKOFF_FIRST_MS : backoffDelay(attempt)) * (0.75 + 0.5 * Math.random());
     this.events.onState({ phase: 'waiting', attempt, retry_at: performance.now() + delay });
     this.#retryTimer = setTimeout(() => this.#open(), delay);
   }

@@ -1,0 +1,88 @@
+// A viewer whose connections are the web client's own: it notices a dead link, opens the next connection and goes on there as the web client
+// does, which has its settings put in force before it asks for the stream, with the tiles that it still has.
+import { createRequire } from "node:module";
+import { fileURLToPath } from "node:url";
+import { isColours, KIND, readFrame } from "../integration/node/spectra_client.mjs";
+
+const root = fileURLToPath(new URL("../../", import.meta.url));
+const WebSocket = createRequire(`${root}tests/integration/node/package.json`)("ws");
+const { build } = createRequire(`${root}web/package.json`)("esbuild");
+const bundled = await build({ entryPoints: [`${root}web/src/transport/connection.ts`], bundle: true, format: "esm", write: false });
+const { Connection } = await import(`data:text/javascript;base64,${Buffer.from(bundled.outputFiles[0].contents).toString("base64")}`);
+
+export class WebViewer {
+  greeted_at = 0; // on performance.now()'s clock
+  attempts = 0; // sockets that it has opened
+  #connection;
+  #held = new Map(); // tile -> {claim, hasColours}
+  #session = null;
+  #alpha = null;
+  #isComplete = true;
+  #generation = 0;
+  #resolve = () => {};
+
+  constructor(url) {
+    this.#connection = new Connection(
+      `${url.replace(/^http/, "ws")}/ws?hello=brief`,
+      {
+        onHello: (hello) => void this.#greeted(hello).catch(() => {}),
+        onNotification: (method, params) => this.#notified(method, params),
+        onFrame: (message) => this.#received(readFrame(Buffer.from(message))),
+        onState: () => {},
+        onProtocolError: (error) => console.warn(error.message),
+        expectsMuch: () => !this.#isComplete,
+        onRoundTrip: () => {},
+      },
+      (address) => {
+        this.attempts += 1;
+        const socket = new WebSocket(address, "spectra.v1", { perMessageDeflate: false });
+        socket.on("error", () => {});
+        return socket;
+      },
+    );
+    this.#connection.start();
+  }
+
+  stop() {
+    this.#connection.stop();
+  }
+
+  /** Resolves with the whole picture of a setting, whatever happens to the link meanwhile. */
+  show(alpha) {
+    this.#alpha = alpha;
+    this.#isComplete = false;
+    const picture = new Promise((resolve) => (this.#resolve = resolve));
+    // Without a connection it is the next one that asks for it.
+    void this.#ask().catch(() => {});
+    return picture;
+  }
+
+  async #ask() {
+    this.#generation = Infinity;
+    const { generation } = await this.#connection.request("fusion.set", { method: "thermal_visible_blend", params: { alpha: this.#alpha } });
+    this.#generation = generation;
+  }
+
+  async #greeted({ session_id }) {
+    this.greeted_at = performance.now();
+    await this.#ask();
+    const tiles = [...this.#held.values()].filter(({ hasColours }) => hasColours).map(({ claim }) => claim);
+    const resume = this.#session !== null && tiles.length > 0 ? { resume: { session_id: this.#session, tiles } } : {};
+    await this.#connection.request("scene.subscribe", { channels: ["fused"], ...resume });
+    this.#session = session_id;
+  }
+
+  #notified(method, params) {
+    if (method !== "stream.complete" || params.generation < this.#generation) return;
+    this.#isComplete = true;
+    this.#resolve();
+  }
+
+  #received(frame) {
+    const { tile, kind, sequence } = frame;
+    if (kind === KIND.geometry) this.#held.set(tile, { claim: [frame.level, ...frame.position, frame.revision], hasColours: false });
+    else if (kind === KIND.remove) this.#held.delete(tile);
+    else if (isColours(frame) && this.#held.has(tile)) this.#held.get(tile).hasColours = true;
+    this.#connection.notify("stream.ack", { sequence });
+  }
+}
