@@ -5,27 +5,23 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/mapping/depth_kernel.hpp"
 #include "server/mapping/voxel_map.hpp"
 
 namespace spectra::mapping {
 namespace {
 
 constexpr int kBandRows = 16;
-constexpr int kEdgeReach = 2;    ///< Pixels.
-constexpr int kNormalReach = 3;  ///< Pixels.
-constexpr float kLeastCosine = 0.17F;
-constexpr float kSteepest = 5.67F;  ///< The tangent of 80 degrees.
 
-/// What weighing a pixel needs. Inner: of one whose neighbours as far as kNormalReach are in the picture.
-template <bool kInner>
-struct Scene {
+/// Weighs the pixels beside the border of the picture, one by one; the others as weigh_pixels() does.
+struct BorderPixels {
   const float* depth;
   const RayTable& rays;
   float focal;
   int width, height;
 
   float at(int x, int y) const {
-    return !kInner && (x < 0 || y < 0 || x >= width || y >= height)
+    return x < 0 || y < 0 || x >= width || y >= height
                ? 0
                : depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
   }
@@ -41,7 +37,7 @@ struct Scene {
       const float most = largest_step(z, sigma_m, reach);
       for (const auto& [dx, dy] : kAround) {
         const int u = x + reach * dx, v = y + reach * dy;
-        if (!kInner && (u < 0 || v < 0 || u >= width || v >= height)) continue;
+        if (u < 0 || v < 0 || u >= width || v >= height) continue;
         const float other = at(u, v);
         if (other == 0 ? reach == 1 : std::abs(other - z) > most) return true;
       }
@@ -124,32 +120,43 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
   std::transform(picture.pixels.begin(), picture.pixels.end(), frame.depth_m.begin(), [&](std::uint16_t value) {
     return value == calibration.invalid ? 0 : static_cast<float>(value) * unit;
   });
-  const Scene<true> inner{frame.depth_m.data(), rays, static_cast<float>(calibration.camera.fx), frame.width,
-                          frame.height};
-  const Scene<false> outer{inner.depth, rays, inner.focal, frame.width, frame.height};
+  const auto focal = static_cast<float>(calibration.camera.fx);
+  const BorderPixels border{frame.depth_m.data(), rays, focal, frame.width, frame.height};
+  const DepthPixels pixels{frame.depth_m.data(), rays.x.data(), rays.y.data(), frame.width, focal,
+                           calibration.noise,    truncation_m};
   const double reference = 2 * calibration.noise.base_m;
+  const auto weigh_one = [&](int x, int y) {
+    const std::size_t pixel = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+    const float z = frame.depth_m[pixel];
+    if (z <= 0) return;
+    const double sigma = calibration.noise.sigma_m(static_cast<double>(z));
+    if (sigma > truncation_m) return;
+    const float cosine = border.cosine_of(x, y, z, static_cast<float>(sigma));
+    if (cosine < kLeastCosine) return;
+    const double trust = std::min(1.0, reference * reference / (sigma * sigma));
+    const int weight = static_cast<int>(kWeightOne * static_cast<float>(trust) * cosine + 0.5F);
+    frame.weight[pixel] = static_cast<float>(std::max(1, weight));
+  };
   std::vector<std::size_t> counts(static_cast<std::size_t>(frame.tiles_down), 0);
   static_assert(kBandRows == DepthFrame::kTile);
   pool.for_each(static_cast<std::size_t>(frame.tiles_down), [&](std::size_t band) {
     const int first = static_cast<int>(band) * kBandRows, last = std::min(first + kBandRows, frame.height);
     for (int y = first; y < last; ++y) {
-      for (int x = 0; x < frame.width; ++x) {
-        const std::size_t pixel = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
-        const float z = frame.depth_m[pixel];
-        if (z <= 0) continue;
-        const double sigma = calibration.noise.sigma_m(static_cast<double>(z));
-        if (sigma > truncation_m) continue;
-        const bool is_inner =
-            x >= kNormalReach && y >= kNormalReach && x + kNormalReach < frame.width && y + kNormalReach < frame.height;
-        const auto sigma_m = static_cast<float>(sigma);
-        const float cosine = is_inner ? inner.cosine_of(x, y, z, sigma_m) : outer.cosine_of(x, y, z, sigma_m);
-        if (cosine < kLeastCosine) continue;
-        const double trust = std::min(1.0, reference * reference / (sigma * sigma));
-        const int weight = static_cast<int>(kWeightOne * static_cast<float>(trust) * cosine + 0.5F);
-        frame.weight[pixel] = static_cast<float>(std::max(1, weight));
-        float& farthest = frame.farthest_m[band * static_cast<std::size_t>(frame.tiles_across) +
-                                           static_cast<std::size_t>(x / DepthFrame::kTile)];
-        farthest = std::max(farthest, z);
+      const std::size_t row = static_cast<std::size_t>(y) * width;
+      const bool is_inner = y >= kNormalReach && y + kNormalReach < frame.height &&
+                            frame.width >= static_cast<int>(kLeastWeighed) + 2 * kNormalReach;
+      const int begin = is_inner ? kNormalReach : frame.width,
+                end = is_inner ? frame.width - kNormalReach : frame.width;
+      for (int x = 0; x < begin; ++x) weigh_one(x, y);
+      for (int x = end; x < frame.width; ++x) weigh_one(x, y);
+      if (is_inner) {
+        const std::size_t pixel = row + static_cast<std::size_t>(begin);
+        weigh_pixels(pixels, pixel, static_cast<std::size_t>(end - begin), &frame.weight[pixel]);
+      }
+      for (std::size_t x = 0; x < width; ++x) {
+        if (frame.weight[row + x] <= 0) continue;
+        float& farthest = frame.farthest_m[band * static_cast<std::size_t>(frame.tiles_across) + x / DepthFrame::kTile];
+        farthest = std::max(farthest, frame.depth_m[row + x]);
         ++counts[band];
       }
     }

@@ -7,6 +7,7 @@
 
 #include "server/mapping/block_kernels.hpp"
 #include "server/mapping/surface_view.hpp"
+#include "server/mapping/whole_numbers.hpp"
 
 namespace spectra::mapping {
 namespace {
@@ -46,9 +47,7 @@ std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m
         for (int s = 0; s <= steps; ++s) {
           const Eigen::Vector3f at =
               from + ray * (begin + (end - begin) * static_cast<float>(s) / static_cast<float>(std::max(steps, 1)));
-          const GridPlace place{base.x + static_cast<std::int32_t>(std::floor(at.x())),
-                                base.y + static_cast<std::int32_t>(std::floor(at.y())),
-                                base.z + static_cast<std::int32_t>(std::floor(at.z()))};
+          const GridPlace place{base.x + floor_of(at.x()), base.y + floor_of(at.y()), base.z + floor_of(at.z())};
           GridPlace& known =
               recent[index_within(place, 3) * 2 % recent.size() + (static_cast<std::size_t>(place.x) >> 3 & 1)];
           if (known == place) continue;

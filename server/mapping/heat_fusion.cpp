@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/mapping/surface_view.hpp"
+#include "server/mapping/whole_numbers.hpp"
 
 namespace spectra::mapping {
 namespace {
@@ -32,7 +33,7 @@ constexpr double kUntoldKelvin = 0.3, kWanderKelvin = 0.05;
 class Differences {
  public:
   void add(float difference, float weight) {
-    const double bin = std::floor((static_cast<double>(difference) + kReach) / kStep);
+    const double bin = (static_cast<double>(difference) + kReach) / kStep;
     if (!(bin >= 0 && bin < static_cast<double>(kBins))) return;
     bins_[static_cast<std::size_t>(bin)] += static_cast<std::uint64_t>(std::min(1e6F, 64 * weight) + 0.5F) + 1;
     ++count_;
@@ -211,39 +212,36 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
   const CameraModel& model = calibration_.camera;
   const Lens lens(model);
 
-  constexpr std::size_t kChunk = 64;
-  std::vector<std::vector<Look>> looks((view.blocks.size() + kChunk - 1) / kChunk);
+  std::vector<std::vector<Look>> looks(view.voxels.size());
   pool.for_each(looks.size(), [&](std::size_t chunk) {
-    const std::size_t end = std::min(view.blocks.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      for (const SurfaceVoxel& seen : view.blocks[i].voxels) {
-        const int x = static_cast<int>(std::floor(seen.u)), y = static_cast<int>(std::floor(seen.v));
-        if (x < 0 || y < 0 || x + 1 >= model.width || y + 1 >= model.height) continue;
-        if ((rules_.occlusion && !seen.is_reached) || (rules_.angle && seen.cosine < kLeastCosine)) continue;
-        const std::size_t pixel =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(model.width) + static_cast<std::size_t>(x);
-        if (rules_.edges && view.is_near_edge[pixel] != 0) continue;
-        const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
-        const float* row = &prepared.celsius[pixel];
-        const float* next = row + model.width;
-        const float celsius = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
-        Look look{view.blocks[i].block, seen.voxel, celsius, 1, noise};
-        if (rules_.weights) {
-          const float z = seen.z_m, c = std::max(seen.cosine, 0.05F);
-          const float px = (seen.u - lens.cx) / lens.fx, py = (seen.v - lens.cy) / lens.fy;
-          // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
-          const Eigen::Vector3f point(px * z, py * z, z);
-          const Eigen::Vector3f moved = -(linear + angular.cross(point));
-          const float du = lens.fx * (moved.x() - px * moved.z()) / z, dv = lens.fy * (moved.y() - py * moved.z()) / z;
-          const float uncertain = kPixelError * prepared.gradient[pixel];
-          const float askew = (1 - c) * (1 - c);
-          const float reflected = kReflection * askew * askew * (1 - c) * (celsius - prepared.reflected);
-          look.own = noise + uncertain * uncertain + reflected * reflected;
-          look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F);
-          if (look.own * look.scale > kMostVariance) continue;
-        }
-        looks[chunk].push_back(look);
+    looks[chunk].reserve(view.voxels[chunk].size());
+    for (const SurfaceVoxel& seen : view.voxels[chunk]) {
+      const int x = floor_of(seen.u), y = floor_of(seen.v);
+      if (x < 0 || y < 0 || x + 1 >= model.width || y + 1 >= model.height) continue;
+      if ((rules_.occlusion && !seen.is_reached) || (rules_.angle && seen.cosine < kLeastCosine)) continue;
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(model.width) + static_cast<std::size_t>(x);
+      if (rules_.edges && view.is_near_edge[pixel] != 0) continue;
+      const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
+      const float* row = &prepared.celsius[pixel];
+      const float* next = row + model.width;
+      const float celsius = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
+      Look look{seen.block, seen.voxel, celsius, 1, noise};
+      if (rules_.weights) {
+        const float z = seen.z_m, c = std::max(seen.cosine, 0.05F);
+        const float px = (seen.u - lens.cx) / lens.fx, py = (seen.v - lens.cy) / lens.fy;
+        // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
+        const Eigen::Vector3f point(px * z, py * z, z);
+        const Eigen::Vector3f moved = -(linear + angular.cross(point));
+        const float du = lens.fx * (moved.x() - px * moved.z()) / z, dv = lens.fy * (moved.y() - py * moved.z()) / z;
+        const float uncertain = kPixelError * prepared.gradient[pixel];
+        const float askew = (1 - c) * (1 - c);
+        const float reflected = kReflection * askew * askew * (1 - c) * (celsius - prepared.reflected);
+        look.own = noise + uncertain * uncertain + reflected * reflected;
+        look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F);
+        if (look.own * look.scale > kMostVariance) continue;
       }
+      looks[chunk].push_back(look);
     }
   });
 

@@ -57,6 +57,9 @@ base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMe
 
 std::string block_ply(const UnitMesh& mesh, double begin_unix_s) {
   std::string text;
+  // A little more than it takes, so that it need not grow.
+  constexpr std::size_t kHead = 1024, kBytesAVertex = 40, kBytesATriangle = 16;
+  text.reserve(kHead + kBytesAVertex * mesh.positions.size() + kBytesATriangle * mesh.triangles.size());
   files::PlyEncoder encoder(layout_of(mesh), [&text](std::span<const std::byte> bytes) -> base::Result<void> {
     text.append(std::bit_cast<const char*>(bytes.data()), bytes.size());
     return base::success();

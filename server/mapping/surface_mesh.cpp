@@ -5,13 +5,16 @@
 #include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
 
 #include "server/mapping/cube_cases.hpp"
+#include "server/mapping/mesh_kernels.hpp"
 
 namespace spectra::mapping {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kEdge = kBlockEdge + 1;        ///< Voxels that the cells of a block need, each way.
 constexpr int kUnitCorners = kUnitEdge + 1;  ///< The same of a unit.
 constexpr base::Rgb8 kNoColour{128, 128, 128};
@@ -37,22 +40,12 @@ struct VertexTable {
   }
 };
 
-/// 0 or 1 for each voxel of a row.
-using RowFlags = std::array<std::uint16_t, kBlockEdge>;
-
-/// The flags as bits: a product brings those of four voxels beside each other.
-unsigned bits_of(const RowFlags& flags) {
-  static_assert(std::endian::native == std::endian::little);
-  constexpr std::uint64_t kBeside = 1ULL << 48 | 1ULL << 33 | 1ULL << 18 | 1ULL << 3;
-  const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(flags);
-  return static_cast<unsigned>((halves[0] * kBeside >> 48 & 0xf) | (halves[1] * kBeside >> 48 & 0xf) << 4);
-}
-
 /// Which voxels of a block, and of its neighbours as far as its cells need them, are known and which are inside: bits along x.
 struct Neighbourhood {
   std::array<const VoxelBlock*, 8> voxels{};  ///< The block and those beyond, by bits of x, y, z; null: none.
   std::array<const HeatBlock*, 8> heat{};
-  std::array<float, 8> certainty{};  ///< BlockHead::heat_certainty.
+  std::array<float, 8> certainty{};        ///< BlockHead::heat_certainty.
+  std::array<const BlockBits*, 8> bits{};  ///< All 0 where there is no block.
   std::array<std::uint16_t, kEdge * kEdge> known{}, inside{};
 
   /// The block, by its number in the eight, and the index within it of a voxel at 0..8 each.
@@ -61,55 +54,66 @@ struct Neighbourhood {
   }
 
   /// False: no surface can be in it.
-  bool gather(std::uint16_t least_weight) {
+  bool gather() {
     unsigned any = 0, all = 0x1ff;
-    for (int row = 0; row < kEdge * kEdge; ++row) {
-      const auto [which, first] = voxel(0, row % kEdge, row / kEdge);
-      const VoxelBlock *block = voxels[which], *next = voxels[which | 1];
-      unsigned is_known = 0, is_inside = 0;
-      if (block != nullptr) {
-        RowFlags are_inside, are_known;
-        for (std::size_t x = 0; x < kBlockEdge; ++x) {
-          are_inside[x] = block->distance[first + x] < 0 ? 1 : 0;
-          are_known[x] = block->weight[first + x] >= least_weight ? 1 : 0;
-        }
-        is_inside = bits_of(are_inside);
-        is_known = bits_of(are_known);
+    for (int z = 0; z < kEdge; ++z) {
+      for (int y = 0; y < kEdge; ++y) {
+        const auto which = static_cast<std::size_t>((y >> 3) << 1 | (z >> 3) << 2);
+        const auto row = static_cast<std::size_t>((y & 7) | (z & 7) << 3);
+        const BlockBits &block = *bits[which], &next = *bits[which | 1];
+        const auto at = static_cast<std::size_t>(y + kEdge * z);
+        known[at] = static_cast<std::uint16_t>(block.known[row] | (next.known[row] & 1U) << kBlockEdge);
+        inside[at] = static_cast<std::uint16_t>(block.inside[row] | (next.inside[row] & 1U) << kBlockEdge);
+        any |= inside[at];
+        all &= inside[at];
       }
-      if (next != nullptr) {
-        is_inside |= next->distance[first] < 0 ? 1U << kBlockEdge : 0;
-        is_known |= next->weight[first] >= least_weight ? 1U << kBlockEdge : 0;
-      }
-      is_inside &= is_known;
-      any |= is_inside;
-      all &= is_inside;
-      known[static_cast<std::size_t>(row)] = static_cast<std::uint16_t>(is_known);
-      inside[static_cast<std::size_t>(row)] = static_cast<std::uint16_t>(is_inside);
     }
     return any != 0 && all != 0x1ff;
   }
 };
 
+/// What meshing a unit needs room for, kept from unit to unit.
+struct MeshingRoom {
+  static constexpr int kBlocks = kUnitBlocks + 1;  ///< A unit and the blocks beyond, each way.
+  VertexTable vertices;
+  std::array<BlockBits, std::size_t{kBlocks} * kBlocks * kBlocks> bits;
+  std::array<bool, std::size_t{kBlocks} * kBlocks * kBlocks> has_bits{};
+  CrossedEdges edges{};
+  UnitMesh mesh;
+};
+
 class Mesher {
  public:
-  Mesher(const VoxelMap& map, const MeshRules& rules, VertexTable& vertices)
+  Mesher(const VoxelMap& map, const MeshRules& rules, MeshingRoom& room)
       : map_(map),
         rules_(rules),
         least_weight_(static_cast<std::uint16_t>(std::clamp(std::ceil(rules.least_weight), 0.0F, kWeightMost))),
-        vertices_(vertices) {}
+        room_(room),
+        mesh_(room.mesh) {
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      const int from = edges_[e].from;
+      const int place = ((from >> 2) * kUnitCorners + (from >> 1 & 1)) * kUnitCorners + (from & 1);
+      offsets_[e] = static_cast<std::size_t>(3 * place + edges_[e].axis);
+    }
+  }
 
   void add_unit(const MapUnit& unit) {
     for (int i = 0; i < 8; ++i) {
       const std::int32_t beyond = map_.find_unit({unit.at.x + (i & 1), unit.at.y + (i >> 1 & 1), unit.at.z + (i >> 2)});
       units_[static_cast<std::size_t>(i)] = beyond < 0 ? nullptr : &map_.units()[static_cast<std::size_t>(beyond)];
     }
-    vertices_.clear();
+    room_.vertices.clear();
+    room_.has_bits.fill(false);
+    mesh_.positions.clear();
+    mesh_.colours.clear();
+    for (auto* values : {&mesh_.celsius, &mesh_.sigma_kelvin, &mesh_.seen_s}) values->clear();
+    mesh_.edges.clear();
+    mesh_.triangles.clear();
     for (const std::int32_t block : unit.blocks) {
       if (block >= 0) add_block(block);
     }
   }
 
-  UnitMesh take() { return std::move(mesh_); }
   /// Some vertices may be in no triangle.
   bool has_left_out() const { return has_left_out_; }
 
@@ -118,21 +122,48 @@ class Mesher {
     base_ = map_.head(block).at;
     const GridPlace in_unit{base_.x & 3, base_.y & 3, base_.z & 3};
     bool may_be_inside = false, may_be_outside = false;
+    std::array<std::int32_t, 8> found{};
     for (int i = 0; i < 8; ++i) {
       const GridPlace at{in_unit.x + (i & 1), in_unit.y + (i >> 1 & 1), in_unit.z + (i >> 2)};
       const MapUnit* unit = units_[static_cast<std::size_t>(at.x >> 2 | (at.y >> 2) << 1 | (at.z >> 2) << 2)];
-      const std::int32_t found = unit == nullptr ? -1 : unit->blocks[index_within(at, 2)];
-      around_.voxels[static_cast<std::size_t>(i)] = found < 0 ? nullptr : &map_.voxels(found);
-      around_.heat[static_cast<std::size_t>(i)] = found < 0 || map_.head(found).heat < 0 ? nullptr : &map_.heat(found);
-      around_.certainty[static_cast<std::size_t>(i)] = found < 0 ? 1.0F : map_.head(found).heat_certainty();
-      may_be_inside = may_be_inside || (found >= 0 && map_.head(found).has_inside);
-      may_be_outside = may_be_outside || (found >= 0 && map_.head(found).has_outside);
+      const std::int32_t index = unit == nullptr ? -1 : unit->blocks[index_within(at, 2)];
+      found[static_cast<std::size_t>(i)] = index;
+      may_be_inside = may_be_inside || (index >= 0 && map_.head(index).has_inside);
+      may_be_outside = may_be_outside || (index >= 0 && map_.head(index).has_outside);
     }
-    if (!may_be_inside || !may_be_outside || !around_.gather(least_weight_)) return;
+    if (!may_be_inside || !may_be_outside) return;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::int32_t index = found[i];
+      const auto k = static_cast<int>(i);
+      around_.voxels[i] = index < 0 ? nullptr : &map_.voxels(index);
+      around_.heat[i] = index < 0 || map_.head(index).heat < 0 ? nullptr : &map_.heat(index);
+      around_.certainty[i] = index < 0 ? 1.0F : map_.head(index).heat_certainty();
+      around_.bits[i] =
+          bits_of(around_.voxels[i], {in_unit.x + (k & 1), in_unit.y + (k >> 1 & 1), in_unit.z + (k >> 2)});
+    }
+    if (!around_.gather()) return;
     origin_ = {in_unit.x * kBlockEdge, in_unit.y * kBlockEdge, in_unit.z * kBlockEdge};
+    room_.edges.count = 0;
+    first_vertex_ = static_cast<std::uint32_t>(mesh_.edges.size());
+    const std::size_t first_triangle = mesh_.triangles.size();
     for (int z = 0; z < kBlockEdge; ++z) {
       for (int y = 0; y < kBlockEdge; ++y) add_cells(y, z);
     }
+    add_vertices();
+    drop_narrow(first_triangle);
+  }
+
+  /// Those of a block, found once a unit; `at` in blocks of the unit.
+  const BlockBits* bits_of(const VoxelBlock* block, GridPlace at) {
+    static const BlockBits kNone{};
+    if (block == nullptr) return &kNone;
+    constexpr int kBlocks = MeshingRoom::kBlocks;
+    const auto place = static_cast<std::size_t>((at.z * kBlocks + at.y) * kBlocks + at.x);
+    if (!room_.has_bits[place]) {
+      find_bits(*block, least_weight_, room_.bits[place]);
+      room_.has_bits[place] = true;
+    }
+    return &room_.bits[place];
   }
 
   /// The cells of a row that the surface crosses.
@@ -150,102 +181,86 @@ class Mesher {
       const int x = std::countr_zero(crossed);
       unsigned corners = 0;
       for (std::size_t k = 0; k < 4; ++k) corners |= (around_.inside[rows[k]] >> x & 3U) << 2 * k;
-      for (const auto& triangle : cases_[corners]) add_triangle(x, y, z, triangle);
+      const std::size_t cell =
+          3 * static_cast<std::size_t>(((origin_.z + z) * kUnitCorners + origin_.y + y) * kUnitCorners + origin_.x + x);
+      for (const auto& edges : cases_[corners]) {
+        base::Triangle triangle{};
+        for (std::size_t i = 0; i < 3; ++i) triangle[i] = vertex(cell, edges[i], x, y, z);
+        mesh_.triangles.push_back(triangle);
+      }
     }
-  }
-
-  void add_triangle(int x, int y, int z, const std::array<std::uint8_t, 3>& edges) {
-    base::Triangle corners{};
-    for (std::size_t i = 0; i < 3; ++i) corners[i] = vertex(x, y, z, edges_[edges[i]]);
-    // A surface through a voxel itself draws edges together.
-    if (mesh_.positions[corners[0]] == mesh_.positions[corners[1]] ||
-        mesh_.positions[corners[1]] == mesh_.positions[corners[2]] ||
-        mesh_.positions[corners[2]] == mesh_.positions[corners[0]]) {
-      has_left_out_ = true;
-      return;
-    }
-    mesh_.triangles.push_back(corners);
   }
 
   /// The vertex on an edge of a cell.
-  std::uint32_t vertex(int x, int y, int z, const CubeEdge& edge) {
-    const GridPlace from{x + (edge.from & 1), y + (edge.from >> 1 & 1), z + (edge.from >> 2)};
-    const int place = ((origin_.z + from.z) * kUnitCorners + origin_.y + from.y) * kUnitCorners + origin_.x + from.x;
-    const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
-    const std::uint32_t index = vertices_.of(static_cast<std::size_t>(3 * place + edge.axis), next);
-    if (index == next) make_vertex(from, edge);
+  std::uint32_t vertex(std::size_t cell, std::size_t edge, int x, int y, int z) {
+    CrossedEdges& crossed = room_.edges;
+    const auto next = first_vertex_ + static_cast<std::uint32_t>(crossed.count);
+    const std::uint32_t index = room_.vertices.of(cell + offsets_[edge], next);
+    if (index == next) add_edge({x, y, z}, edges_[edge]);
     return index;
   }
 
-  void make_vertex(GridPlace from, const CubeEdge& edge) {
-    const auto place = [](std::int32_t block, int within) {
-      return static_cast<std::uint64_t>(block * kBlockEdge + within) & 0x1fffff;
-    };
-    // Places that are 2^21 voxels apart never meet in a unit or beside it.
-    mesh_.edges.push_back(static_cast<std::uint64_t>(edge.axis) << 62 ^
-                          (place(base_.x, from.x) << 42 | place(base_.y, from.y) << 21 | place(base_.z, from.z)));
-    const auto [block_a, voxel_a] = Neighbourhood::voxel(from.x, from.y, from.z);
-    const auto [block_b, voxel_b] = Neighbourhood::voxel(
-        from.x + (edge.axis == 0 ? 1 : 0), from.y + (edge.axis == 1 ? 1 : 0), from.z + (edge.axis == 2 ? 1 : 0));
-    const VoxelBlock &a = *around_.voxels[block_a], &b = *around_.voxels[block_b];
-    const double of_a = a.distance[voxel_a], of_b = b.distance[voxel_b];
-    const double share = of_a / (of_a - of_b);
-    const auto metres = [&](std::int32_t block, int within, bool is_along) {
-      return static_cast<float>((static_cast<double>(block) * kBlockEdge + within + (is_along ? share : 0)) *
-                                map_.voxel_m());
-    };
-    mesh_.positions.push_back({metres(base_.x, from.x, edge.axis == 0), metres(base_.y, from.y, edge.axis == 1),
-                               metres(base_.z, from.z, edge.axis == 2)});
-    add_colour(a, voxel_a, b, voxel_b, share);
-    add_temperature(block_a, voxel_a, block_b, voxel_b, static_cast<float>(share));
+  void add_edge(GridPlace cell, const CubeEdge& edge) {
+    CrossedEdges& crossed = room_.edges;
+    const GridPlace from{cell.x + (edge.from & 1), cell.y + (edge.from >> 1 & 1), cell.z + (edge.from >> 2)};
+    const std::size_t i = crossed.count++;
+    crossed.x[i] = base_.x * kBlockEdge + from.x;
+    crossed.y[i] = base_.y * kBlockEdge + from.y;
+    crossed.z[i] = base_.z * kBlockEdge + from.z;
+    crossed.axis[i] = edge.axis;
+    read_end(from, i, crossed.first);
+    read_end({from.x + (edge.axis == 0 ? 1 : 0), from.y + (edge.axis == 1 ? 1 : 0), from.z + (edge.axis == 2 ? 1 : 0)},
+             i, crossed.second);
   }
 
-  void add_colour(const VoxelBlock& a, std::size_t voxel_a, const VoxelBlock& b, std::size_t voxel_b, double share) {
-    const bool has_a = a.colour_weight[voxel_a] > 0, has_b = b.colour_weight[voxel_b] > 0;
-    if (!has_a && !has_b) {
-      mesh_.colours.push_back(kNoColour);
-      return;
-    }
-    const double of_b = !has_a ? 1 : !has_b ? 0 : share;
-    const auto level = [&](const auto& channel_a, const auto& channel_b) {
-      const double mixed = (1 - of_b) * channel_a[voxel_a] + of_b * channel_b[voxel_b];
-      return static_cast<std::uint8_t>(std::min(255.0, mixed / 256 + 0.5));
-    };
-    mesh_.colours.push_back({level(a.red, b.red), level(a.green, b.green), level(a.blue, b.blue)});
-  }
-
-  /// What a voxel knows of its temperature.
-  struct Heat {
-    float celsius = 0, variance = std::numeric_limits<float>::infinity(), own_variance = 0, seen_s = 0;
-  };
-  Heat heat_of(std::size_t block, std::size_t voxel) const {
+  void read_end(GridPlace voxel, std::size_t i, CrossedEdges::Ends& end) const {
+    const auto [block, v] = Neighbourhood::voxel(voxel.x, voxel.y, voxel.z);
+    const VoxelBlock& voxels = *around_.voxels[block];
+    end.distance[i] = voxels.distance[v];
+    end.colour_weight[i] = voxels.colour_weight[v];
+    end.red[i] = voxels.red[v];
+    end.green[i] = voxels.green[v];
+    end.blue[i] = voxels.blue[v];
     const HeatBlock* heat = around_.heat[block];
-    if (heat == nullptr) return {};
-    return {heat->celsius[voxel], heat->variance[voxel], heat->variance[voxel] * around_.certainty[block],
-            heat->seen_s[voxel]};
+    end.celsius[i] = heat == nullptr ? 0 : heat->celsius[v];
+    end.variance[i] = heat == nullptr ? std::numeric_limits<float>::infinity() : heat->variance[v];
+    end.own_variance[i] = heat == nullptr ? 0 : heat->variance[v] * around_.certainty[block];
+    end.seen_s[i] = heat == nullptr ? 0 : heat->seen_s[v];
   }
 
-  void add_temperature(std::size_t block_a, std::size_t voxel_a, std::size_t block_b, std::size_t voxel_b,
-                       float share) {
-    const Heat a = heat_of(block_a, voxel_a), b = heat_of(block_b, voxel_b);
-    // Never quite 0, so that a voxel that knows nothing leaves it to the other, however far that is.
-    const float of_a = (1 - share + 1e-3F) / a.variance, of_b = (share + 1e-3F) / b.variance;
-    const float sum = of_a + of_b;
-    if (!(sum > 0)) {
-      mesh_.celsius.push_back(kNaN);
-      mesh_.sigma_kelvin.push_back(kNaN);
-      mesh_.seen_s.push_back(kNaN);
-      return;
+  /// Those of the edges that were found in a block.
+  void add_vertices() {
+    CrossedEdges& crossed = room_.edges;
+    find_vertices(crossed, map_.voxel_m(), rules_.least_sigma_kelvin);
+    for (std::size_t i = 0; i < crossed.count; ++i) {
+      // Places that are 2^21 voxels apart never meet in a unit or beside it.
+      const auto place = [](std::int32_t voxel) { return static_cast<std::uint64_t>(voxel) & 0x1fffff; };
+      mesh_.edges.push_back(static_cast<std::uint64_t>(crossed.axis[i]) << 62 ^
+                            (place(crossed.x[i]) << 42 | place(crossed.y[i]) << 21 | place(crossed.z[i])));
+      mesh_.positions.push_back({crossed.x_m[i], crossed.y_m[i], crossed.z_m[i]});
+      const auto level = [](std::int32_t value) { return static_cast<std::uint8_t>(value); };
+      mesh_.colours.push_back(crossed.red[i] < 0
+                                  ? kNoColour
+                                  : base::Rgb8{level(crossed.red[i]), level(crossed.green[i]), level(crossed.blue[i])});
     }
-    mesh_.celsius.push_back((of_a * a.celsius + of_b * b.celsius) / sum);
-    // The looks of both are the same looks: together they know no more than the mean of what each knows.
-    const float mixed = std::isinf(a.variance)   ? b.own_variance
-                        : std::isinf(b.variance) ? a.own_variance
-                                                 : (of_a * a.own_variance + of_b * b.own_variance) / sum;
-    mesh_.sigma_kelvin.push_back(std::sqrt(mixed + rules_.least_sigma_kelvin * rules_.least_sigma_kelvin));
-    mesh_.seen_s.push_back(std::isinf(a.variance)   ? b.seen_s
-                           : std::isinf(b.variance) ? a.seen_s
-                                                    : std::max(a.seen_s, b.seen_s));
+    const auto append = [&](const CrossedEdges::Array<float>& from, std::vector<float>& to) {
+      to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(crossed.count));
+    };
+    append(crossed.celsius, mesh_.celsius);
+    append(crossed.sigma_kelvin, mesh_.sigma_kelvin);
+    append(crossed.seen_s, mesh_.seen_s);
+  }
+
+  /// A surface through a voxel itself draws edges together: takes out triangles without area, from one on.
+  void drop_narrow(std::size_t first) {
+    const auto is_narrow = [&](const base::Triangle& t) {
+      const auto& at = mesh_.positions;
+      return at[t[0]] == at[t[1]] || at[t[1]] == at[t[2]] || at[t[2]] == at[t[0]];
+    };
+    const auto kept =
+        std::remove_if(mesh_.triangles.begin() + static_cast<std::ptrdiff_t>(first), mesh_.triangles.end(), is_narrow);
+    has_left_out_ = has_left_out_ || kept != mesh_.triangles.end();
+    mesh_.triangles.erase(kept, mesh_.triangles.end());
   }
 
   const VoxelMap& map_;
@@ -253,12 +268,14 @@ class Mesher {
   const std::uint16_t least_weight_;
   const std::array<CubeEdge, 12>& edges_ = cube_edges();
   const CubeCases& cases_ = cube_cases();
-  VertexTable& vertices_;
+  std::array<std::size_t, 12> offsets_{};  ///< Of an edge of a cell, in VertexTable.
+  MeshingRoom& room_;
   std::array<const MapUnit*, 8> units_{};  ///< The unit and those beyond, by bits of x, y, z; null: none.
   Neighbourhood around_;
-  GridPlace base_;    ///< Of the block, in blocks.
-  GridPlace origin_;  ///< Of the block within its unit, in voxels.
-  UnitMesh mesh_;
+  GridPlace base_;                  ///< Of the block, in blocks.
+  GridPlace origin_;                ///< Of the block within its unit, in voxels.
+  std::uint32_t first_vertex_ = 0;  ///< Of the block.
+  UnitMesh& mesh_;
   bool has_left_out_ = false;
 };
 
@@ -292,13 +309,16 @@ void drop_unused(UnitMesh& mesh) {
 
 }  // namespace
 
-UnitMesh mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules) {
-  thread_local VertexTable vertices;
-  Mesher mesher(map, rules, vertices);
+const UnitMesh& passing_mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules) {
+  thread_local const auto room = std::make_unique<MeshingRoom>();
+  Mesher mesher(map, rules, *room);
   mesher.add_unit(map.units()[static_cast<std::size_t>(unit)]);
-  UnitMesh mesh = mesher.take();
-  if (mesher.has_left_out()) drop_unused(mesh);
-  return mesh;
+  if (mesher.has_left_out()) drop_unused(room->mesh);
+  return room->mesh;
+}
+
+UnitMesh mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules) {
+  return passing_mesh_of_unit(map, unit, rules);
 }
 
 UnitMesh joined(const std::vector<UnitMesh>& units) {

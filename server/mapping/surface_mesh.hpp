@@ -33,6 +33,9 @@ struct MeshRules {
 /// of the last look.
 UnitMesh mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules);
 
+/// The same in room that is used again: holds until this thread meshes another unit.
+const UnitMesh& passing_mesh_of_unit(const VoxelMap& map, std::int32_t unit, const MeshRules& rules);
+
 /// Units joined into one mesh: vertices of the same edge become one.
 UnitMesh joined(const std::vector<UnitMesh>& units);
 

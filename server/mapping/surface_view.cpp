@@ -8,6 +8,7 @@
 #include "server/mapping/block_kernels.hpp"
 #include "server/mapping/depth_fusion.hpp"
 #include "server/mapping/surface_kernel.hpp"
+#include "server/mapping/whole_numbers.hpp"
 
 namespace spectra::mapping {
 namespace {
@@ -80,10 +81,9 @@ struct Drawing {
     SeenVoxels seen;
     see_voxels(kernel, map.voxels(index), kernel.view.corner(map.head(index).at), voxel_m, beside,
                kTruncation * voxel_m / kDistanceOne, seen);
-    out.reserve(seen.count);
     for (std::size_t i = 0; i < seen.count; ++i) {
       out.push_back(
-          {static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]});
+          {index, static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]});
       if (seen.off_m[i] <= voxel_m) draw_square(seen, i, depth_m);  // else the surface is drawn by those next to it
     }
   }
@@ -92,10 +92,8 @@ struct Drawing {
   void draw_square(const SeenVoxels& seen, std::size_t i, std::vector<float>& depth_m) const {
     const float u = seen.u[i], v = seen.v[i], z = seen.z_m[i], half = seen.half[i];
     const float reach = 2 * static_cast<float>(map.voxel_m());
-    const int left = std::max(0, static_cast<int>(std::ceil(u - half))),
-              right = std::min(camera.width - 1, static_cast<int>(std::floor(u + half))),
-              top = std::max(0, static_cast<int>(std::ceil(v - half))),
-              bottom = std::min(camera.height - 1, static_cast<int>(std::floor(v + half)));
+    const int left = std::max(0, ceil_of(u - half)), right = std::min(camera.width - 1, floor_of(u + half)),
+              top = std::max(0, ceil_of(v - half)), bottom = std::min(camera.height - 1, floor_of(v + half));
     for (int row = top; row <= bottom; ++row) {
       float* pixels = &depth_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width)];
       const float of_row = (static_cast<float>(row) - v) * seen.per_v[i];
@@ -117,20 +115,22 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
   const Lens& lens = kernel.lens;
   const auto voxel_m = static_cast<float>(map.voxel_m());
   const float radius_m = 0.87F * kBlockEdge * voxel_m;
+  std::vector<std::int32_t> blocks;
   for (const MapUnit& unit : map.units()) {
     const GridPlace middle{unit.at.x * kUnitBlocks + 2, unit.at.y * kUnitBlocks + 2, unit.at.z * kUnitBlocks + 2};
     if (!view.is_before(middle, 5 * radius_m, lens, camera)) continue;
     for (const std::int32_t block : unit.blocks) {
       if (block < 0 || !map.head(block).has_surface) continue;
-      if (view.is_before(map.head(block).at, 2 * radius_m, lens, camera)) drawn.blocks.push_back({block, {}});
+      if (view.is_before(map.head(block).at, 2 * radius_m, lens, camera)) blocks.push_back(block);
     }
   }
-  std::sort(drawn.blocks.begin(), drawn.blocks.end(), [](const auto& a, const auto& b) { return a.block < b.block; });
+  std::sort(blocks.begin(), blocks.end());
   drawn.depth_m.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), kFarthest);
 
   const Drawing drawing{map, camera, kernel};
-  constexpr std::size_t kChunk = 64;
-  const std::size_t chunks = (drawn.blocks.size() + kChunk - 1) / kChunk;
+  constexpr std::size_t kChunk = 64, kUsual = 200;  // Voxels of a block.
+  const std::size_t chunks = (blocks.size() + kChunk - 1) / kChunk;
+  drawn.voxels.resize(chunks);
   // Each thread draws into a picture of its own; the nearest of all is the same whoever has drawn what.
   std::vector<std::vector<float>> pictures(
       std::min<std::size_t>(pool.thread_count() + 1, std::max<std::size_t>(1, chunks)));
@@ -138,9 +138,10 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
   pool.for_each(pictures.size(), [&](std::size_t picture) {
     pictures[picture].assign(drawn.depth_m.size(), kFarthest);
     for (std::size_t chunk = next_chunk++; chunk < chunks; chunk = next_chunk++) {
-      const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
+      const std::size_t end = std::min(blocks.size(), (chunk + 1) * kChunk);
+      drawn.voxels[chunk].reserve(kUsual * kChunk);
       for (std::size_t i = chunk * kChunk; i < end; ++i)
-        drawing.draw(drawn.blocks[i].block, drawn.blocks[i].voxels, pictures[picture]);
+        drawing.draw(blocks[i], drawn.voxels[chunk], pictures[picture]);
     }
   });
   for (const std::vector<float>& picture : pictures) {
@@ -149,17 +150,14 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
   drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m);
 
   pool.for_each(chunks, [&](std::size_t chunk) {
-    const std::size_t end = std::min(drawn.blocks.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      for (SurfaceVoxel& seen : drawn.blocks[i].voxels) {
-        const int x = static_cast<int>(std::floor(seen.u + 0.5F)), y = static_cast<int>(std::floor(seen.v + 0.5F));
-        if (x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
-        const float before = drawn.depth_m[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
-                                           static_cast<std::size_t>(x)];
-        // A square lies across the line of sight whatever its surface does: what is askew has more depth within a voxel.
-        const float c = std::max(seen.cosine, 0.1F);
-        seen.is_reached = seen.z_m < before + voxel_m * (1.5F + 1.5F * std::sqrt(1 - c * c) / c);
-      }
+    for (SurfaceVoxel& seen : drawn.voxels[chunk]) {
+      const int x = floor_of(seen.u + 0.5F), y = floor_of(seen.v + 0.5F);
+      if (x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
+      const float before = drawn.depth_m[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
+                                         static_cast<std::size_t>(x)];
+      // A square lies across the line of sight whatever its surface does: what is askew has more depth within a voxel.
+      const float c = std::max(seen.cosine, 0.1F);
+      seen.is_reached = seen.z_m < before + voxel_m * (1.5F + 1.5F * std::sqrt(1 - c * c) / c);
     }
   });
   return drawn;

@@ -151,13 +151,16 @@ bool UnitPublisher::has_changed(const Told& told, const UnitMesh& mesh, float vo
   return false;
 }
 
-UnitPublisher::Candidate UnitPublisher::made(const VoxelMap& map, const MeshRules& rules, std::int32_t unit) const {
+UnitPublisher::Candidate UnitPublisher::made(const VoxelMap& map, const MeshRules& rules, std::int32_t unit,
+                                             bool is_wanted_anyway) const {
   Candidate candidate;
   candidate.unit = unit;
-  candidate.mesh = mesh_of_unit(map, unit, rules);
-  candidate.is_new = is_told(unit) ? has_changed(told_[static_cast<std::size_t>(unit)], candidate.mesh,
-                                                 static_cast<float>(map.voxel_m()))
-                                   : !candidate.mesh.triangles.empty();
+  const UnitMesh& mesh = passing_mesh_of_unit(map, unit, rules);
+  candidate.is_new = is_told(unit)
+                         ? has_changed(told_[static_cast<std::size_t>(unit)], mesh, static_cast<float>(map.voxel_m()))
+                         : !mesh.triangles.empty();
+  if (!candidate.is_new && !is_wanted_anyway) return candidate;
+  candidate.mesh = mesh;
   candidate.border = border_of(candidate.mesh);
   for (const float celsius : candidate.mesh.celsius) candidate.hottest = std::max(candidate.hottest, celsius);
   return candidate;
@@ -198,7 +201,7 @@ std::vector<PublishedUnit> UnitPublisher::take(VoxelMap& map, const MeshRules& r
   const double hot = median_celsius() + kHotKelvin;
   const std::vector<std::int32_t> looked_at = next_units(map, eye, hot, most);
   std::vector<Candidate> changed(looked_at.size());
-  pool.for_each(looked_at.size(), [&](std::size_t i) { changed[i] = made(map, rules, looked_at[i]); });
+  pool.for_each(looked_at.size(), [&](std::size_t i) { changed[i] = made(map, rules, looked_at[i], false); });
   std::erase_if(changed, [](const Candidate& candidate) { return !candidate.is_new; });
   boost::unordered_flat_set<std::int32_t> is_changed;
   for (const Candidate& candidate : changed) is_changed.insert(candidate.unit);
@@ -228,7 +231,7 @@ std::vector<PublishedUnit> UnitPublisher::take(VoxelMap& map, const MeshRules& r
         });
       };
       if (shared(won) == shared(lost)) continue;
-      changed.push_back(made(map, rules, neighbour));
+      changed.push_back(made(map, rules, neighbour, true));
       is_changed.insert(neighbour);
       waiting_.erase(neighbour);
     }

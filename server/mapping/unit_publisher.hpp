@@ -67,7 +67,8 @@ class UnitPublisher {
   std::vector<std::int32_t> next_units(const VoxelMap& map, const Eigen::Vector3d& eye, double hot, std::size_t most);
   static std::vector<BorderVertex> border_of(const UnitMesh& mesh);
   static bool has_changed(const Told& told, const UnitMesh& mesh, float voxel_m);
-  Candidate made(const VoxelMap& map, const MeshRules& rules, std::int32_t unit) const;
+  /// Without its mesh where that is no news, and not wanted anyway.
+  Candidate made(const VoxelMap& map, const MeshRules& rules, std::int32_t unit, bool is_wanted_anyway) const;
   void keep(const Candidate& candidate);
   double median_celsius() const;
   bool is_told(std::int32_t unit) const { return told_[static_cast<std::size_t>(unit)].triangle_count > 0; }
