@@ -69,6 +69,13 @@ void rules(auto& fields, Is<ResumeRequest> auto& resume) {
   const auto is_claim = [&](std::uint32_t place) { return place < resume.tiles.size(); };
   fields.require(
       "raw", [&] { return !resume.raw || each(*resume.raw, is_claim); }, "a list of places in tiles, from 0");
+  fields.require(
+      "temperature_sigma", [&] { return !resume.temperature_sigma || each(*resume.temperature_sigma, is_claim); },
+      "a list of places in tiles, from 0");
+  const auto is_of_a_claim = [&](const std::array<std::uint32_t, 2>& pair) { return is_claim(pair[0]); };
+  fields.require(
+      "colours", [&] { return !resume.colours || each(*resume.colours, is_of_a_claim); },
+      "a list of pairs of a place in tiles, from 0, and a sequence");
 }
 
 }  // namespace spectra::protocol

@@ -75,6 +75,11 @@ static void describe(auto& fields, Is<ResumeRequest> auto& message) {
       },
       "a list of at most 1500 tiles [level 0..255, x, y, z, revision from 1]");
   fields.optional("raw", message.raw);
+  fields.optional("temperature_sigma", message.temperature_sigma);
+  fields.optional("colours", message.colours);
+  fields.require(
+      "colours", [&] { return !message.colours || ((*message.colours).size() <= 1500); },
+      "a list of at most 1500 pairs [place in tiles, sequence]");
   rules(fields, message);
 }
 
@@ -113,6 +118,8 @@ static void describe(auto& fields, Is<SubscribeReply> auto& message) {
       "resumed_tiles",
       [&] { return !message.resumed_tiles || (*message.resumed_tiles >= 0 && *message.resumed_tiles <= 1500); },
       "an integer from 0 to 1500");
+  fields.optional("current_colours", message.current_colours);
+  fields.optional("generation", message.generation);
   rules(fields, message);
 }
 

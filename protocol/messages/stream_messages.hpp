@@ -34,6 +34,11 @@ struct ResumeRequest {
   std::vector<std::array<std::uint32_t, 5>> tiles;
   /// Places in `tiles` of those of which it has both raw layers, in the form that it asks for now; absent: none.
   std::optional<std::vector<std::uint32_t>> raw;
+  /// Places in `tiles` of those of which it has how sure temperatures are; absent: none.
+  std::optional<std::vector<std::uint32_t>> temperature_sigma;
+  /// Which colours it holds: a place in `tiles`, and the sequence of the frame that brought them on that
+  /// connection, 0 where they are as that connection's own resume named them. Absent: colours come anew.
+  std::optional<std::vector<std::array<std::uint32_t, 2>>> colours;
 };
 
 /// Params of scene.subscribe.
@@ -56,6 +61,11 @@ struct SubscribeRequest {
 struct SubscribeReply {
   /// There when the request had `resume`: how many of the claimed tiles are current and are not sent again.
   std::optional<int> resumed_tiles;
+  /// There when `resume` had `colours`: places in `tiles` of those whose colours are what the settings in force
+  /// give, so that they are not sent again either.
+  std::optional<std::vector<std::uint32_t>> current_colours;
+  /// There with `current_colours`: the generation that those colours count as.
+  std::optional<std::uint32_t> generation;
 };
 
 /// Params of the notification stream.ack.

@@ -13,6 +13,7 @@
 #include "server/map/scene_store.hpp"
 #include "server/session/catalogue.hpp"
 #include "server/session/session_ids.hpp"
+#include "server/session/session_memories.hpp"
 #include "server/sources/baseline_marked.hpp"
 #include "server/sources/robot_track.hpp"
 #include "server/stream/frame_cache.hpp"
@@ -48,6 +49,7 @@ struct ServedScene {
   SharedMessage mapping_trouble;  ///< Why nothing is mapped any more; for operators.
   sources::RobotTrack robot;      ///< Of the robot that maps the scene, if one does.
   const SessionIds session_ids;
+  SessionMemories memories;
   const Catalogue catalogue;
   /// MapKeeper::mark_baseline() of the map; whoever makes the keeper sets it before there are sessions.
   std::function<void(sources::BaselineDone)> mark_baseline;

@@ -54,6 +54,7 @@ ViewerSession::ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, Serve
       weak_peer_(peer),
       served_(served),
       limits_(limits),
+      id_(served.session_ids.next()),
       requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s),
       statuses_([this](const protocol::Status& status) { notify("status", protocol::to_json(status)); }) {}
 
@@ -92,7 +93,7 @@ void ViewerSession::opened() {
 
   protocol::Hello hello;
   hello.server = {"Spectra", std::string(kVersion)};
-  hello.session_id = served_.session_ids.next();
+  hello.session_id = id_;
   hello.role = may_operate ? protocol::Role::Operator : protocol::Role::Viewer;
   hello.capabilities = {"histogram",   "probe", "extremes", "extremes_in_view", "exports", "subtract_green", "resume",
                         "cache_bytes", "marks", "age",      "baseline",         "robot"};
@@ -124,7 +125,10 @@ void ViewerSession::tell_mapping_trouble(const std::optional<std::string>& messa
 }
 
 void ViewerSession::closed() {
-  if (stream_) stream_->close();
+  if (stream_) {
+    served_.memories.ended(id_, stream_->memory(), net::steady_seconds());
+    stream_->close();
+  }
   scene_subscription_ = {};
   progress_subscription_.reset();
   store_subscription_.reset();
@@ -231,7 +235,7 @@ ViewerSession::Answer ViewerSession::subscribe(const json& params) {
                    "resume", "the first scene.subscribe, or the first after scene.unsubscribe");
   }
   protocol::SubscribeReply reply;
-  if (request.resume) reply.resumed_tiles = resume(*request.resume);
+  if (request.resume) reply = resume(*request.resume);
   is_subscribed_ = true;
   subscription_ = {.in_flight_bytes = request.in_flight_bytes.value_or(0),
                    .cache_bytes = request.cache_bytes.value_or(0),
@@ -250,8 +254,10 @@ bool ViewerSession::gives_raw_layers() const {
   return limits_.gives_raw_layers && access::may(peer_.role(), access::Right::Operate);
 }
 
-std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
-  if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return 0;
+protocol::SubscribeReply ViewerSession::resume(const protocol::ResumeRequest& request) {
+  protocol::SubscribeReply reply;
+  reply.resumed_tiles = 0;
+  if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return reply;
   std::vector<stream::ResumedTile> tiles;
   tiles.reserve(request.tiles.size());
   for (const auto& [level, x, y, z, revision] : request.tiles) {
@@ -260,12 +266,31 @@ std::uint32_t ViewerSession::resume(const protocol::ResumeRequest& request) {
   for (const std::uint32_t place : request.raw.value_or(std::vector<std::uint32_t>())) {
     tiles[place].has_raw_layers = gives_raw_layers();
   }
-  return stream_->resume(tiles);
+  for (const std::uint32_t place : request.temperature_sigma.value_or(std::vector<std::uint32_t>())) {
+    tiles[place].has_temperature_sigma = true;
+  }
+  if (request.colours) {
+    for (const auto& [place, sequence] : *request.colours) tiles[place].colour_sequence = sequence;
+  }
+  const auto now_s = net::steady_seconds();
+  auto resumed =
+      stream_->resume(tiles, request.colours ? served_.memories.of(request.session_id, now_s) : stream::ViewerMemory());
+  reply.resumed_tiles = static_cast<int>(resumed.tile_count);
+  if (request.colours) {
+    reply.current_colours = std::move(resumed.current_colours);
+    reply.generation = stream_->generation();
+  }
+  return reply;
 }
 
 ViewerSession::Answer ViewerSession::unsubscribe(const json& /*params*/) {
   is_subscribed_ = false;
-  if (stream_) stream_->unsubscribe();
+  if (stream_) {
+    if (auto memory = stream_->memory(); !memory.empty()) {
+      served_.memories.ended(id_, std::move(memory), net::steady_seconds());
+    }
+    stream_->unsubscribe();
+  }
   return json::object();
 }
 
@@ -463,6 +488,7 @@ void ViewerSession::begin_stream() {
   stream_ = stream::ViewerStream::create(scene_, served_.cache, served_.pool, [weak_peer = weak_peer_] {
     if (const auto peer = weak_peer.lock()) peer->wake();
   });
+  served_.memories.opened(id_, stream_);
   if (quality_ != stream::StreamQuality{}) stream_->set_quality(quality_);
   if (camera_) stream_->set_camera(*camera_);
   if (is_subscribed_) stream_->subscribe(subscription_);

@@ -65,8 +65,8 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
 
   Answer scene_get(const nlohmann::json& params);
   Answer subscribe(const nlohmann::json& params);
-  /// Returns the number of tiles that need not be sent again.
-  std::uint32_t resume(const protocol::ResumeRequest& request);
+  /// What need not be sent again.
+  protocol::SubscribeReply resume(const protocol::ResumeRequest& request);
   Answer unsubscribe(const nlohmann::json& params);
   Answer fusion_get(const nlohmann::json& params);
   Answer set_quality(const nlohmann::json& params);
@@ -104,6 +104,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   const std::weak_ptr<net::ViewerPeer> weak_peer_;
   ServedScene& served_;
   const net::NetLimits limits_;
+  const std::string id_;  ///< Of the session.
   access::TokenBucket requests_;
 
   map::SceneStore::Subscription scene_subscription_;

@@ -23,6 +23,13 @@ struct RawDemand {
   double temperature_step_celsius = 0;  ///< 0 = TemperatureCodes::kDefaultStepCelsius.
 };
 
+/// What fused colours show, beside the tile's own look.
+struct Picture {
+  std::shared_ptr<const PlanIdentity> plan;  ///< Null: none.
+  bool has_marks = false;
+  friend bool operator==(const Picture&, const Picture&) = default;
+};
+
 /// What one viewer is to be shown, as a job needs it: the settings in force. An epoch rises with each change that makes
 /// frames of that kind stale; 0 stands for none.
 struct Demand {
@@ -64,6 +71,7 @@ struct Demand {
             .layer = layer,
             .step_celsius = layer == Layer::Temperature ? raw.temperature_step_celsius : 0};
   }
+  Picture picture() const { return {plan_identity, carries_marks()}; }
   /// A method that highlights nothing has no marks to carry.
   bool carries_marks() const { return marks && plan && plan->highlights(); }
 };

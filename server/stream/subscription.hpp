@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "protocol/tile_frame.hpp"
 
@@ -30,6 +32,16 @@ struct ResumedTile {
   protocol::TileId tile;
   std::uint32_t revision = 0;
   bool has_raw_layers = false;  ///< Temperatures and visible colours, in the form that it subscribes to.
+  bool has_temperature_sigma = false;
+  /// Of the frame that brought its colours over that connection, 0 where they are as that connection was resumed with; nothing:
+  /// they are to come anew.
+  std::optional<std::uint32_t> colour_sequence = std::nullopt;
+};
+
+/// What of such tiles need not be sent again.
+struct Resumed {
+  std::uint32_t tile_count = 0;                ///< Geometry.
+  std::vector<std::uint32_t> current_colours;  ///< Places, in what was claimed, of those whose colours are as demanded.
 };
 
 }  // namespace spectra::stream

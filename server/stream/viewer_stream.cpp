@@ -75,6 +75,8 @@ void ViewerStream::subscribe(const Subscription& subscription) {
     if (subscription.colour_transform != demand_.colour_transform) {
       demand_.colour_transform = subscription.colour_transform;
       ++demand_.colour_epoch;
+      // What was resumed shows the same, however it was written.
+      if (!subscribed_) tiles_.keep_colours(demand_.colour_epoch - 1, demand_.colour_epoch, 0);
       ++demand_.raw.epoch[RawDemand::kVisible];
       colour_cost_ = ColourCost(subscription.colour_transform);
       is_complete_due_ = true;
@@ -104,14 +106,20 @@ void ViewerStream::unsubscribe() {
   });
 }
 
-std::uint32_t ViewerStream::resume(std::span<const ResumedTile> claims) {
-  std::uint32_t current_count = 0;
+Resumed ViewerStream::resume(std::span<const ResumedTile> claims, const ViewerMemory& memory) {
+  Resumed resumed;
   change([&] {
     if (subscribed_) return;
-    current_count = tiles_.resume(claims, demand_, *cache_);
+    resumed = tiles_.resume(claims, memory, demand_, *cache_);
     remove_surplus();
+    remove_outdated();
   });
-  return current_count;
+  return resumed;
+}
+
+ViewerMemory ViewerStream::memory() const {
+  const std::lock_guard lock(mutex_);
+  return tiles_.memory();
 }
 
 std::uint32_t ViewerStream::set_plan(fusion::FusionPlan plan) {
@@ -272,8 +280,10 @@ void ViewerStream::apply() {
     if (demand_.plan && demand_.plan->highlights()) ++demand_.colour_epoch;
   }
   if (point_.colour_bits != demand_.colour_bits) {
+    const bool is_finer = point_.colour_bits > demand_.colour_bits;
     demand_.colour_bits = point_.colour_bits;
     ++demand_.colour_epoch;
+    if (is_finer) tiles_.keep_colours(demand_.colour_epoch - 1, demand_.colour_epoch, demand_.colour_bits);
   }
   select();
   if (head() != nullptr) is_complete_due_ = true;

@@ -56,10 +56,13 @@ class ViewerStream final : public std::enable_shared_from_this<ViewerStream>, pr
 
   /// Called before subscribe(): tiles that the viewer says it holds from an earlier stream on the same cache. What is
   /// still current (the revision was issued for that tile, with the position step and encoder speed in force) is not sent
-  /// again, its colours are, as after a change of the settings; what is not is replaced, and what is gone is removed.
-  /// Returns how many are current; when none is, everything is sent as to a viewer who holds nothing. Safe on untrusted
+  /// again; what is not is replaced, and what is gone is removed. Colours are sent again, as after a change of the settings, but
+  /// those of which the viewer says in which frame they came, and `memory`, what that stream had given out, says that they
+  /// were as demanded now. When nothing is current, everything is sent as to a viewer who holds nothing. Safe on untrusted
   /// input: a false claim spoils only the picture of the viewer who makes it.
-  std::uint32_t resume(std::span<const ResumedTile> tiles);
+  Resumed resume(std::span<const ResumedTile> tiles, const ViewerMemory& memory = {});
+  /// What has been given out, for the stream that goes on after this one.
+  ViewerMemory memory() const;
 
   /// A plan made (on a worker) with the reference_temperature() of the current scene; returns the generation its colours will carry, from 1.
   std::uint32_t set_plan(fusion::FusionPlan plan);

@@ -136,7 +136,7 @@ ViewerStream::Attempt ViewerStream::next_colours(TileSlot& slot, double now_s) {
     }
     auto header = prepared_header_of(slot, protocol::colour_frame_kind(demand_.colour_transform));
     header.generation = generation_;
-    tiles_.give_colours(slot, demand_.colour_epoch);
+    tiles_.give_colours(slot, demand_, last_sequence_ + 1);
     colour_cost_.learn(slot.prepared.colour_bits, header.vertex_count, slot.prepared.colours->size());
     frame = given_out(header, slot.prepared.colours, now_s);
     if (slot.wish.is_target && !is_refining_due()) tiles_.remove_outdated_beneath(slot, demand_);

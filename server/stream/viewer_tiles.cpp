@@ -1,7 +1,6 @@
 #include "server/stream/viewer_tiles.hpp"
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -40,6 +39,8 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
         slot->held.wire_revision = known->second->held.wire_revision;
         slot->held.child_mask = known->second->held.child_mask;
         slot->held.bytes = known->second->held.bytes;
+        slot->held.earlier_colour_epoch =
+            known->second->is_drawable() ? known->second->held.colour_epoch : known->second->held.earlier_colour_epoch;
         abandon(*known->second);
       }
       known_slots.erase(known);
@@ -86,14 +87,18 @@ void ViewerTiles::give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_
   slot.held.bytes = decoded_bytes(*slot.tile);
   slot.held.geometry_epoch = geometry_epoch;
   slot.held.colour_epoch = 0;
+  slot.held.picture = {};
   slot.forget_raw();
   count_prepared(slot);
 }
 
-void ViewerTiles::give_colours(TileSlot& slot, std::uint64_t colour_epoch) {
-  slot.held.colour_epoch = colour_epoch;
+void ViewerTiles::give_colours(TileSlot& slot, const Demand& demand, std::uint32_t sequence) {
+  slot.held.colour_epoch = demand.colour_epoch;
   slot.held.colour_bits = slot.prepared.colour_bits;
   slot.held.look = slot.look;
+  slot.held.earlier_colour_epoch = 0;
+  slot.held.picture = demand.picture();
+  slot.held.colour_sequence = sequence;
 }
 
 std::size_t ViewerTiles::set_looks(const LookRules& rules) {
@@ -126,9 +131,18 @@ bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const
     return true;
   }
   if (slot.wish.is_target) return false;
-  if (!slot.wish.is_preview && slot.is_drawable() && are_children_drawable(slot)) return true;
+  if (slot.is_drawable() && (slot.wish.is_preview ? is_answered_beneath(slot, demand) : are_children_drawable(slot)))
+    return true;
   const bool is_of_before = slot.held.wire_revision != 0 && slot.held.geometry_epoch == 0;
-  return is_of_before && slot.held.child_mask == slot.tile->child_mask && is_covered(slot, demand);
+  return is_of_before && slot.held.child_mask == slot.tile->child_mask && is_hidden(slot, demand);
+}
+
+bool ViewerTiles::is_answered_beneath(const TileSlot& slot, const Demand& demand) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
+    const TileSlot& child = *slots_[index];
+    return (child.is_drawable() && child.has_colours(demand)) || is_answered_beneath(child, demand);
+  });
 }
 
 bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
@@ -137,49 +151,89 @@ bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
                      [this](std::size_t child) { return slots_[child]->is_drawable(); });
 }
 
-std::uint32_t ViewerTiles::resume(std::span<const ResumedTile> claims, const Demand& demand,
-                                  const FrameCache::State& cache) {
+ViewerMemory ViewerTiles::memory() const {
+  ViewerMemory memory;
+  for (const auto& slot : slots_) {
+    if (slot->held.wire_revision != 0) memory.emplace(slot->tile->id, slot->held);
+  }
+  return memory;
+}
+
+Resumed ViewerTiles::resume(std::span<const ResumedTile> claims, const ViewerMemory& memory, const Demand& demand,
+                            const FrameCache::State& cache) {
   std::map<TileId, TileSlot*> slot_of;
   for (const auto& slot : slots_) slot_of.emplace(slot->tile->id, slot.get());
   std::set<TileId> seen;
-  std::uint32_t current_count = 0;
-  for (const ResumedTile& claim : claims) {
+  Resumed resumed;
+  for (std::size_t place = 0; place < claims.size(); ++place) {
+    const ResumedTile& claim = claims[place];
     if (claim.revision == 0 || !seen.insert(claim.tile).second) continue;
     const auto known = slot_of.find(claim.tile);
     if (known == slot_of.end()) {
       push_removal(claim.tile, claim.revision);
-    } else if (hold_resumed(*known->second, claim.revision, demand, cache)) {
-      ++current_count;
-      if (!claim.has_raw_layers) continue;
-      for (std::size_t layer = 0; layer < RawDemand::kRawCount; ++layer) {
-        known->second->raw[layer].held_epoch = demand.raw.epoch[layer];
-      }
+      continue;
+    }
+    TileSlot& slot = *known->second;
+    const auto remembered = memory.find(claim.tile);
+    const bool is_remembered = remembered != memory.end() && remembered->second.wire_revision == claim.revision;
+    if (!hold_resumed(slot, claim, is_remembered ? remembered->second : TileSlot::Held(), demand, cache)) continue;
+    ++resumed.tile_count;
+    if (slot.held.colour_epoch == demand.colour_epoch && slot.held.look == slot.look) {
+      resumed.current_colours.push_back(static_cast<std::uint32_t>(place));
+    }
+    for (std::size_t layer = 0; layer < RawDemand::kLayers.size(); ++layer) {
+      const bool has_layer = layer == RawDemand::kSigma ? claim.has_temperature_sigma : claim.has_raw_layers;
+      if (has_layer) slot.raw[layer].held_epoch = demand.raw.epoch[layer];
     }
   }
-  if (current_count == 0) forget_all_held();
-  return current_count;
+  if (resumed.tile_count == 0) forget_all_held();
+  return resumed;
 }
 
 // True when that geometry is the one in force. Otherwise it is held under its name alone, so that it is replaced.
-bool ViewerTiles::hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand,
-                               const FrameCache::State& cache) {
+bool ViewerTiles::hold_resumed(TileSlot& slot, const ResumedTile& claim, const TileSlot::Held& before,
+                               const Demand& demand, const FrameCache::State& cache) {
   put_down(slot);
   // A claim does not say these; where this stream has given the geometry out before, it knows them.
-  const float position_step_m = slot.held.position_step_m;
-  const auto origin_m = slot.held.origin_m;
+  const bool says_where = before.position_step_m > 0;
+  const float position_step_m = says_where ? before.position_step_m : slot.held.position_step_m;
+  const auto origin_m = says_where ? before.origin_m : slot.held.origin_m;
   slot.forget_held();
   slot.held.position_step_m = position_step_m;
   slot.held.origin_m = origin_m;
-  slot.held.wire_revision = revision;
+  slot.held.wire_revision = claim.revision;
+  slot.held.revision = before.revision;
+  slot.held.child_mask = before.child_mask;
+  slot.held.bytes = before.bytes;
+  const bool says_colours = before.picture.plan && claim.colour_sequence == before.colour_sequence;
+  const std::uint64_t colour_epoch =
+      says_colours && before.picture == demand.picture() ? demand.colour_epoch : Demand::kEarlierColourEpoch;
+  slot.held.earlier_colour_epoch = colour_epoch;
+  const std::uint32_t revision = before.revision != 0 ? before.revision : claim.revision;
   if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
   slot.held.revision = revision;
   slot.held.vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
   slot.held.child_mask = slot.tile->child_mask;
   slot.held.bytes = decoded_bytes(*slot.tile);
   slot.held.geometry_epoch = demand.geometry_epoch;
-  slot.held.colour_epoch = Demand::kEarlierColourEpoch;
+  slot.held.earlier_colour_epoch = 0;
+  slot.held.colour_epoch = colour_epoch;
   slot.held.colour_bits = demand.colour_bits;
+  if (says_colours) {
+    slot.held.picture = before.picture;
+    slot.held.look = before.look;
+    slot.held.colour_bits = before.colour_bits;
+  }
   return true;
+}
+
+void ViewerTiles::keep_colours(std::uint64_t from_epoch, std::uint64_t to_epoch, int least_bits) {
+  for (const auto& slot : slots_) {
+    if (slot->held.colour_epoch == from_epoch && slot->held.colour_bits >= least_bits) {
+      slot->held.colour_epoch = to_epoch;
+    }
+    if (slot->held.earlier_colour_epoch == from_epoch) slot->held.earlier_colour_epoch = to_epoch;
+  }
 }
 
 void ViewerTiles::forget_all_held() {
@@ -233,6 +287,15 @@ void ViewerTiles::remove_outdated_beneath(const TileSlot& slot, const Demand& de
     if (is_outdated && !is_covered(outdated, demand)) remove_from_viewer(outdated);
     remove_outdated_beneath(outdated, demand);
   }
+}
+
+bool ViewerTiles::is_hidden(const TileSlot& slot, const Demand& demand) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
+    const TileSlot& child = *slots_[index];
+    const bool is_current = child.is_drawable() && child.held.colour_epoch == demand.colour_epoch;
+    return is_current || child.held.earlier_colour_epoch == demand.colour_epoch || is_hidden(child, demand);
+  });
 }
 
 bool ViewerTiles::is_covered(const TileSlot& slot, const Demand& demand) const {

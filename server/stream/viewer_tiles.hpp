@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -56,6 +57,10 @@ struct TileSlot {
     std::uint64_t colour_epoch = 0;
     int colour_bits = 0;
     TileLook look;
+    Picture picture;  ///< Of the colours; where they are from an earlier connection and not known, none.
+    std::uint32_t colour_sequence = 0;  ///< Of the frame that brought the colours; 0: an earlier connection did.
+    /// Of colours of an earlier version of the tile, which the viewer draws until those of this one are there.
+    std::uint64_t earlier_colour_epoch = 0;
     float position_step_m = 0;  ///< The coarsest of the tile.
     std::array<float, 3> origin_m{};
   };
@@ -107,6 +112,9 @@ struct TileSlot {
   void forget_raw();
 };
 
+/// What a viewer has been given, tile by tile: outlives its connection, so that who comes back gets only what has changed.
+using ViewerMemory = std::map<protocol::TileId, TileSlot::Held>;
+
 /// The tiles of the scene as one viewer has them: what is given out, what is prepared for it, and what it is to be told to
 /// remove. Knows nothing of when and why. Not thread-safe: the stream's lock is held.
 class ViewerTiles {
@@ -132,8 +140,8 @@ class ViewerTiles {
 
   /// The geometry of a Ready slot goes out under that name.
   void give_geometry(TileSlot& slot, std::uint32_t name, std::uint64_t geometry_epoch);
-  /// The colours of a Ready slot go out.
-  void give_colours(TileSlot& slot, std::uint64_t colour_epoch);
+  /// The colours of a Ready slot go out, in the frame of that sequence.
+  void give_colours(TileSlot& slot, const Demand& demand, std::uint32_t sequence);
   /// Bytes of all frames that are Ready and not given out.
   std::size_t prepared_bytes() const { return prepared_bytes_; }
 
@@ -141,8 +149,13 @@ class ViewerTiles {
   /// viewer has of an earlier scene is good enough to be hidden behind them.
   bool is_satisfied(const TileSlot& slot, const Demand& demand) const;
 
+  /// What the viewer has been given and not been told to remove.
+  ViewerMemory memory() const;
   /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume().
-  std::uint32_t resume(std::span<const ResumedTile> claims, const Demand& demand, const FrameCache::State& cache);
+  Resumed resume(std::span<const ResumedTile> claims, const ViewerMemory& memory, const Demand& demand,
+                 const FrameCache::State& cache);
+  /// Colours that were sent for one epoch are as demanded in another one, too, where they have at least so many bits.
+  void keep_colours(std::uint64_t from_epoch, std::uint64_t to_epoch, int least_bits);
   /// A viewer that starts from nothing.
   void forget_all_held();
 
@@ -163,9 +176,14 @@ class ViewerTiles {
   /// Whenever what is prepared of a slot or held of it has changed.
   void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;
+  /// All of it is drawn by tiles beneath that are as demanded.
+  bool is_answered_beneath(const TileSlot& slot, const Demand& demand) const;
+  /// All of it is drawn by tiles beneath under the settings of now, be it by earlier versions of them.
+  bool is_hidden(const TileSlot& slot, const Demand& demand) const;
   /// All of it is drawn by tiles beneath that have the newest colours.
   bool is_covered(const TileSlot& slot, const Demand& demand) const;
-  bool hold_resumed(TileSlot& slot, std::uint32_t revision, const Demand& demand, const FrameCache::State& cache);
+  bool hold_resumed(TileSlot& slot, const ResumedTile& claim, const TileSlot::Held& before, const Demand& demand,
+                    const FrameCache::State& cache);
   void abandon(TileSlot& slot);
   void push_removal(protocol::TileId tile, std::uint32_t revision);
 

@@ -372,7 +372,7 @@ export function addLinkTests(browser) {
     await server.stop();
   });
 
-  test('After a cut the picture goes on without its geometry being sent again', async () => {
+  test('After a cut the picture goes on without anything being sent again', async () => {
     const server = await startServer(['--demo']);
     const link = await startLink(server.port);
     const { page, problems } = await openClient(browser, 'about:blank');
@@ -396,11 +396,7 @@ export function addLinkTests(browser) {
     link.up();
     await page.waitForFunction(() => globalThis.spectra.store.connected, null, { timeout: 20_000 });
     await settled(page);
-    assert.ok(
-      kinds.some((kind) => COLOURS.includes(kind)),
-      'no colours came',
-    );
-    assert.equal(kinds.filter((kind) => kind === GEOMETRY).length, 0, 'geometry came again');
+    assert.deepEqual(kinds, [], 'frames came');
     assert.equal(await shownTiles(page), tiles);
     assert.deepEqual(sample(await screenshot(page, 'cut-after')), before, 'the picture is another one');
 

@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { patch } from '../../tests/integration/node/patch.mjs';
 import { assertAccessible } from './axe.mjs';
 import { decodePng, drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { startLink } from './link.mjs';
 
 const SIDE = 41;
 const SCALE = 0.1;
@@ -47,6 +48,73 @@ const placeOf = (page, column, row, height = 0) =>
 const near = (a, b, levels) => a.every((value, channel) => Math.abs(value - b[channel]) <= levels);
 
 export function addLiveTests(browser) {
+  test('What has changed while the link was cut is in the picture afterwards, and nothing else is sent', async () => {
+    const server = await startServer(['--live']);
+    const link = await startLink(server.port);
+    let revision = 0;
+    for (let i = 0; i < 16; i += 1) revision = await put(server, i % 4, i >> 2);
+    const { page, problems } = await openClient(browser, 'about:blank', { width: 1280, height: 800 });
+    let frames = [];
+    page.on('websocket', (socket) =>
+      socket.on('framereceived', ({ payload }) => {
+        if (typeof payload !== 'string') frames.push({ kind: payload[4], tile: payload.subarray(16, 32).toString('hex') });
+      }),
+    );
+    await page.goto(link.url);
+    await shows(page, revision);
+    const look = (on) =>
+      on.evaluate((size) => {
+        const { viewport, store } = globalThis.spectra;
+        const { origin } = store.scene;
+        const target = [2 * size - origin[0], 2 * size - origin[1], -origin[2]];
+        viewport.lookAlong([0, 0, 1]);
+        globalThis.spectra.setView({ eye: [target[0], target[1] - 0.01, target[2] + 5 * size], target });
+      }, STEP_M);
+    await look(page);
+    await settled(page);
+    await drawn(page);
+    const pixels = async (on, name) => {
+      const image = await screenshot(on, name);
+      const all = [];
+      for (let x = 400; x < 1000; x += 7) for (let y = 60; y < 740; y += 7) all.push(image.at(x, y).join());
+      return all;
+    };
+    const differing = (a, b) => a.filter((pixel, index) => pixel !== b[index]).length / a.length;
+    const before = await pixels(page, 'cut-live-before');
+
+    frames = [];
+    link.down();
+    await page.getByText('Reconnecting').waitFor();
+    // As warm as before, so that the range stays where it is.
+    revision = await put(server, 1, 1, { height: 8 });
+    link.up();
+    await shows(page, revision);
+    await drawn(page);
+    const after = await pixels(page, 'cut-live-after');
+    const fresh = await openClient(browser, server.url, { width: 1280, height: 800 });
+    await shows(fresh.page, revision);
+    await look(fresh.page);
+    await settled(fresh.page);
+    await drawn(fresh.page);
+    const expected = await pixels(fresh.page, 'cut-live-fresh');
+    assert.ok(differing(after, expected) < 0.002, `${differing(after, expected)} of the pixels are not those of a new page`);
+    assert.ok(differing(before, after) > 0.02 && differing(before, after) < 0.2, `${differing(before, after)} have changed`);
+    const renewed = new Set(frames.filter(({ kind }) => kind === 1).map(({ tile }) => tile));
+    assert.ok(renewed.size > 0 && renewed.size <= 9, `${renewed.size} tiles came anew`);
+    assert.ok(
+      frames.every(({ tile }) => renewed.has(tile)),
+      'colours of what had not changed were sent',
+    );
+    assert.deepEqual(
+      problems.filter((text) => !/WebSocket connection|ERR_/.test(text)),
+      [],
+    );
+    await fresh.page.close();
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+
   test('What has become warmer since the baseline was marked is shown where it is; a probe says how long ago and since when; what is old fades', async () => {
     const server = await startServer(['--live']);
     let revision = 0;

@@ -213,13 +213,33 @@ export class SpectraClient {
     return held.map(({ frame }) => [frame.level, ...frame.position, frame.revision]);
   }
 
-  /** Subscribes as a client does after a drop-out, with the tiles of the connection before; returns resumed_tiles. */
-  async resume(earlier, { session_id = earlier.hello.session_id, tiles = earlier.claims(), ...params } = {}) {
+  /** What beside their geometry it holds of the tiles that it claims. */
+  layersOf(claims) {
+    const held = claims.map((claim) => this.tiles.get(claim.slice(0, 4).join("/")));
+    const places = (has) => held.flatMap((tile, place) => (tile && has(tile) ? [place] : []));
+    return {
+      raw: places(({ temperature, visible }) => temperature && visible),
+      temperature_sigma: places(({ sigma }) => sigma),
+      colours: places(({ colourSequence }) => colourSequence !== undefined).map((place) => [place, held[place].colourSequence]),
+    };
+  }
+
+  /**
+   * Subscribes as a client does after a drop-out, with the tiles of the connection before; returns resumed_tiles. With `layers` it says
+   * what else it holds of them.
+   */
+  async resume(earlier, { session_id = earlier.hello.session_id, tiles = earlier.claims(), layers = false, ...params } = {}) {
     const held = tiles.map((claim) => earlier.tiles.get(claim.slice(0, 4).join("/"))).filter(Boolean);
-    this.tiles = new Map(held.map((tile) => [tile.frame.tile, { ...tile, generation: 0 }]));
-    const request = { channels: ["fused"], ...params, resume: { session_id, tiles } };
+    const kept = layers ? earlier.layersOf(tiles) : {};
+    const told = new Set((kept.colours ?? []).map(([place]) => tiles[place].slice(0, 4).join("/")));
+    const sequence = (tile) => (told.has(tile.frame.tile) ? 0 : undefined);
+    this.tiles = new Map(held.map((tile) => [tile.frame.tile, { ...tile, generation: 0, colourSequence: sequence(tile) }]));
+    const request = { channels: ["fused"], ...params, resume: { session_id, tiles, ...kept } };
     const { resumed_tiles } = await this.request("scene.subscribe", request, (result) => {
       if (!result.resumed_tiles) this.tiles.clear();
+      for (const place of result.current_colours ?? []) {
+        this.tiles.get(tiles[place].slice(0, 4).join("/")).generation = result.generation;
+      }
     });
     return resumed_tiles;
   }
@@ -324,6 +344,7 @@ export class SpectraClient {
       if (colours.length !== tile.geometry.positions.length) throw new Error("colours: vertex count differs");
       tile.colours = colours;
       tile.generation = frame.generation;
+      tile.colourSequence = frame.sequence;
     } else if (frame.kind === KIND.temperature_sigma) {
       const tile = this.tiles.get(frame.tile);
       if (!tile || tile.frame.revision !== frame.revision) throw new Error("sigma before its geometry");

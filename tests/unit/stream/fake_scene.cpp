@@ -55,6 +55,13 @@ FakeScene::FakeScene(std::vector<std::shared_ptr<const map::Tile>> tiles, std::u
   temperature->summary = accumulator.summary();
   temperature->histogram = [](std::uint32_t bins) { return fusion::Histogram{0, 0, std::vector<std::uint64_t>(bins)}; };
   temperature_ = std::move(temperature);
+  reference_ = temperature_;
+}
+
+FakeScene::FakeScene(std::vector<std::shared_ptr<const map::Tile>> tiles, std::uint32_t revision,
+                     const map::SceneSnapshot& before)
+    : FakeScene(std::move(tiles), revision) {
+  reference_ = before.reference_temperature();
 }
 
 std::uint64_t FakeScene::vertex_count() const {

@@ -17,6 +17,9 @@ std::shared_ptr<map::Tile> patch_tile(protocol::TileId id, int side, int column,
 class FakeScene : public map::SceneSnapshot {
  public:
   FakeScene(std::vector<std::shared_ptr<const map::Tile>> tiles, std::uint32_t revision);
+  /// With the reference temperature of another one, as a map that has changed a little.
+  FakeScene(std::vector<std::shared_ptr<const map::Tile>> tiles, std::uint32_t revision,
+            const map::SceneSnapshot& before);
 
   const std::string& name() const override { return name_; }
   std::uint32_t revision() const override { return revision_; }
@@ -32,7 +35,7 @@ class FakeScene : public map::SceneSnapshot {
   int level_count() const override { return 3; }
   std::span<const std::shared_ptr<const map::Tile>> tiles() const override { return tiles_; }
   const fusion::SceneTemperature& temperature() const override { return *temperature_; }
-  std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const override { return temperature_; }
+  std::shared_ptr<const fusion::SceneTemperature> reference_temperature() const override { return reference_; }
   std::uint32_t vertex_index(const map::Tile& leaf, std::size_t vertex) const override {
     return leaf.source_vertex[vertex];
   }
@@ -52,6 +55,7 @@ class FakeScene : public map::SceneSnapshot {
   std::vector<std::shared_ptr<const map::Tile>> tiles_;
   base::Bounds bounds_;
   std::shared_ptr<const fusion::SceneTemperature> temperature_;
+  std::shared_ptr<const fusion::SceneTemperature> reference_;
 };
 
 /// A root and `leaf_count` leaves beneath it (at most 64), every tile of `side` x `side` vertices.

@@ -34,15 +34,27 @@ std::vector<ResumedTile> TestViewer::claims() const {
   return claims;
 }
 
-std::uint32_t TestViewer::resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims) {
-  const std::uint32_t current_count = stream_->resume(claims);
+std::vector<ResumedTile> TestViewer::claims_with_colours() const {
+  auto claims = this->claims();
+  for (ResumedTile& claim : claims) {
+    claim.colour_sequence = tiles.at(claim.tile).colour_sequence;
+    claim.has_temperature_sigma = !tiles.at(claim.tile).sigma.codes.empty();
+  }
+  return claims;
+}
+
+std::uint32_t TestViewer::resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims,
+                                 const ViewerMemory& memory) {
+  const auto [current_count, current_colours] = stream_->resume(claims, memory);
   if (current_count == 0) return 0;
   for (const ResumedTile& claim : claims) {
     tiles[claim.tile] = earlier.tiles.at(claim.tile);
     tiles[claim.tile].generation = 0;
+    tiles[claim.tile].colour_sequence = 0;
     // A false claim may be answered with what the viewer has in truth.
     if (tiles[claim.tile].geometry.revision == claim.revision) revisions_.insert(claim.revision);
   }
+  for (const std::uint32_t place : current_colours) tiles[claims[place].tile].generation = stream_->generation();
   return current_count;
 }
 
@@ -130,6 +142,7 @@ void TestViewer::receive(const OutgoingFrame& outgoing) {
       EXPECT_GE(header.generation, held->second.generation);
       EXPECT_EQ(header.generation, stream_->generation());
       held->second.generation = header.generation;
+      held->second.colour_sequence = header.sequence;
       held->second.colours = protocol::codec::decoded_colours(frame.value().payload, colour_transform).value();
       EXPECT_EQ(held->second.colours.size(), header.vertex_count);
       held->second.marks = protocol::codec::decoded_marks(frame.value().payload).value();

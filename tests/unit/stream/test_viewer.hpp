@@ -19,6 +19,7 @@ struct HeldTile {
   protocol::TileFrameHeader geometry;
   std::vector<std::array<float, 3>> positions_m;  ///< Relative to the scene origin.
   std::uint32_t generation = 0;                   ///< Of the colours; 0 = none of this connection.
+  std::uint32_t colour_sequence = 0;              ///< Of the frame that brought them; 0 = they were resumed.
   std::vector<protocol::codec::ColourBytes> colours;
   std::vector<std::uint8_t> marks;                    ///< That came with them, if any.
   std::vector<protocol::codec::ColourBytes> visible;  ///< Raw layers.
@@ -39,8 +40,11 @@ class TestViewer {
 
   /// The tiles it holds with colours, as another stream is told of them.
   std::vector<ResumedTile> claims() const;
-  /// Before it subscribes: holds the tiles of `earlier` that it claims. Returns what ViewerStream::resume() does.
-  std::uint32_t resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims);
+  /// The same, with how sure temperatures are and the frames that brought the colours.
+  std::vector<ResumedTile> claims_with_colours() const;
+  /// Before it subscribes: holds the tiles of `earlier` that it claims. Returns how many are current.
+  std::uint32_t resume(const TestViewer& earlier, const std::vector<ResumedTile>& claims,
+                       const ViewerMemory& memory = {});
 
   /// Takes frames as they come, until the stream says complete. Fails the test when nothing comes for a long time.
   StreamComplete complete();

@@ -140,7 +140,7 @@ TEST_F(ViewerStreamResume, KeepsToTheBytesOfTheNewViewer) {
 
 TEST_F(ViewerStreamResume, WhileFramesFlowNothingIsTakenUp) {
   after_.stream().subscribe({});
-  EXPECT_EQ(after_.stream().resume(before_.claims()), 0U);
+  EXPECT_EQ(after_.stream().resume(before_.claims()).tile_count, 0U);
   show(after_, 0.6);
   after_.complete();
   expect_picture(after_, *scene_, 0.6);

@@ -223,6 +223,57 @@ TEST_F(ViewerStreamTest, ANewSceneSendsWhatChangedAndRemovesWhatIsGone) {
   expect_picture(viewer, *next, 0.3);
 }
 
+TEST_F(ViewerStreamTest, OfAChangedTileAndAllAboveItOnlyWhatIsDrawnIsSent) {
+  auto tiles = testing::quadtree_tiles(3, 12);
+  scene_ = scene_of(tiles);
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  const std::size_t before = viewer.frames.size();
+  for (const std::size_t changed : {0U, 1U, 5U}) {
+    auto tile = std::make_shared<map::Tile>(*tiles[changed]);
+    tile->positions[0].z += 1;
+    tiles[changed] = tile;
+  }
+  const auto changed = scene_of(tiles, 2);
+  viewer.stream().set_scene(changed);
+  viewer.complete();
+  ASSERT_EQ(viewer.frames.size(), before + 2);
+  EXPECT_EQ(viewer.frames.back().tile, tiles[5]->id);
+
+  // Another setting is answered by the top first, as it is now.
+  show(viewer, 0.6);
+  viewer.complete();
+  EXPECT_EQ(viewer.frames[before + 2].tile, tiles[0]->id);
+  EXPECT_EQ(viewer.frames[before + 2].kind, FrameKind::Geometry);
+  expect_tile(viewer.tiles.at(tiles[0]->id), *tiles[0], plan_with_alpha(*changed, 0.6), 8);
+}
+
+TEST_F(ViewerStreamTest, WhatIsAboveATileThatChangesTwiceStaysHidden) {
+  auto tiles = testing::quadtree_tiles(3, 12);
+  scene_ = scene_of(tiles);
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  // Changed twice, the second time before anything of the first has come: what stands there is still of before.
+  const std::size_t before = viewer.frames.size();
+  testing::HeldWorkers held(pool_);
+  for (int round = 0; round < 2; ++round) {
+    for (const std::size_t changed : {0U, 1U, 5U}) {
+      auto tile = std::make_shared<map::Tile>(*tiles[changed]);
+      tile->positions[0].z += 1;
+      tiles[changed] = tile;
+    }
+    viewer.stream().set_scene(scene_of(tiles, static_cast<std::uint32_t>(2 + round)));
+  }
+  held.release();
+  viewer.complete();
+  ASSERT_EQ(viewer.frames.size(), before + 2);
+  EXPECT_EQ(viewer.frames.back().tile, tiles[5]->id);
+}
+
 TEST_F(ViewerStreamTest, ATileThatGoesWhileItsColoursAreReadyLeavesNothingQueued) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe({});

@@ -522,6 +522,13 @@ export interface ResumeRequest {
   tiles: [number, number, number, number, number][];
   /** Places in `tiles` of those of which it has both raw layers, in the form that it asks for now; absent: none. */
   raw?: number[];
+  /** Places in `tiles` of those of which it has how sure temperatures are; absent: none. */
+  temperature_sigma?: number[];
+  /**
+   * Which colours it holds: a place in `tiles`, and the sequence of the frame that brought them on that connection, 0
+   * where they are as that connection's own resume named them. Absent: colours come anew.
+   */
+  colours?: [number, number][];
 }
 
 /** Params of the notification robot.moved. */
@@ -740,6 +747,13 @@ export interface StreamStats {
 export interface SubscribeReply {
   /** There when the request had `resume`: how many of the claimed tiles are current and are not sent again. */
   resumed_tiles?: number;
+  /**
+   * There when `resume` had `colours`: places in `tiles` of those whose colours are what the settings in force give, so
+   * that they are not sent again either.
+   */
+  current_colours?: number[];
+  /** There with `current_colours`: the generation that those colours count as. */
+  generation?: number;
 }
 
 /** Params of scene.subscribe. */
@@ -816,6 +830,8 @@ export const sceneDescription: Decoder<SceneDescription> = object({
 
 export const subscribeReply: Decoder<SubscribeReply> = object({
   resumed_tiles: optional(count),
+  current_colours: optional(array(count)),
+  generation: optional(count),
 });
 
 export const fusionRange: Decoder<FusionRange> = object({

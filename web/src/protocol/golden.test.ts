@@ -86,6 +86,7 @@ describe('Golden messages', () => {
       ...optionalFields,
       ...(name === 'hello.brief.notification.json' ? ['catalogue'] : []),
       ...(name.startsWith('fusion.facts.') ? ['counts'] : []),
+      ...(name.startsWith('scene.subscribe.') ? ['current_colours', 'generation'] : []),
     ];
     for (const key of Object.keys(body).filter((name) => !optional.includes(name))) {
       const { [key as keyof typeof body]: _left, ...rest } = body;

@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { decodeServerMessage, type Hello, hello, type Scene } from '../protocol/messages';
+import type { HeldLayers } from '../tiles/tile_set';
 import { Store } from './store.svelte';
 import { Subscription } from './subscription';
 
@@ -28,11 +29,13 @@ function setUp() {
     };
   const before = { fusion: null as object | null, quality: null as object | null };
   const claims = ['0/0/0'] as never[];
+  const layers: HeldLayers = { raw: [], temperature_sigma: [], colours: [] };
+  const layersOf = vi.fn(() => structuredClone(layers));
   const asked: { method: string; params: Record<string, unknown>; answer: (result: object) => Promise<void> }[] = [];
   let settle: () => void = () => undefined;
   const sent = { wait: false };
   const concerned = {
-    tiles: { clear: note('tiles cleared', undefined), rawOf: () => [] as number[], claims: () => claims, resume: vi.fn() },
+    tiles: { clear: note('tiles cleared', undefined), layersOf, claims: () => claims, resume: vi.fn() },
     intake: { beginConnection: note('intake begins', undefined) },
     settings: {
       greeted: () => before.fusion as never,
@@ -72,7 +75,7 @@ function setUp() {
     invalidate: () => undefined,
     onProblem: (error) => diary.push(String(error)),
   });
-  return { store, subscription, concerned, diary, asked, before, sent, settle: () => settle() };
+  return { store, subscription, concerned, claims, layers, diary, asked, before, sent, settle: () => settle() };
 }
 
 beforeEach(() => vi.restoreAllMocks());
@@ -133,12 +136,31 @@ describe('a subscription', () => {
     subscription.greeted(able);
     await later();
     await asked[0]!.answer({ resumed_tiles: 0 });
-    expect(concerned.tiles.resume).toHaveBeenLastCalledWith([], false);
+    const nothing = { raw: [], temperature_sigma: [], colours: [] };
+    expect(concerned.tiles.resume).toHaveBeenLastCalledWith([], false, nothing, { places: [], generation: 0 });
     subscription.greeted({ ...able, session_id: 'another' });
     await later();
-    expect(asked[1]!.params['resume']).toEqual({ session_id: HELLO.session_id, tiles: ['0/0/0'] });
+    expect(asked[1]!.params['resume']).toEqual({ session_id: HELLO.session_id, tiles: ['0/0/0'], ...nothing });
+    await asked[1]!.answer({ resumed_tiles: 1, current_colours: [0], generation: 3 });
+    expect(concerned.tiles.resume).toHaveBeenLastCalledWith(['0/0/0'], true, nothing, { places: [0], generation: 3 });
+  });
+
+  it('says of claims what layers it holds, raw ones where they are given, and of no more than a message may tell', async () => {
+    const { subscription, asked, concerned, claims, layers } = setUp();
+    Object.assign(layers, { raw: [0], temperature_sigma: [0], colours: [[0, 17]] });
+    const able = { ...HELLO, capabilities: ['resume'] };
+    subscription.greeted(able);
+    await later();
+    await asked[0]!.answer({});
+    subscription.greeted(able);
+    await later();
+    expect(asked[1]!.params['resume']).toMatchObject({ raw: [], temperature_sigma: [0], colours: [[0, 17]] });
     await asked[1]!.answer({ resumed_tiles: 1 });
-    expect(concerned.tiles.resume).toHaveBeenLastCalledWith(['0/0/0'], true);
+    while (claims.length < 1500) claims.push('0/0/0' as never);
+    subscription.greeted({ ...able, capabilities: ['resume', 'raw_layers'] });
+    await later();
+    expect(asked[2]!.params['resume']).toMatchObject({ raw: [0] });
+    expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 180);
   });
 
   it("asks for nothing before the user's settings are in force again, and not at all when that connection is gone", async () => {

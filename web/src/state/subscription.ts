@@ -13,10 +13,12 @@ import type { Store } from './store.svelte';
 
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
+/** What a message may hold, less what else is in it; a claimed tile is six of them, and what is said of its layers up to five more. */
+const MOST_VALUES = 9900;
 
 /** What a connection's beginning concerns. */
 export interface Concerned {
-  tiles: Pick<TileSet, 'clear' | 'claims' | 'rawOf' | 'resume'>;
+  tiles: Pick<TileSet, 'clear' | 'claims' | 'layersOf' | 'resume'>;
   intake: Pick<FrameIntake, 'beginConnection'>;
   settings: Pick<Settings, 'greeted' | 'send' | 'busy'>;
   quality: Pick<QualityWish, 'greeted' | 'send' | 'askMarks' | 'sceneHasStep'>;
@@ -125,16 +127,17 @@ export class Subscription {
     if (!settings.busy) this.store.wanted = null;
     const session_id = this.#claimableSession;
     const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED) : [];
-    const raw = greeting.capabilities.includes('raw_layers') ? tiles.rawOf(claims) : [];
+    const layers = tiles.layersOf(claims, Math.max(0, Math.floor((MOST_VALUES - 6 * claims.length) / 5)));
+    if (!greeting.capabilities.includes('raw_layers')) layers.raw = [];
     try {
       this.#isSubscribed = true;
       const answer = await this.session.request('scene.subscribe', {
         ...this.#params(greeting.capabilities),
-        ...(claims.length > 0 ? { resume: { session_id, tiles: claims, ...(raw.length > 0 ? { raw } : {}) } } : {}),
+        ...(claims.length > 0 ? { resume: { session_id, tiles: claims, ...layers } } : {}),
       });
       if (connectionNumber !== this.#connectionNumber) return;
-      const { resumed_tiles = 0 } = subscribed(answer, 'scene.subscribe');
-      tiles.resume(claims, resumed_tiles > 0);
+      const { resumed_tiles = 0, current_colours = [], generation = 0 } = subscribed(answer, 'scene.subscribe');
+      tiles.resume(claims, resumed_tiles > 0, layers, { places: current_colours, generation });
       this.#claimableSession = greeting.session_id;
       this.session.invalidate();
     } catch (error) {
@@ -167,7 +170,7 @@ export class Subscription {
     }
     const same = before?.name === next.name;
     // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
-    if (fresh && before && !(same && JSON.stringify(before.bounds) === JSON.stringify(next.bounds))) tiles.clear();
+    if (fresh && before && !(same && JSON.stringify(before.origin) === JSON.stringify(next.origin))) tiles.clear();
     look.sceneIs(next);
     quality.sceneHasStep(next.position_step_m);
     if (!same) {

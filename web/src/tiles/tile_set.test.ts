@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, it } from 'vitest';
 import type { DecodedSigma } from '../decode/messages';
 import { childTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 import { decodedGeometry, ROOT as root, tileFrame as frame } from './test_tiles';
-import { type Drawable, TileSet, RawMismatch, type RawLayers } from './tile_set';
+import { type Drawable, TileSet, RawMismatch, type RawLayers, type TileClaim } from './tile_set';
 
 const geometry = (vertices = 3) => decodedGeometry(vertices);
 const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fill(shade);
@@ -53,6 +53,10 @@ function add(tile: TileId, part: Partial<TileFrame> = {}, shade = 1): FakeDrawab
 function recolour(tile: TileId, generation: number, revision = 1): void {
   tiles.addColours(frame(tile, { generation, revision, child_mask: masks.get(tileKey(tile)) ?? 0 }), colours(generation));
   tiles.updateSelection();
+}
+/** The server's answer to claims; `places` of those whose colours it says are those of `generation`. */
+function resume(claims: TileClaim[], isGranted: boolean, places: number[] = [], generation = 1): void {
+  tiles.resume(claims, isGranted, tiles.layersOf(claims, claims.length), { places, generation });
 }
 const drawn = () => made.filter(({ visible, disposed }) => visible && !disposed).length;
 
@@ -110,7 +114,7 @@ describe('TileSet, of a scene that changes by itself', () => {
     const [top, one] = fine();
     tiles.isVersion(5);
     tiles.beginConnection();
-    tiles.resume(tiles.claims(100), true);
+    resume(tiles.claims(100), true);
     recolour(root, 5);
     expect([top!.visible, one!.visible]).toEqual([true, false]);
   });
@@ -324,7 +328,7 @@ describe('TileSet, after a cut connection', () => {
     const [a, b] = [add(left, { revision: 7, generation: 40 }), add(right, { revision: 8, generation: 40 })];
     const claims = tiles.claims(10);
     tiles.beginConnection();
-    tiles.resume(claims, true);
+    resume(claims, true);
     tiles.updateSelection();
     expect([parent.visible, a.visible, b.visible]).toEqual([false, true, true]);
     recolour(left, 2, 7);
@@ -344,7 +348,7 @@ describe('TileSet, after a cut connection', () => {
     expect(drawable.shade).toBe(1);
     tiles.addColours(frame(root, { revision: 5, generation: 2 }), colours(77));
     expect(drawable.shade).toBe(1);
-    tiles.resume(claims, true);
+    resume(claims, true);
     expect([drawable.shade, made.length]).toEqual([77, 1]);
   });
 
@@ -353,7 +357,7 @@ describe('TileSet, after a cut connection', () => {
     const gone = add(right, { revision: 6 });
     const claims = tiles.claims(10);
     tiles.beginConnection();
-    tiles.resume(claims, true);
+    resume(claims, true);
     tiles.remove(right);
     tiles.addColours(frame(left, { revision: 9, generation: 1 }), colours(50));
     expect(old.disposed).toBe(false);
@@ -367,7 +371,7 @@ describe('TileSet, after a cut connection', () => {
     const old = add(root, { revision: 5, generation: 9 });
     const claims = tiles.claims(10);
     tiles.beginConnection();
-    tiles.resume(claims, false);
+    resume(claims, false);
     tiles.addColours(frame(root, { revision: 5, generation: 1 }), colours(50));
     expect([old.shade, old.disposed]).toEqual([1, false]);
     expect(tiles.claims(10)).toEqual([]);
@@ -380,14 +384,54 @@ describe('TileSet, after a cut connection', () => {
     const unclaimed = add(right, { revision: 6 });
     const claims = tiles.claims(1);
     tiles.beginConnection();
-    tiles.resume(claims, true);
+    resume(claims, true);
     tiles.beginConnection();
     expect(tiles.claims(10)).toEqual([claim(left, 5)]);
-    tiles.resume(tiles.claims(10), true);
+    resume(tiles.claims(10), true);
     tiles.settle();
     expect(unclaimed.disposed).toBe(true);
     recolour(left, 1, 5);
     expect(made).toHaveLength(2);
+  });
+
+  it('claims colours by the frame that brought them, and counts what is current as of the new connection', () => {
+    const parent = add(root, { child_mask: 0b11, revision: 5, generation: 9, sequence: 31 });
+    const [a, b] = [
+      add(left, { revision: 6, generation: 9, sequence: 32 }),
+      add(right, { revision: 7, generation: 9, sequence: 33 }),
+    ];
+    tiles.addSigma(frame(right, { revision: 7 }), { kind: 'sigma', codes: Uint16Array.of(1, 2, 3), scale: 1, offset: 0 });
+    let claims = tiles.claims(10);
+    const place = (tile: TileId) => claims.findIndex(([level, x]) => level === tile.level && x === tile.x);
+    const sequenceOf = (tile: TileId) => new Map(tiles.layersOf(claims, 10).colours).get(place(tile));
+    expect([root, left, right].map(sequenceOf)).toEqual([31, 32, 33]);
+    expect(tiles.layersOf(claims, 10).temperature_sigma).toEqual([place(right)]);
+
+    tiles.beginConnection();
+    resume(claims, true, [place(left), place(right)], 4);
+    tiles.settle();
+    expect([parent.visible, a.visible, b.visible]).toEqual([false, true, true]);
+    expect([...tiles.drawnGenerations(() => true)]).toEqual([4]);
+    expect(tiles.progress(4)).toEqual({ current: 2, total: 2 });
+    expect(made).toHaveLength(3);
+    // A coarse tile of the same generation hides none of them.
+    recolour(root, 4, 5);
+    expect([parent.visible, a.visible, b.visible]).toEqual([false, true, true]);
+    recolour(left, 5, 6);
+
+    // What came over this connection goes by its sequence, the rest as it was claimed.
+    claims = tiles.claims(10);
+    expect([root, left, right].map(sequenceOf)).toEqual([1, 1, 0]);
+    tiles.beginConnection();
+    resume(claims, true, [place(left)], 2);
+    expect([root, left, right].map(sequenceOf)).toEqual([0, 0, 0]);
+    expect(tiles.layersOf(claims, 10).temperature_sigma).toEqual([place(right)]);
+    // A newer answer stands in front of what was not confirmed.
+    recolour(root, 2, 5);
+    expect([parent.visible, a.visible, b.visible]).toEqual([true, false, false]);
+    tiles.beginConnection();
+    resume(claims, false);
+    expect(tiles.layersOf(claims, 10).colours).toEqual([]);
   });
 
   it('does not wait for tiles that are kept out of the picture', () => {
@@ -581,6 +625,7 @@ describe('TileSet, raw layers', () => {
     add(child(0));
     addRaw(child(0));
     const claims = tiles.claims(10);
-    expect(tiles.rawOf(claims)).toEqual([claims.findIndex(([level]) => level === 1)]);
+    expect(tiles.layersOf(claims, 10).raw).toEqual([claims.findIndex(([level]) => level === 1)]);
+    expect(tiles.layersOf(claims, 0)).toEqual({ raw: [], temperature_sigma: [], colours: [] });
   });
 });

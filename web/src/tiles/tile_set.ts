@@ -49,12 +49,33 @@ interface Shown {
   answer: number;
   /** In which its temperatures came, where the drawing side has both raw layers of this geometry; null: it lacks them. */
   rawStep_celsius: number | null;
+  /** The drawing side has how sure its temperatures are. */
+  hasSigma: boolean;
+  /**
+   * Sequence of the frame that brought its colours over the connection that scene.subscribe was answered on last; 0 where they are as they
+   * were claimed then; null: no server knows of them.
+   */
+  colourSequence: number | null;
   /** The server that is or was connected knows that this geometry is held here. */
   isKnownToServer: boolean;
 }
 
 /** Geometry held, as scene.subscribe claims it: level, x, y, z, revision. */
 export type TileClaim = [number, number, number, number, number];
+
+/** What of claimed tiles is here beside their geometry, by their places among the claims. */
+export interface HeldLayers {
+  raw: number[];
+  temperature_sigma: number[];
+  /** With the sequence of the frame that brought them. */
+  colours: [number, number][];
+}
+
+/** Claimed tiles, by their places, whose colours need not come again, and the generation that they count as. */
+export interface CurrentColours {
+  places: readonly number[];
+  generation: number;
+}
 
 /** A place in the tile tree. It is there while its tile, or one beneath it, is held. */
 interface TileNode {
@@ -68,7 +89,7 @@ interface TileNode {
   /** Geometry whose colours have not come yet. */
   waitingGeometry: { revision: number; geometry: DecodedGeometry; error: DrawnError } | null;
   /** Colours whose geometry is not decoded yet. */
-  waitingColours: { revision: number; generation: number; rgba: Uint8Array<ArrayBuffer> } | null;
+  waitingColours: { revision: number; generation: number; sequence: number; rgba: Uint8Array<ArrayBuffer> } | null;
   /** Raw layers of which not both are there, or whose geometry is not. */
   waitingRaw: { revision: number; temperature: DecodedTemperature | null; visible: DecodedVisible | null } | null;
   /** The same of how sure its temperatures are. */
@@ -152,10 +173,17 @@ export class TileSet {
       .map(({ id, shown }) => [id.level, id.x, id.y, id.z, shown?.revision ?? 0]);
   }
 
-  /** Of these claims, by their places, those of which both raw layers are here. */
-  rawOf(claims: readonly TileClaim[]): number[] {
-    const hasRaw = ([level, x, y, z]: TileClaim) => this.#nodes.get(tileKey({ level, x, y, z }))?.shown?.rawStep_celsius != null;
-    return claims.flatMap((claim, place) => (hasRaw(claim) ? [place] : []));
+  /** What beside their geometry is here of the first `most` of these claims. */
+  layersOf(claims: readonly TileClaim[], most: number): HeldLayers {
+    const held: HeldLayers = { raw: [], temperature_sigma: [], colours: [] };
+    claims.slice(0, most).forEach(([level, x, y, z], place) => {
+      const shown = this.#nodes.get(tileKey({ level, x, y, z }))?.shown ?? null;
+      if (shown === null) return;
+      if (shown.rawStep_celsius !== null) held.raw.push(place);
+      if (shown.hasSigma) held.temperature_sigma.push(place);
+      if (shown.colourSequence !== null) held.colours.push([place, shown.colourSequence]);
+    });
+    return held;
   }
 
   /** How many tiles are drawn, how many of them can be fused here, and the coarsest step in which the temperatures of one came. */
@@ -202,15 +230,25 @@ export class TileSet {
   }
 
   /**
-   * The server has answered the claims: it takes them into account (and sends no geometry again that is still good, replaces what is
+   * The server has answered the claims: it takes them into account (and sends nothing again that is still good, replaces what is
    * not, removes what is gone), or it does not know them.
    */
-  resume(claims: readonly TileClaim[], isGranted: boolean): void {
+  resume(claims: readonly TileClaim[], isGranted: boolean, layers: HeldLayers, current: CurrentColours): void {
     this.#isResumed = isGranted;
-    const claimed = new Set(claims.map(([level, x, y, z]) => tileKey({ level, x, y, z })));
+    const places = new Map(claims.map(([level, x, y, z], place) => [tileKey({ level, x, y, z }), place]));
+    const told = new Set(layers.colours.map(([place]) => place));
+    const isCurrent = new Set(current.places);
     for (const node of this.#nodes.values()) {
-      if (node.shown === null || !this.#isStale(node.shown)) continue;
-      node.shown.isKnownToServer = isGranted && claimed.has(node.key);
+      const { shown } = node;
+      if (shown === null || !this.#isStale(shown)) continue;
+      const place = isGranted ? places.get(node.key) : undefined;
+      shown.isKnownToServer = place !== undefined;
+      shown.colourSequence = place !== undefined && told.has(place) ? 0 : null;
+      if (place !== undefined && isCurrent.has(place)) {
+        shown.rank = this.#rank(current.generation);
+        shown.answer = this.#answer(current.generation);
+        this.#changed(node);
+      }
       this.#join(node);
     }
   }
@@ -262,7 +300,7 @@ export class TileSet {
     const { waitingColours } = node;
     if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation)
       return;
-    node.waitingColours = { revision: frame.revision, generation: frame.generation, rgba };
+    node.waitingColours = { revision: frame.revision, generation: frame.generation, sequence: frame.sequence, rgba };
     this.#join(node);
   }
 
@@ -484,7 +522,9 @@ export class TileSet {
     if (waitingSigma === null || shown?.revision !== waitingSigma.revision) return;
     node.waitingSigma = null;
     const { sigma } = waitingSigma;
-    if (sigma.codes.length === shown.geometry.vertex_count) shown.drawable.setSigma(sigma);
+    if (sigma.codes.length !== shown.geometry.vertex_count) return;
+    shown.drawable.setSigma(sigma);
+    shown.hasSigma = true;
   }
 
   #joinRaw(node: TileNode): void {
@@ -518,6 +558,8 @@ export class TileSet {
         rank,
         answer: rank,
         rawStep_celsius: scale,
+        hasSigma: false,
+        colourSequence: null,
         isKnownToServer: true,
       };
       if (node.isDrawn) drawable.setVisible(true);
@@ -529,7 +571,7 @@ export class TileSet {
   #joinColours(node: TileNode): void {
     const { shown, waitingGeometry, waitingColours } = node;
     if (waitingColours === null) return;
-    const { revision, generation, rgba } = waitingColours;
+    const { revision, generation, sequence, rgba } = waitingColours;
     const rank = this.#rank(generation);
     if (shown !== null && shown.revision === revision && (!this.#isStale(shown) || (this.#isResumed && shown.isKnownToServer))) {
       node.waitingColours = null;
@@ -537,6 +579,7 @@ export class TileSet {
       checkLength(node, rgba, shown.geometry);
       shown.rank = rank;
       shown.answer = this.#answer(generation);
+      shown.colourSequence = sequence;
       shown.error.rounding_levels = roundingOf(rgba);
       shown.drawable.setColours(rgba);
       this.#arrived(node);
@@ -557,6 +600,8 @@ export class TileSet {
         rank,
         answer,
         rawStep_celsius: null,
+        hasSigma: false,
+        colourSequence: sequence,
         isKnownToServer: true,
       };
       if (node.isDrawn) drawable.setVisible(true);
