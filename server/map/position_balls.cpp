@@ -2,9 +2,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
+#include "server/map/position_neighbourhood.hpp"
 #include "server/map/position_shapes.hpp"
 #include "server/map/position_step.hpp"
 
@@ -17,211 +17,43 @@ namespace {
 /// Where one in so many of a cell falls together with another, balls that reach beyond it are looked at.
 constexpr std::size_t kVerticesToCrowd = 16;
 
-/// Balls around every vertex are looked at: of so many vertices, and in so many steps up to those of so much the
-/// radius (squared; as many times the vertices, on a surface). What they may reach beyond the cell, in parts of its longest side; and the
-/// change of a side that is left to them.
-constexpr std::size_t kFewestOfBall = 50;
-constexpr std::size_t kRings = 14;
+/// Balls around every vertex are looked at, from the smallest up to those of so much the radius (squared; as many times the vertices, on a
+/// surface); larger ones, up to so many times that, around one vertex of a cell: around its neighbours they are nearly the same.
 constexpr float kLargestBall = 2.2F;
-constexpr double kBallReach = 1;
-constexpr double kSpareReach = 1.25;
-constexpr double kMostSideChange = 0.0985;
+constexpr float kLargestOfCell = 10;
 constexpr int kMostRounds = 8;
 
-/// Of more vertices around a cell it is not looked at: one of strays, far larger than its own vertices are from each other, that has
-/// half the scene in its reach. Some 500 are usual.
+/// What they may reach beyond the cell, in parts of its longest side; and what is looked for where they reach farther.
+constexpr double kBallReach = 1;
+constexpr double kSpareReach = 1.25;
+
+/// Of more vertices around a cell each of its own is looked at with what is around it alone: a wide cell, with something dense within its
+/// reach. Some 500 are usual.
 constexpr std::size_t kMostAround = 1 << 14;
+constexpr int kMostReaches = 40;
 
-/// Where the ends of the box of some vertices are, as they are and as they are rounded; those at the upper end negative, so that
-/// every number is a least one.
-struct Ends {
-  static constexpr float kFar = std::numeric_limits<float>::infinity();
-  std::array<float, 12> least{kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar, kFar};
+/// Instead of the radius of a ball: no further look is needed, as steps only get finer, or none is taken; and all that there is.
+constexpr float kSafe = -1;
+constexpr float kEverywhere = std::numeric_limits<float>::infinity();
 
-  Ends() = default;
-  Ends(const std::array<float, 3>& place, const std::array<float, 3>& rounded) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      least[axis] = place[axis];
-      least[3 + axis] = rounded[axis];
-      least[6 + axis] = -place[axis];
-      least[9 + axis] = -rounded[axis];
-    }
+double squared_gap(const base::Bounds& a, const base::Bounds& b) {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double gap = std::max({0.0, double{coordinates(a.min)[axis]} - double{coordinates(b.max)[axis]},
+                                 double{coordinates(b.min)[axis]} - double{coordinates(a.max)[axis]}});
+    sum += gap * gap;
   }
-  float low(std::size_t axis) const { return least[axis]; }
-  float high(std::size_t axis) const { return -least[6 + axis]; }
-  float rounded_low(std::size_t axis) const { return least[3 + axis]; }
-  float rounded_high(std::size_t axis) const { return -least[9 + axis]; }
-
-  bool operator==(const Ends&) const = default;
-
-  void join(const Ends& other) {
-    for (std::size_t i = 0; i < least.size(); ++i) least[i] = std::min(least[i], other.least[i]);
-  }
-  /// Whether a side changes by more than is left to it.
-  bool are_off() const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float side = high(axis) - low(axis), rounded_side = rounded_high(axis) - rounded_low(axis);
-      if (std::abs(rounded_side - side) > static_cast<float>(kMostSideChange) * side) return true;
-    }
-    return false;
-  }
-  /// Whether those of any part between `inner` and `outer`, which holds it, may be.
-  static bool may_be_off_between(const Ends& inner, const Ends& outer) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float side = inner.high(axis) - inner.low(axis), most_side = outer.high(axis) - outer.low(axis);
-      const float rounded_side = inner.rounded_high(axis) - inner.rounded_low(axis);
-      const float most_rounded_side = outer.rounded_high(axis) - outer.rounded_low(axis);
-      constexpr auto kMost = static_cast<float>(kMostSideChange);
-      if (most_rounded_side > (1 + kMost) * side || rounded_side < (1 - kMost) * most_side) return true;
-    }
-    return false;
-  }
-};
+  return sum;
+}
 
 }  // namespace
 
-/// The vertices around a cell, seen from a corner of it.
-struct PositionSteps::Neighbourhood {
-  std::array<float, 3> corner{};
-  static constexpr std::array<float, 3> kFarthest{Ends::kFar, Ends::kFar, Ends::kFar};
-  double reach = 0;                      ///< Beyond the cell, as far as they were looked for.
-  std::array<float, 3> coarsest_step{};  ///< Of any of them.
-  std::vector<std::uint32_t> points;
-  std::vector<std::uint32_t> changed;  ///< Those of `points` that were rounded anew in the last round.
-  std::vector<std::array<float, 3>> place, rounded;
-  std::vector<float> xs, ys, zs;            ///< Of `place`.
-  std::vector<Ends> ends;                   ///< Of each alone.
-  std::vector<float> distance;              ///< To a vertex of the cell, squared.
-  std::vector<std::uint8_t> is_later_twin;  ///< Another one is rounded to the same place.
-  std::vector<std::uint32_t> twins;
-  std::vector<std::uint32_t> near, ball;
-  std::vector<float> near_distance;
-  std::vector<std::uint32_t> ring;
-  std::array<std::uint32_t, kRings + 2> ring_begin{};
-  std::vector<std::pair<float, std::uint32_t>> in_order;  ///< Distance and number, nearest first.
-
-  void resize(std::size_t count) {
-    place.resize(count);
-    rounded.resize(count);
-    for (auto* axis : {&xs, &ys, &zs}) axis->resize(count);
-    ends.resize(count);
-    distance.resize(count);
-    near.resize(count);
-    ball.resize(count);
-    near_distance.resize(count);
-    ring.resize(count);
-  }
-
-  /// Fills in `distance`.
-  void measure_from(const std::array<float, 3>& center) {
-    const std::size_t count = distance.size();
-    for (std::size_t n = 0; n < count; ++n) {
-      const float x = xs[n] - center[0], y = ys[n] - center[1], z = zs[n] - center[2];
-      distance[n] = x * x + y * y + z * z;
-    }
-  }
-
-  /// Squared.
-  float distance_from(const std::array<float, 3>& center, std::size_t n) const {
-    const std::array<float, 3>& p = place[n];
-    const float x = p[0] - center[0], y = p[1] - center[1], z = p[2] - center[2];
-    return x * x + y * y + z * z;
-  }
-
-  /// Puts those within a radius (squared) into `near`; returns how many.
-  std::size_t gather(float radius) {
-    std::size_t kept = 0;
-    for (std::size_t n = 0; n < distance.size(); ++n) {
-      near[kept] = static_cast<std::uint32_t>(n);
-      kept += distance[n] <= radius ? 1u : 0u;
-    }
-    return kept;
-  }
-
-  /// Of the first `near_count` of `near`: in which ring around a ball each is; in it is 0, and beyond the last ring the last.
-  void find_rings(std::size_t near_count, float radius, float width) {
-    for (std::size_t n = 0; n < near_count; ++n) near_distance[n] = distance[near[n]];
-    for (std::size_t n = 0; n < near_count; ++n) {
-      const float beyond = (near_distance[n] - radius) / width;
-      // Where floats end it is no number.
-      const float at_most = beyond < kRings ? beyond : kRings;
-      const float at_least = at_most > 0 ? at_most : 0;
-      const auto below = static_cast<std::int32_t>(at_least);
-      const std::int32_t above = below + (static_cast<float>(below) < at_least ? 1 : 0);
-      ring[n] = near_distance[n] <= radius ? 0u : static_cast<std::uint32_t>(above);
-    }
-  }
-
-  /// Fills in `is_later_twin`.
-  void find_twins() {
-    is_later_twin.assign(points.size(), 0);
-    twins.resize(points.size());
-    std::iota(twins.begin(), twins.end(), 0u);
-    std::sort(twins.begin(), twins.end(), [&](std::uint32_t a, std::uint32_t b) { return rounded[a] < rounded[b]; });
-    for (std::size_t i = 1; i < twins.size(); ++i) is_later_twin[twins[i]] = rounded[twins[i]] == rounded[twins[i - 1]];
-  }
-  /// Whether a fifth of some ball of the first `near_count` of `near` may fall together.
-  bool may_be_merged(std::size_t near_count) const {
-    std::size_t twin_count = 0;
-    for (std::size_t n = 0; n < near_count; ++n) twin_count += is_later_twin[near[n]];
-    return twin_count * kVerticesToMerged > kFewestOfBall;
-  }
-
-  /// Whether no step could change a side of a ball (of a radius, squared; of the first `near_count` of `near`) by more than is left to
-  /// it, nor of a larger one: each end is off by half a step at most.
-  bool keeps_sides_around(float radius, std::size_t near_count) const {
-    std::array<float, 3> low = kFarthest, high = kFarthest;  // The upper ends negative.
-    for (std::size_t n = 0; n < near_count; ++n) {
-      if (distance[near[n]] > radius) continue;
-      const std::array<float, 3>& p = place[near[n]];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min(low[axis], p[axis]);
-        high[axis] = std::min(high[axis], -p[axis]);
-      }
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!((-high[axis] - low[axis]) * static_cast<float>(kMostSideChange) >= coarsest_step[axis])) return false;
-    }
-    return true;
-  }
-
-  /// Fills in `in_order` and `ring_begin` by ring; in no order within one.
-  void sort_by_ring(std::size_t near_count) {
-    ring_begin.fill(0);
-    for (std::size_t n = 0; n < near_count; ++n) ++ring_begin[ring[n] + 1];
-    std::partial_sum(ring_begin.begin(), ring_begin.end(), ring_begin.begin());
-    in_order.resize(near_count);
-    std::array<std::uint32_t, kRings + 2> next = ring_begin;
-    for (std::size_t n = 0; n < near_count; ++n) in_order[next[ring[n]]++] = {near_distance[n], near[n]};
-  }
-
-  /// Of the first `near_count` of `near` (at least `count`): a radius that has `count` of them, or more where several are equally far.
-  /// Bisection; several times faster here than std::nth_element.
-  float radius_of(std::size_t count, std::size_t near_count) {
-    float most = 0;
-    for (std::size_t n = 0; n < near_count; ++n) {
-      near_distance[n] = distance[near[n]];
-      most = std::max(most, near_distance[n]);
-    }
-    if (near_count == count) return most;
-    float least = 0;
-    for (;;) {
-      const float middle = (least + most) / 2;
-      if (!(middle > least && middle < most)) return most;
-      std::uint32_t within = 0;
-      for (std::size_t n = 0; n < near_count; ++n) within += near_distance[n] <= middle ? 1u : 0u;
-      if (within == count) return middle;
-      (within < count ? least : most) = middle;
-    }
-  }
-};
-
 template <class Visit>
-void PositionSteps::for_each_cell_around(const Cell& cell, double reach, Visit visit) {
+void PositionSteps::for_each_cell_around(const base::Bounds& box, double reach, Visit visit) {
   std::array<double, 3> low{}, high{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    low[axis] = double{coordinates(cell.bounds.min)[axis]} - reach;
-    high[axis] = double{coordinates(cell.bounds.max)[axis]} + reach;
+    low[axis] = double{coordinates(box.min)[axis]} - reach;
+    high[axis] = double{coordinates(box.max)[axis]} + reach;
   }
   for_each_cell(low, high, visit);
 }
@@ -262,6 +94,7 @@ void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
       }
     });
     keep_flat(planes, round.wanted);
+    keep_pieces_apart(round.wanted, round.is_first);
     bool is_any_changed = false;
     for (Cell& cell : cells_) {
       cell.is_changed = false;
@@ -316,20 +149,22 @@ void PositionSteps::keep_flat(const Planes& planes, std::vector<StepHalvings>& h
   }
 }
 
-void PositionSteps::gather_around(const Cell& cell, double reach, Neighbourhood& around, const SidesRound& round) {
+void PositionSteps::gather_around(const base::Bounds& box, double reach, Neighbourhood& around,
+                                  const SidesRound& round) {
   const auto step_m = static_cast<double>(largest_step_m_);
   around.reach = reach;
-  around.corner = coordinates(cell.bounds.min);
+  around.corner = coordinates(box.min);
   around.points.clear();
   around.changed.clear();
-  for_each_cell_around(cell, reach, [&](const Cell& other) {
-    if (around.points.size() > kMostAround) return;
+  for_each_cell_around(box, reach, [&](const Cell& other) {
+    if (around.points.size() > kMostAround || squared_gap(other.bounds, box) > reach * reach) return;
     for (std::uint32_t i = other.begin; i < other.end; ++i) {
       if (round.is_changed[i] != 0) around.changed.push_back(static_cast<std::uint32_t>(around.points.size()));
       around.points.push_back(i);
     }
   });
-  if (around.points.size() > kMostAround) {
+  around.are_too_many = around.points.size() > kMostAround;
+  if (around.are_too_many) {
     around.points.clear();
     around.changed.clear();
   }
@@ -353,7 +188,38 @@ void PositionSteps::gather_around(const Cell& cell, double reach, Neighbourhood&
     around.ys[n] = around.place[n][1];
     around.zs[n] = around.place[n][2];
   }
-  if (cell.is_crowded) around.find_twins();
+  if (around.wants_twins) around.find_twins();
+}
+
+float PositionSteps::gather_alone(std::uint32_t seed, double first_reach, Neighbourhood& around, SidesRound& round) {
+  const base::Bounds box{points_[seed].position, points_[seed].position};
+  const auto smallest_ball = [&] {
+    around.measure_from({});
+    return around.radius_of(kFewestOfBall, around.gather(kEverywhere));
+  };
+  float& radius = round.radius[seed];
+  if (round.is_first) {
+    radius = kSafe;
+    double few = 0, many = std::numeric_limits<double>::infinity(), reach = first_reach;
+    for (int i = 0; i < kMostReaches; ++i) {
+      gather_around(box, reach, around, round);
+      if (around.points.size() >= kFewestOfBall || around.points.size() == points_.size()) break;
+      (around.are_too_many ? many : few) = reach;
+      reach = std::isfinite(many) ? (few + many) / 2 : 2 * reach;
+    }
+    if (around.points.size() < kFewestOfBall) return 0;
+    // Farther out than was looked it may be smaller.
+    const float farthest = smallest_ball();
+    gather_around(box, kSpareReach * std::sqrt(double{farthest}), around, round);
+    if (around.are_too_many) gather_around(box, reach, around, round);
+    radius = smallest_ball();
+  }
+  for (const float largest : {kLargestBall, 1.8F, 1.4F, 1.1F}) {
+    gather_around(box, std::sqrt(double{radius} * double{largest}), around, round);
+    if (!around.are_too_many) return largest;
+  }
+  radius = kSafe;
+  return 0;
 }
 
 void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round) {
@@ -363,91 +229,122 @@ void PositionSteps::keep_sides_in(const Cell& cell, Neighbourhood& around, Sides
     if (*largest < 0) return;
     reach = std::sqrt(double{*largest} * double{kLargestBall});
     bool is_any_changed = false;
-    for_each_cell_around(cell, reach, [&](const Cell& other) { is_any_changed = is_any_changed || other.is_changed; });
+    for_each_cell_around(cell.bounds, reach,
+                         [&](const Cell& other) { is_any_changed = is_any_changed || other.is_changed; });
     if (!is_any_changed) return;
   }
-  gather_around(cell, reach, around, round);
-  constexpr float kSafe =
-      -1;  // Instead of a radius: no further look is needed, as steps only get finer, or none is taken.
-  constexpr float kEverywhere = std::numeric_limits<float>::infinity();
-  float radius = kEverywhere;  // Of the smallest ball around the vertex before; all squared.
+  around.wants_twins = cell.is_crowded;
+  gather_around(cell.bounds, reach, around, round);
+  bool is_each_alone = around.are_too_many;
+  float radius_of_large = kSafe;
+  float last_radius = kEverywhere;
   for (std::uint32_t seed = cell.begin; seed < cell.end; ++seed) {
-    std::array<float, 3> center = coordinates(points_[seed].position);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      center[axis] = static_cast<float>(double{center[axis]} - double{around.corner[axis]});
-    if (around.points.size() < kFewestOfBall) {
-      round.radius[seed] = kSafe;
-      continue;
-    }
-    if (!round.is_first) {
-      radius = round.radius[seed];
-      if (radius == kSafe) continue;
-      // Where nothing has changed since it was looked at nothing else would come of it.
-      const bool is_any_near = std::any_of(around.changed.begin(), around.changed.end(), [&](std::uint32_t n) {
-        return around.distance_from(center, n) <= radius * kLargestBall;
-      });
-      if (!is_any_near) continue;
-    }
-    around.measure_from(center);
-    if (round.is_first) {
+    float& radius = round.radius[seed];  // Of the smallest ball around it; squared.
+    if (!round.is_first && radius == kSafe) continue;
+    const base::Vec3f& at = points_[seed].position;
+    float largest_ball = kLargestBall;
+    std::array<float, 3> center{};
+    const auto see_from_corner = [&] {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        center[axis] = static_cast<float>(double{coordinates(at)[axis]} - double{around.corner[axis]});
+      around.measure_from(center);
+    };
+    if (round.is_first && !is_each_alone) {
+      if (around.points.size() < kFewestOfBall) {
+        radius = kSafe;
+        continue;
+      }
+      see_from_corner();
       // Among few, if it is about as large as the one before.
-      std::size_t few_count = around.gather(radius * 1.5F);
+      std::size_t few_count = around.gather(last_radius * 1.5F);
       if (few_count < kFewestOfBall) few_count = around.gather(kEverywhere);
       radius = around.radius_of(kFewestOfBall, few_count);
       const double wanted_reach = std::sqrt(double{radius} * double{kLargestBall});
       if (wanted_reach > around.reach && std::isfinite(wanted_reach) && around.points.size() < points_.size()) {
         // It may be smaller then.
-        gather_around(cell, kSpareReach * wanted_reach, around, round);
-        if (around.points.size() < kFewestOfBall) {
-          round.radius[seed] = kSafe;
-          continue;
+        gather_around(cell.bounds, kSpareReach * wanted_reach, around, round);
+        is_each_alone = around.are_too_many;
+        if (!is_each_alone) {
+          see_from_corner();
+          radius = around.radius_of(kFewestOfBall, around.gather(radius));
         }
-        around.measure_from(center);
-        radius = around.radius_of(kFewestOfBall, around.gather(radius));
       }
-      round.radius[seed] = radius;
+      last_radius = radius;
     }
-    const std::size_t near_count = around.gather(radius * kLargestBall);
+    if (is_each_alone) {
+      largest_ball = gather_alone(seed, longest_side(cell.bounds), around, round);
+      if (radius == kSafe) continue;
+    }
+    see_from_corner();
+    // Where nothing has changed since it was looked at nothing else would come of it.
+    if (!round.is_first && std::none_of(around.changed.begin(), around.changed.end(),
+                                        [&](std::uint32_t n) { return around.distance[n] <= radius * largest_ball; })) {
+      continue;
+    }
+    const std::size_t near_count = around.gather(radius * largest_ball);
     if (cell.is_crowded && around.may_be_merged(near_count)) keep_apart(around, near_count, round.wanted);
-    const bool is_safe = around.keeps_sides_around(radius, near_count);
-    if (is_safe && !cell.is_crowded) round.radius[seed] = kSafe;
-    if (is_safe) continue;
-    // What each ring between a ball and the next larger one adds to it.
-    const float ring_width = radius * (kLargestBall - 1) / kRings;
-    around.find_rings(near_count, radius, ring_width);
-    std::array<Ends, kRings + 1> rings;
-    for (std::size_t n = 0; n < near_count; ++n) rings[around.ring[n]].join(around.ends[around.near[n]]);
-    Ends ball = rings[0];
-    around.in_order.clear();
-    Ends kept_ends;
-    const auto keep_ball = [&](const Ends& ends, float ball_radius) {
-      // Another vertex between the same ends asks for nothing else.
-      if (ends == kept_ends) return;
-      kept_ends = ends;
-      std::size_t kept = 0;
-      for (std::size_t n = 0; n < near_count; ++n) {
-        around.ball[kept] = around.near[n];
-        kept += around.near_distance[n] <= ball_radius ? 1u : 0u;
-      }
-      keep_sides_of(around, std::span(around.ball).first(kept), round.wanted);
-    };
-    if (ball.are_off()) keep_ball(ball, radius);
-    for (std::uint32_t ring = 1; ring <= kRings; ++ring) {
-      const Ends before = ball;
-      ball.join(rings[ring]);
-      if (!Ends::may_be_off_between(before, ball)) continue;
-      if (around.in_order.empty()) around.sort_by_ring(near_count);
-      const auto in_ring = std::span(around.in_order)
-                               .subspan(around.ring_begin[ring], around.ring_begin[ring + 1] - around.ring_begin[ring]);
-      std::sort(in_ring.begin(), in_ring.end());
-      // Each ball that ends within it.
-      Ends growing = before;
-      for (std::size_t i = 0; i < in_ring.size(); ++i) {
-        const auto [distance, n] = in_ring[i];
-        growing.join(around.ends[n]);
-        const bool is_ball = i + 1 == in_ring.size() || in_ring[i + 1].first > distance;
-        if (is_ball && growing.are_off()) keep_ball(growing, distance);
-      }
+    const bool is_safe = around.keeps_sides_around(radius, near_count, around.coarsest_step);
+    if (seed == cell.begin && round.is_first) {
+      const float any = largest_step_m_;
+      if (!around.keeps_sides_around(kEverywhere, near_count, {any, any, any})) radius_of_large = radius * kLargestBall;
+    }
+    if (!is_safe) {
+      around.measure_near(at, points_, near_count);
+      keep_balls_of(around, near_count, radius, largest_ball, round.wanted);
+    } else if (!cell.is_crowded) {
+      radius = kSafe;
+    }
+  }
+  if (radius_of_large != kSafe) keep_large_balls_at(cell.begin, radius_of_large, around, round);
+}
+
+void PositionSteps::keep_large_balls_at(std::uint32_t seed, float radius, Neighbourhood& around, SidesRound& round) {
+  const base::Vec3f& at = points_[seed].position;
+  gather_around({at, at}, std::sqrt(double{radius} * double{kLargestOfCell}), around, round);
+  around.measure_from({});
+  const std::size_t near_count = around.gather(radius * kLargestOfCell);
+  if (near_count < kFewestOfBall || around.keeps_sides_around(radius, near_count, around.coarsest_step)) return;
+  around.measure_near(at, points_, near_count);
+  keep_balls_of(around, near_count, radius, kLargestOfCell, round.wanted);
+}
+
+void PositionSteps::keep_balls_of(Neighbourhood& around, std::size_t near_count, float smallest, float largest,
+                                  std::vector<StepHalvings>& wanted) {
+  // A little less: those about as far as the farthest of the smallest ball each count by their own distance.
+  const double radius = double{smallest} * (1 - 0x1p-16);
+  // What each ring between a ball and the next larger one adds to it.
+  around.find_rings(near_count, radius, radius * (double{largest} - 1) / kRings);
+  std::array<Ends, kRings + 1> rings;
+  for (std::size_t n = 0; n < near_count; ++n) rings[around.ring[n]].join(around.ends[around.near[n]]);
+  Ends kept_ends;
+  const auto keep_ball = [&](const Ends& ends, double ball_radius) {
+    // Another vertex between the same ends asks for nothing else.
+    if (ends == kept_ends) return;
+    kept_ends = ends;
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < near_count; ++n) {
+      around.ball[kept] = around.near[n];
+      kept += around.near_distance[n] <= ball_radius ? 1u : 0u;
+    }
+    keep_sides_of(around, std::span(around.ball).first(kept), wanted);
+  };
+  around.sort_by_ring(near_count);
+  Ends ball = rings[0];
+  if (around.ring_begin[1] >= kFewestOfBall && ball.are_off()) keep_ball(ball, radius);
+  for (std::uint32_t ring = 1; ring <= kRings; ++ring) {
+    const Ends before = ball;
+    ball.join(rings[ring]);
+    if (!Ends::may_be_off_between(before, ball)) continue;
+    const std::size_t begin = around.ring_begin[ring], end = around.ring_begin[ring + 1];
+    std::sort(around.in_order.begin() + static_cast<std::ptrdiff_t>(begin),
+              around.in_order.begin() + static_cast<std::ptrdiff_t>(end));
+    // Each ball that ends within it.
+    Ends growing = before;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [distance, n] = around.in_order[i];
+      growing.join(around.ends[n]);
+      const bool is_ball = i + 1 >= kFewestOfBall && (i + 1 == end || around.in_order[i + 1].first > distance);
+      if (is_ball && growing.are_off()) keep_ball(growing, distance);
     }
   }
 }

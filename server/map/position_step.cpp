@@ -124,6 +124,7 @@ PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs
   if (has_triangles) limit_to_one_tile();
   keep_sides(pool);
   coincident_ = {};
+  small_pieces_ = {};
 }
 
 void PositionSteps::gather(std::span<const std::shared_ptr<Tile>> leaves) {
@@ -179,6 +180,7 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
     std::uint32_t count = 0;
     StepHalvings halvings{};
     std::vector<base::Vec3f> positions;  ///< Of a small one.
+    std::vector<std::uint32_t> points;   ///< The same ones.
   };
   std::vector<Piece> all;
   for (const Cell& cell : cells_) {
@@ -187,14 +189,16 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
       std::uint32_t& number = number_of[pieces.of(points_[i].source)];
       if (number == kNone) {
         number = static_cast<std::uint32_t>(all.size());
-        all.push_back({{p, p}, 0, {}, {}});
+        all.push_back({{p, p}, 0, {}, {}, {}});
       }
       Piece& piece = all[number];
       piece.bounds.min = {std::min(piece.bounds.min.x, p.x), std::min(piece.bounds.min.y, p.y),
                           std::min(piece.bounds.min.z, p.z)};
       piece.bounds.max = {std::max(piece.bounds.max.x, p.x), std::max(piece.bounds.max.y, p.y),
                           std::max(piece.bounds.max.z, p.z)};
-      if (++piece.count <= kSmallPieceVertexCount) piece.positions.push_back(p);
+      if (++piece.count > kSmallPieceVertexCount) continue;
+      piece.positions.push_back(p);
+      piece.points.push_back(i);
     }
   }
   const auto step_m = static_cast<double>(largest_step_m_);
@@ -205,6 +209,7 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
     if (piece.count <= kSmallPieceVertexCount) {
       const std::uint8_t apart = halvings_apart(piece.positions, piece.positions.size() / kVerticesToMerged, step_m);
       piece.halvings = finer(piece.halvings, {apart, apart, apart});
+      small_pieces_.push_back(std::move(piece.points));
     }
     piece.halvings = shape.within_precision(piece.halvings, step_m);
     is_any_fine = is_any_fine || piece.halvings != StepHalvings{};
@@ -215,6 +220,47 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
       cell.halvings = finer(cell.halvings, all[number_of[pieces.of(points_[i].source)]].halvings);
     }
   }
+}
+
+void PositionSteps::keep_pieces_apart(std::vector<StepHalvings>& wanted, bool are_all_new) const {
+  std::vector<std::array<double, 3>> rounded;
+  std::vector<std::uint32_t> merged;
+  for (const std::vector<std::uint32_t>& piece : small_pieces_) {
+    if (!are_all_new &&
+        std::none_of(piece.begin(), piece.end(), [&](std::uint32_t p) { return wanted[p] != halvings_[p]; })) {
+      continue;
+    }
+    for (bool is_finer = true; is_finer;) {
+      is_finer = false;
+      rounded.clear();
+      merged.clear();
+      std::size_t merged_count = 0;
+      for (const std::uint32_t p : piece) {
+        rounded.push_back(rounded_at(p, wanted[p]));
+        const auto twin = std::find(rounded.begin(), rounded.end() - 1, rounded.back());
+        if (twin == rounded.end() - 1) continue;
+        ++merged_count;
+        merged.insert(merged.end(), {p, piece[static_cast<std::size_t>(twin - rounded.begin())]});
+      }
+      if (merged_count * kVerticesToMerged <= piece.size()) break;
+      for (const std::uint32_t p : merged) {
+        for (std::uint8_t& halvings : wanted[p]) {
+          if (halvings >= most_halvings_) continue;
+          ++halvings;
+          is_finer = true;
+        }
+      }
+    }
+  }
+}
+
+std::array<double, 3> PositionSteps::rounded_at(std::uint32_t point, const StepHalvings& halvings) const {
+  std::array<double, 3> rounded{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double step = std::ldexp(static_cast<double>(largest_step_m_), -halvings[axis]);
+    rounded[axis] = std::floor(double{coordinates(points_[point].position)[axis]} / step + 0.5) * step;
+  }
+  return rounded;
 }
 
 void PositionSteps::ask_neighbours(jobs::WorkerPool& pool) {

@@ -79,10 +79,21 @@ class PositionSteps {
   Planes find_planes() const;
   /// So that each plane is rounded to one: where a finer step begins, half a step would stand out of it.
   void keep_flat(const Planes& planes, std::vector<StepHalvings>& halvings) const;
+  /// Of single vertices of small pieces, so that four fifths stay apart: what is apart at one step may fall together at a finer one, whose
+  /// points lie between those of the coarser. Looks at those with vertices that are to be rounded otherwise, or at all.
+  void keep_pieces_apart(std::vector<StepHalvings>& wanted, bool are_all_new) const;
+  std::array<double, 3> rounded_at(std::uint32_t point, const StepHalvings& halvings) const;
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
   void keep_sides(jobs::WorkerPool& pool);
-  void gather_around(const Cell& cell, double reach, Neighbourhood& around, const SidesRound& round);
+  void gather_around(const base::Bounds& box, double reach, Neighbourhood& around, const SidesRound& round);
+  /// Those around one vertex; finds the radius of its smallest ball in the first round. Returns the largest ball's to that (both squared).
+  float gather_alone(std::uint32_t seed, double first_reach, Neighbourhood& around, SidesRound& round);
   void keep_sides_in(const Cell& cell, Neighbourhood& around, SidesRound& round);
+  /// Of larger balls than that around one vertex of each cell, from a radius (squared) on.
+  void keep_large_balls_at(std::uint32_t seed, float radius, Neighbourhood& around, SidesRound& round);
+  /// Of all balls from one of radius `smallest` to one of `largest` times that (squared) around where `near_distance` is measured from.
+  void keep_balls_of(Neighbourhood& around, std::size_t near_count, float smallest, float largest,
+                     std::vector<StepHalvings>& wanted);
   /// At most a fifth of the vertices of each ball fall together with others.
   void keep_apart(Neighbourhood& around, std::size_t near_count, std::vector<StepHalvings>& wanted);
   void keep_sides_of(const Neighbourhood& around, std::span<const std::uint32_t> ball,
@@ -96,9 +107,9 @@ class PositionSteps {
   /// Calls `visit(cell)` for the cells that reach into a box.
   template <class Visit>
   void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
-  /// Those that balls around the vertices of a cell may reach.
+  /// Those that balls around the vertices of a box may reach.
   template <class Visit>
-  void for_each_cell_around(const Cell& cell, double reach, Visit visit);
+  void for_each_cell_around(const base::Bounds& box, double reach, Visit visit);
   /// Whether many of its vertices fall together.
   bool is_crowded(const Cell& cell);
 
@@ -108,6 +119,7 @@ class PositionSteps {
   std::vector<Node> nodes_;
   std::vector<Cell> cells_;
   std::vector<StepHalvings> halvings_;                               ///< Of each of points_.
+  std::vector<std::vector<std::uint32_t>> small_pieces_;             ///< Of each the numbers of its points.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> coincident_;  ///< Vertices in the same place.
 };
 

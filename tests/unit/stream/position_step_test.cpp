@@ -7,6 +7,7 @@
 #include <string>
 
 #include "form.hpp"
+#include "fusion/demo/demo_scene.hpp"
 #include "server/stream/lattice.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
@@ -202,7 +203,7 @@ TEST(PositionSteps, KeepTheThicknessOfRoughWallsAlongAnAxis) {
   std::normal_distribution<double> roughness(0, 0.004);
   scene.grid(180, 180, {3, 1, 2}, {0.01F, 0, 0}, {0, 0.01F, 0}, [&](int, int) { return roughness(random); });
   const auto snapshot = scene_of(scene.mesh());
-  const FormReport form = form_of(*snapshot, 2'000);
+  const FormReport form = form_of(*snapshot, 3'000);
   ASSERT_GT(form.patch_count, 5'000u);
   EXPECT_TRUE(form.is_kept()) << described(form);
 }
@@ -229,6 +230,29 @@ TEST(PositionSteps, LeaveAnExactWallFlatWhereFinerStepsBegin) {
   scene.grid(30, 30, {2, 0.3701F, 1}, {0.002F, 0, 0}, {0, 0.0001F, 0.002F},
              [](int column, int row) { return 0.0004 * ((column * 7 + row * 3) % 5); });
   expect_kept(scene.mesh());
+}
+
+TEST(PositionSteps, KeepTheThicknessOfAFloorBesideSomethingDense) {
+  // Cells of the floor are wider than what stands on it, and have all its vertices within their reach. A wall ends the floor: the piece
+  // as a whole is thick.
+  Parts scene;
+  std::mt19937 random(5);
+  std::normal_distribution<double> roughness(0, 0.0002);
+  scene.grid(40, 40, {-4, -4, 0}, {0.2F, 0, 0}, {0, 0.2F, 0},
+             [&](int column, int) { return column == 39 ? 1.0 : roughness(random); });
+  scene.grid(135, 135, {-0.07F, -0.07F, 0.1F}, {0.001F, 0, 0}, {0, 0.001F, 0},
+             [](int i, int j) { return 0.003 * std::sin(0.4 * i) * std::cos(0.3 * j); });
+  const auto snapshot = scene_of(scene.mesh());
+  const FormReport form = form_of(*snapshot, 3'000);
+  ASSERT_GT(form.patch_count, 10'000u);
+  EXPECT_TRUE(form.is_kept()) << described(form);
+}
+
+TEST(PositionSteps, KeepEveryPieceOfTheDemoScene) {
+  // One of its small pieces is apart at the step that it asks for, and fell together at the finer ones of its neighbours.
+  const FormReport form = form_of(*scene_of(demo::demo_scene({})), 20);
+  ASSERT_GT(form.piece_count, 400u);
+  EXPECT_TRUE(form.is_kept()) << described(form);
 }
 
 TEST(PositionSteps, AreTheSameForATriangleSoup) {
