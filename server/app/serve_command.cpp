@@ -23,6 +23,7 @@
 #include "server/app/progress_line.hpp"
 #include "server/app/serve_setup.hpp"
 #include "server/net/http_server.hpp"
+#include "server/net/memory_reserve.hpp"
 #include "server/net/tls_identity.hpp"
 #include "server/session/served_scene.hpp"
 #include "server/session/viewer_session.hpp"
@@ -149,7 +150,7 @@ class SceneLoader {
 
   std::atomic<bool> is_done_{false};
   std::string failure_;
-  std::thread thread_;
+  std::jthread thread_;  // Joined, too, when serving ends with an exception.
 };
 
 }  // namespace
@@ -157,6 +158,7 @@ class SceneLoader {
 int run_serve(const ServeOptions& options) {
   // Whoever read what it says may go; the server stays.
   std::signal(SIGPIPE, SIG_IGN);
+  net::keep_memory_reserve();
   if (const auto problem = set_up_log(options.log)) return fail(kJobFailed, *problem);
   auto looked = serve_setup(options);
   if (const auto* problem = std::get_if<SetupProblem>(&looked)) return fail(problem->status, problem->text);

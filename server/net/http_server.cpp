@@ -20,12 +20,14 @@
 #include <exception>
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "server/net/connection_stream.hpp"
 #include "server/net/http_connection.hpp"
 #include "server/net/interface_addresses.hpp"
+#include "server/net/memory_reserve.hpp"
 #include "server/net/server_context.hpp"
 #include "server/net/static_files.hpp"
 
@@ -42,6 +44,7 @@ constexpr int kNotSentLowWaterBytes = 16 * 1024;
 constexpr int kUserTimeoutMs = 20'000;
 /// How often the staged stop looks whether everybody has gone.
 constexpr std::chrono::milliseconds kStopPoll{20};
+constexpr std::chrono::milliseconds kMemoryPause{20};
 
 std::string url_of(std::string_view scheme, const asio::ip::address& address, std::uint16_t port) {
   const std::string host = address.is_v6() ? '[' + address.to_string() + ']' : address.to_string();
@@ -100,6 +103,8 @@ struct HttpServer::State {
 
   void listen();
   asio::awaitable<void> accept_connections();
+  /// What is short, in words; empty when nothing is.
+  asio::awaitable<std::string> accept_one();
   asio::awaitable<void> stop_in_stages();
   /// Says why, as far as the peer takes it at once, and closes.
   void refuse(tcp::socket& socket, std::string_view why);
@@ -162,48 +167,63 @@ void HttpServer::State::refuse(tcp::socket& socket, std::string_view why) {
 }
 
 asio::awaitable<void> HttpServer::State::accept_connections() {
-  const NetLimits& limits = context.options.limits;
   bool was_short = false;
   while (!is_stopping) {
-    tcp::socket socket(asio::make_strand(io));
-    const auto [error] = co_await acceptor.async_accept(socket, kAwait);
-    if (is_stopping) co_return;
-    if (error) {
-      if (!is_shortage(error)) {
-        // The peer was gone before it was accepted; the next one is none the worse for it.
-        spdlog::debug("accept: {}", error.message());
-        continue;
-      }
-      metrics.accept_failures += 1;
-      if (!was_short) spdlog::warn("cannot accept connections for the moment: {}", error.message());
-      was_short = true;
-      accept_timer.expires_after(limits.accept_backoff);
-      co_await accept_timer.async_wait(kAwait);
-      continue;
-    }
-    was_short = false;
-    metrics.connections_accepted += 1;
-    if (metrics.connections_open >= static_cast<std::int64_t>(limits.max_connections)) {
-      refuse(socket, "too many connections");
-      continue;
-    }
+    std::string shortage;
     try {
-      error_code unknown;
-      const auto address = socket.remote_endpoint(unknown).address().to_string();
-      auto place = context.places.take(access::who_counts(address), limits.connections_per_address);
-      if (!place) {
-        refuse(socket, "too many connections from your address");
+      shortage = co_await accept_one();
+      if (shortage.empty()) {
+        was_short = false;
         continue;
       }
-      set_socket_options(socket);
-      const auto executor = socket.get_executor();
-      const auto connection =
-          std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), std::move(*place), context);
-      asio::co_spawn(executor, connection->run(), asio::detached);
+      if (!std::exchange(was_short, true)) spdlog::warn("cannot accept connections for the moment: {}", shortage);
+      accept_timer.expires_after(context.options.limits.accept_backoff);
+      co_await accept_timer.async_wait(kAwait);
     } catch (const std::bad_alloc&) {
-      metrics.connections_refused += 1;  // It costs this connection.
+      // It costs a connection, or not even that; whoever has memory needs a moment to give it back.
+      metrics.accept_failures += 1;
+      std::this_thread::sleep_for(kMemoryPause);
     }
   }
+}
+
+asio::awaitable<std::string> HttpServer::State::accept_one() {
+  const NetLimits& limits = context.options.limits;
+  tcp::socket socket(asio::make_strand(io));
+  const auto [error] = co_await acceptor.async_accept(socket, kAwait);
+  if (is_stopping) co_return "";
+  if (error) {
+    // Else the peer was gone before it was accepted; the next one is none the worse for it.
+    if (!is_shortage(error)) co_return "";
+    metrics.accept_failures += 1;
+    co_return error.message();
+  }
+  metrics.connections_accepted += 1;
+  if (metrics.connections_open >= static_cast<std::int64_t>(limits.max_connections)) {
+    refuse(socket, "too many connections");
+    co_return "";
+  }
+  if (!refill_memory_reserve()) {
+    refuse(socket, "out of memory");
+    co_return "there is no memory for more";
+  }
+  try {
+    error_code unknown;
+    const auto address = socket.remote_endpoint(unknown).address().to_string();
+    auto place = context.places.take(access::who_counts(address), limits.connections_per_address);
+    if (!place) {
+      refuse(socket, "too many connections from your address");
+      co_return "";
+    }
+    set_socket_options(socket);
+    const auto executor = socket.get_executor();
+    const auto connection =
+        std::make_shared<HttpConnection>(ConnectionStream(std::move(socket)), std::move(*place), context);
+    asio::co_spawn(executor, connection->run(), asio::detached);
+  } catch (const std::bad_alloc&) {
+    metrics.connections_refused += 1;  // It costs this connection.
+  }
+  co_return "";
 }
 
 asio::awaitable<void> HttpServer::State::stop_in_stages() {

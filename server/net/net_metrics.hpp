@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -41,6 +42,13 @@ struct NetMetrics {
   };
   OfRole& of(access::AccessRole role) { return of_role_[static_cast<std::size_t>(role)]; }
   const OfRole& of(access::AccessRole role) const { return of_role_[static_cast<std::size_t>(role)]; }
+
+  /// Messages that wait now, of all viewers.
+  std::size_t queued_bytes() const {
+    std::int64_t all = 0;
+    for (const OfRole& of_role : of_role_) all += of_role.queued_bytes;
+    return static_cast<std::size_t>(std::max<std::int64_t>(all, 0));
+  }
 
  private:
   std::array<OfRole, access::kRoles.size()> of_role_;

@@ -57,6 +57,9 @@ class ViewerPeer {
 
   /// Bytes on the control lane that are not written yet.
   virtual std::size_t queued_bytes() const = 0;
+
+  /// The same of all viewers together.
+  virtual std::size_t queued_bytes_of_all() const = 0;
 };
 
 /// The application's side of one viewer; all calls are made on the session's strand.

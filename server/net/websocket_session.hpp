@@ -39,6 +39,7 @@ class WebSocketSession final : public ViewerPeer,
   access::AccessRole role() const override { return who_.role; }
   double round_trip_ms() const override { return round_trip_ms_; }
   std::size_t queued_bytes() const override { return control_bytes_; }
+  std::size_t queued_bytes_of_all() const override { return context_.metrics.queued_bytes(); }
 
   void begin_stop() override;
   void cut() override;

@@ -353,6 +353,10 @@ void ViewerSession::ask(const Id& id, protocol::Result<SceneQuestion> made) {
     return answer(id, refusal(RpcErrorCode::Busy, "too many answers wait to be sent", "",
                               std::to_string(limits_.control_queue_bytes / 2) + " bytes at once"));
   }
+  if (peer_.queued_bytes_of_all() + size_bytes > limits_.queue_bytes_at_once) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many answers to others wait to be sent", "",
+                              std::to_string(limits_.queue_bytes_at_once) + " bytes of all viewers"));
+  }
   computing_count_ += 1;
   computing_bytes_ += size_bytes;
   served_.pool.post(

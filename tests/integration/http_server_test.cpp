@@ -387,6 +387,24 @@ TEST_F(HttpServerTest, AnswersADroppedReplyWith503) {
   EXPECT_EQ(status_of(response), 503);
 }
 
+TEST_F(HttpServerTest, StopsWhileAnAnswerIsStillBeingMade) {
+  std::atomic<bool> is_asked = false;
+  std::function<void(net::HttpReply)> kept;
+  TestServer server(
+      quick_options(),
+      [&](const net::HttpRequest&, const std::function<void(net::HttpReply)>& reply) {
+        kept = reply;
+        is_asked = true;
+      },
+      no_viewer);
+  RawClient waiting(server.port());
+  waiting.send("GET /api/v1/scene.ply HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  ASSERT_TRUE(eventually([&is_asked] { return is_asked.load(); }));
+  const auto begin = std::chrono::steady_clock::now();
+  server.stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+}
+
 TEST_F(HttpServerTest, CutsWhoStopsReadingALongAnswer) {
   const auto body = std::make_shared<const std::string>(64U * 1024 * 1024, 'x');
   TestServer big(

@@ -217,6 +217,62 @@ TEST_F(ViewerSessionTest, ABurstOfLargeAnswersIsRefusedInPartAndCutsNobody) {
   EXPECT_GT(refused, 0);
 }
 
+TEST_F(ViewerSessionTest, AnswersThatNobodyReadsAreBoundedForAllTogether) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.queue_bytes_at_once = 1'000'000;
+  start(std::move(options));
+  serve(demo::demo_scene({.vertex_count = 20'000, .seed = 3}));
+  const auto ask = [](int id) {
+    return json{{"jsonrpc", "2.0"}, {"id", id}, {"method", "scene.histogram"}, {"params", {{"bins", 4096}}}}.dump();
+  };
+  RawWebSocket reader(server_->port());
+  ASSERT_TRUE(reader.receive_text());
+  const auto code = [&reader, &ask](int id) {
+    reader.send_text(ask(id));
+    for (;;) {
+      const auto text = reader.receive_text();
+      if (!text) return -1;
+      const auto message = json::parse(*text);
+      if (message.contains("id")) return message.contains("result") ? 0 : message["error"]["code"].get<int>();
+    }
+  };
+  ASSERT_EQ(code(1), 0);
+  std::vector<std::unique_ptr<RawWebSocket>> silent;
+  int answer = 0;
+  while (answer == 0 && silent.size() < 40) {
+    silent.push_back(std::make_unique<RawWebSocket>(server_->port()));
+    silent.back()->client().set_receive_buffer(4096);
+    for (int i = 0; i < 12; ++i) silent.back()->send_text(ask(i));
+    std::this_thread::sleep_for(milliseconds(20));
+    answer = code(2);
+  }
+  EXPECT_EQ(answer, -32003) << "beside " << silent.size() << " who do not read";
+  silent.clear();
+  EXPECT_TRUE(eventually([&code] { return code(3) == 0; }));
+}
+
+TEST_F(ViewerSessionTest, RefusedTextsAreCountedBeforeTheyAreRead) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.message_bytes_per_s = 20'000;
+  options.limits.message_burst_s = 1;
+  start(std::move(options));
+  Viewer flood(server_->port()), other(server_->port());
+  ASSERT_TRUE(flood.wait_for("hello"));
+  ASSERT_TRUE(other.wait_for("hello"));
+  const auto before = server_->metrics().messages_received.load();
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string rubbish = "[" + std::string(9'998, '1') + "]";
+  for (int i = 0; i < 30; ++i) flood.socket().send_text(rubbish);
+  std::this_thread::sleep_for(milliseconds(500));
+  EXPECT_TRUE(other.call("fusion.get").contains("result"));
+  const auto read = static_cast<double>(server_->metrics().messages_received - before - 1);
+  const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  EXPECT_GE(read, 1);
+  EXPECT_LE(read, 1 + (1 + passed_s) * 20'000 / 10'000) << "texts of 10 kB at 20 kB a second";
+}
+
 TEST_F(ViewerSessionTest, AFileThatIsBeingSentIsNotMadeAgainAndHindersNobody) {
   serve(demo::demo_scene({.vertex_count = 300'000, .seed = 3}));
   const auto ask = [](const std::string& query) {

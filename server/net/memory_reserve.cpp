@@ -1,0 +1,51 @@
+#include "server/net/memory_reserve.hpp"
+
+#include <sys/mman.h>
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <new>
+
+namespace spectra::net {
+namespace {
+
+/// One for each thing that fails before the next connection is accepted; all values of a parsed message fit into it.
+constexpr std::size_t kPartBytes = 512U << 10U;
+constexpr std::size_t kPartCount = 16;
+
+// A new_handler has no state of its own.
+std::array<std::atomic<void*>, kPartCount> parts{};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+std::atomic<bool> is_kept{false};                    // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+
+void give_part_back() {
+  for (auto& part : parts) {
+    if (void* const memory = part.exchange(nullptr)) {
+      ::munmap(memory, kPartBytes);
+      break;
+    }
+  }
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void keep_memory_reserve() {
+  is_kept = true;
+  refill_memory_reserve();
+  std::set_new_handler(give_part_back);
+}
+
+bool refill_memory_reserve() {
+  if (!is_kept) return true;
+  for (auto& part : parts) {
+    if (part != nullptr) continue;
+    void* const memory = ::mmap(nullptr, kPartBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) return false;
+    void* none = nullptr;
+    if (!part.compare_exchange_strong(none, memory)) ::munmap(memory, kPartBytes);
+  }
+  return true;
+}
+
+}  // namespace spectra::net

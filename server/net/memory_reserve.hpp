@@ -1,0 +1,14 @@
+#pragma once
+
+namespace spectra::net {
+
+/// From now on, where `new` finds no memory, a part of a reserve goes back to the system before std::bad_alloc is thrown, so that what was
+/// begun can be taken apart: destructors may want memory, too (that of nlohmann::json does), and end the program where there is none. The
+/// reserve is address space without pages. To be called once, before there are threads.
+void keep_memory_reserve();
+
+/// Takes again what was given back. False as long as there is no memory for it: then nothing new is to be begun. True where no reserve
+/// is kept. Thread-safe.
+bool refill_memory_reserve();
+
+}  // namespace spectra::net
