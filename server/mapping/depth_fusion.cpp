@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "server/mapping/block_kernels.hpp"
+#include "server/mapping/picture_rows.hpp"
 #include "server/mapping/surface_view.hpp"
 #include "server/mapping/whole_numbers.hpp"
 
@@ -70,7 +71,7 @@ std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m
 std::vector<std::uint32_t> packed(const PictureRgb& picture, jobs::WorkerPool& pool) {
   std::vector<std::uint32_t> pixels(picture.pixels.size());
   const auto width = static_cast<std::size_t>(picture.width);
-  pool.for_each(static_cast<std::size_t>(picture.height), [&](std::size_t y) {
+  for_each_row(static_cast<std::size_t>(picture.height), pool, [&](std::size_t y) {
     for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
       const base::Rgb8& c = picture.pixels[i];
       pixels[i] = static_cast<std::uint32_t>(c.r | c.g << 8 | c.b << 16);

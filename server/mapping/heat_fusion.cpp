@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "server/mapping/picture_rows.hpp"
 #include "server/mapping/surface_view.hpp"
 #include "server/mapping/whole_numbers.hpp"
 
@@ -28,6 +29,10 @@ constexpr float kRemembered = 0.98F;  ///< Of how sure looks were, from one pict
 constexpr std::size_t kLeastCompared = 300;
 /// How an offset may have wandered when nothing tells it: at once, and as a random walk.
 constexpr double kUntoldKelvin = 0.3, kWanderKelvin = 0.05;
+
+float celsius_of(std::uint16_t centikelvin) {
+  return static_cast<float>(centikelvin) * 0.01F - kKelvin;
+}
 
 /// A histogram of differences with whole weights: the same whatever the order in which it was filled.
 class Differences {
@@ -68,18 +73,19 @@ class Differences {
 std::vector<float> largest_around(const std::vector<float>& values, std::size_t width, std::size_t height,
                                   jobs::WorkerPool& pool) {
   std::vector<float> across(values.size()), both(values.size());
-  pool.for_each(height, [&](std::size_t y) {
+  for_each_row(height, pool, [&](std::size_t y) {
     const float* row = &values[y * width];
     for (std::size_t x = 0; x < width; ++x) {
       const std::size_t first = x > kSpread ? x - kSpread : 0, end = std::min(width, x + kSpread + 1);
       across[y * width + x] = *std::max_element(row + first, row + end);
     }
   });
-  pool.for_each(height, [&](std::size_t y) {
+  for_each_row(height, pool, [&](std::size_t y) {
     const std::size_t first = y > kSpread ? y - kSpread : 0, end = std::min(height, y + kSpread + 1);
+    float* to = &both[y * width];
     for (std::size_t row = first; row < end; ++row) {
-      for (std::size_t x = 0; x < width; ++x)
-        both[y * width + x] = std::max(both[y * width + x], across[row * width + x]);
+      const float* from = &across[row * width];
+      for (std::size_t x = 0; x < width; ++x) to[x] = std::max(to[x], from[x]);
     }
   });
   return both;
@@ -108,6 +114,21 @@ bool HeatFusion::is_frozen(const Picture16& picture) {
   return false;
 }
 
+float HeatFusion::middle_celsius(const Picture16& picture, const std::vector<float>& celsius) const {
+  const std::size_t middle = celsius.size() / 2;
+  if (!vignetting_.empty()) {
+    std::vector<float> sorted = celsius;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle), sorted.end());
+    return sorted[middle];
+  }
+  // Without it temperatures are in the order of the values.
+  std::vector<std::uint32_t> counts(std::size_t{1} << 16, 0);
+  for (const std::uint16_t value : picture.pixels) ++counts[value];
+  std::size_t value = 0;
+  for (std::size_t below = counts[0]; below <= middle; below += counts[value]) ++value;
+  return celsius_of(static_cast<std::uint16_t>(value));
+}
+
 HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerPool& pool) const {
   Prepared prepared;
   const std::size_t count = picture.pixels.size();
@@ -115,15 +136,13 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
   prepared.celsius.resize(count);
   prepared.gradient.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    prepared.celsius[i] = static_cast<float>(picture.pixels[i]) * 0.01F - kKelvin;
+    prepared.celsius[i] = celsius_of(picture.pixels[i]);
     if (!vignetting_.empty()) prepared.celsius[i] -= vignetting_.pixels[i];
   }
   if (calibration_.reflected_celsius) {
     prepared.reflected = static_cast<float>(*calibration_.reflected_celsius);
   } else {
-    std::vector<float> sorted = prepared.celsius;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count / 2), sorted.end());
-    prepared.reflected = sorted[count / 2];
+    prepared.reflected = middle_celsius(picture, prepared.celsius);
   }
   const auto emissivity = static_cast<float>(calibration_.emissivity);
   const auto to_fourth = [](float celsius) {
@@ -131,16 +150,16 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
     return kelvin * kelvin * kelvin * kelvin;
   };
   const float reflected_power = (1 - emissivity) * to_fourth(prepared.reflected);
-  pool.for_each(height, [&](std::size_t y) {
-    if (emissivity < 1) {
+  if (emissivity < 1) {
+    for_each_row(height, pool, [&](std::size_t y) {
       for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
         const float own = std::max(1.0F, (to_fourth(prepared.celsius[i]) - reflected_power) / emissivity);
         prepared.celsius[i] = std::sqrt(std::sqrt(own)) - kKelvin;
       }
-    }
-  });
+    });
+  }
   const auto noise = static_cast<float>(2 * calibration_.netd_kelvin);
-  pool.for_each(height, [&](std::size_t y) {
+  for_each_row(height, pool, [&](std::size_t y) {
     const std::size_t above = (y > 0 ? y - 1 : y) * width, below = (y + 1 < height ? y + 1 : y) * width;
     for (std::size_t x = 0; x < width; ++x) {
       const std::size_t left = x > 0 ? x - 1 : x, right = x + 1 < width ? x + 1 : x;

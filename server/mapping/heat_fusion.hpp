@@ -56,6 +56,8 @@ class HeatFusion {
   struct Prepared;
 
   Prepared prepare(const Picture16& picture, jobs::WorkerPool& pool) const;
+  /// The median of the picture's temperatures.
+  float middle_celsius(const Picture16& picture, const std::vector<float>& celsius) const;
   bool is_frozen(const Picture16& picture);
   void find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
                    jobs::WorkerPool& pool, HeatReport& report);

@@ -69,6 +69,14 @@ std::string block_ply(const UnitMesh& mesh, double begin_unix_s) {
   return is_whole ? text : std::string();
 }
 
+std::vector<std::string> block_plys(std::span<const PublishedUnit> units, double begin_unix_s, jobs::WorkerPool& pool) {
+  std::vector<std::string> blocks(units.size());
+  pool.for_each(units.size(), [&](std::size_t i) {
+    if (!units[i].mesh.triangles.empty()) blocks[i] = block_ply(units[i].mesh, begin_unix_s);
+  });
+  return blocks;
+}
+
 double unix_begin_s(double begin_s, double newest_s, double now_unix_s) {
   constexpr double kEarliest = 1e8;  // A clock that shows less does not count from 1970.
   return begin_s > kEarliest ? begin_s : now_unix_s - (newest_s - begin_s);

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "fusion/base/error.hpp"
 #include "fusion/base/progress.hpp"
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/surface_mesh.hpp"
+#include "server/mapping/unit_publisher.hpp"
 
 namespace spectra::mapping {
 
@@ -17,6 +21,9 @@ base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMe
 
 /// The same in memory: what a server takes as a block. `begin_unix_s`: when the map's first moment was, Unix seconds.
 std::string block_ply(const UnitMesh& mesh, double begin_unix_s);
+
+/// The same of units, by all threads of a pool; empty for one without a surface.
+std::vector<std::string> block_plys(std::span<const PublishedUnit> units, double begin_unix_s, jobs::WorkerPool& pool);
 
 /// When a map's first moment was on the clock of this machine, Unix seconds: `begin_s` where the source counts so, else what makes
 /// `newest_s` of the source now.

@@ -7,6 +7,7 @@
 
 #include "server/mapping/block_kernels.hpp"
 #include "server/mapping/depth_fusion.hpp"
+#include "server/mapping/picture_rows.hpp"
 #include "server/mapping/surface_kernel.hpp"
 #include "server/mapping/whole_numbers.hpp"
 
@@ -18,52 +19,58 @@ constexpr float kFarthest = std::numeric_limits<float>::infinity();
 constexpr int kEdgeReach = 3, kHoleReach = 2;
 
 /// 1 where any value within `reach` is 1, along both axes.
-std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, int width, int height, int reach) {
+std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, int width, int height, int reach,
+                                  jobs::WorkerPool& pool) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
   std::vector<std::uint8_t> across(mask.size(), 0), both(mask.size(), 0);
   const auto n = static_cast<std::size_t>(reach);
-  for (std::size_t y = 0; y < h; ++y) {
+  for_each_row(h, pool, [&](std::size_t y) {
+    const std::uint8_t* from = &mask[y * w];
+    std::uint8_t* to = &across[y * w];
     std::size_t until = 0;  // one past the last pixel that some 1 covers
     for (std::size_t x = 0; x < w + n; ++x) {
-      if (x < w && mask[y * w + x] != 0) until = x + 2 * n + 1;
-      if (x >= n && x < until) across[y * w + x - n] = 1;
+      if (x < w && from[x] != 0) until = x + 2 * n + 1;
+      if (x >= n && x < until) to[x - n] = 1;
     }
-  }
-  for (std::size_t y = 0; y < h; ++y) {
+  });
+  for_each_row(h, pool, [&](std::size_t y) {
     const std::size_t low = y >= n ? y - n : 0, high = std::min(h - 1, y + n);
+    std::uint8_t* to = &both[y * w];
     for (std::size_t row = low; row <= high; ++row) {
-      for (std::size_t x = 0; x < w; ++x) both[y * w + x] |= across[row * w + x];
+      const std::uint8_t* from = &across[row * w];
+      for (std::size_t x = 0; x < w; ++x) to[x] |= from[x];
     }
-  }
+  });
   return both;
 }
 
-std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, int height, float voxel_m) {
+std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, int height, float voxel_m,
+                                   jobs::WorkerPool& pool) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
   std::vector<std::uint8_t> jumps(depth.size(), 0), something(depth.size(), 0);
   for (std::size_t i = 0; i < depth.size(); ++i) something[i] = depth[i] < kFarthest ? 1 : 0;
   // Nothing counts where it is more than a gap between the squares that were drawn.
-  const std::vector<std::uint8_t> covered = widened(something, width, height, kHoleReach);
+  const std::vector<std::uint8_t> covered = widened(something, width, height, kHoleReach, pool);
   // 1 / z is linear over a plane, however askew it is: what it bends by, as a depth, is a jump.
-  const auto bend = [&](std::size_t before, std::size_t i, std::size_t after) {
-    if (depth[before] == kFarthest || depth[after] == kFarthest) return 0.0F;
-    const float z = depth[i];
-    return z * z * std::abs(1 / depth[before] + 1 / depth[after] - 2 / z);
-  };
-  for (std::size_t y = 0; y < h; ++y) {
+  for_each_row(h, pool, [&, all = depth.data()](std::size_t y) {
+    const auto bend = [all](std::size_t before, std::size_t i, std::size_t after) {
+      if (all[before] == kFarthest || all[after] == kFarthest) return 0.0F;
+      const float z = all[i];
+      return z * z * std::abs(1 / all[before] + 1 / all[after] - 2 / z);
+    };
     for (std::size_t x = 0; x < w; ++x) {
       const std::size_t i = y * w + x;
-      const float z = depth[i];
+      const float z = all[i];
       if (z == kFarthest) continue;
       const float most =
           std::max(x > 0 && x + 1 < w ? bend(i - 1, i, i + 1) : 0, y > 0 && y + 1 < h ? bend(i - w, i, i + w) : 0);
       if (most > std::max(3 * voxel_m, 0.02F * z)) jumps[i] = 1;
     }
-  }
-  std::vector<std::uint8_t> near = widened(jumps, width, height, kEdgeReach);
+  });
+  std::vector<std::uint8_t> near = widened(jumps, width, height, kEdgeReach, pool);
   std::vector<std::uint8_t> nothing(depth.size());
   for (std::size_t i = 0; i < depth.size(); ++i) nothing[i] = covered[i] == 0 ? 1 : 0;
-  const std::vector<std::uint8_t> beside = widened(nothing, width, height, kHoleReach + kEdgeReach);
+  const std::vector<std::uint8_t> beside = widened(nothing, width, height, kHoleReach + kEdgeReach, pool);
   for (std::size_t i = 0; i < near.size(); ++i) near[i] |= beside[i];
   return near;
 }
@@ -147,7 +154,7 @@ SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const 
   for (const std::vector<float>& picture : pictures) {
     for (std::size_t i = 0; i < picture.size(); ++i) drawn.depth_m[i] = std::min(drawn.depth_m[i], picture[i]);
   }
-  drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m);
+  drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m, pool);
 
   pool.for_each(chunks, [&](std::size_t chunk) {
     for (SurfaceVoxel& seen : drawn.voxels[chunk]) {

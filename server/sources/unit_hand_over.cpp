@@ -3,7 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
+#include <span>
 #include <thread>
 
 #include "server/mapping/map_ply.hpp"
@@ -30,38 +32,47 @@ std::size_t UnitHandOver::room() const {
 }
 
 bool UnitHandOver::operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
-  constexpr std::chrono::milliseconds kWait{10};
-  for (mapping::PublishedUnit& unit : units) {
-    // A map that is behind is waited for: what is told then is newer.
-    while (state_->under_way >= kUnderWay) {
-      if (state_->is_over) return false;
-      std::this_thread::sleep_for(kWait);
+  for (std::size_t first = 0; first < units.size(); first += kUnderWay) {
+    const std::span some(units.data() + first, std::min(kUnderWay, units.size() - first));
+    std::vector<std::string> blocks = mapping::block_plys(some, moment.begin_unix_s, pool_);
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      if (!hand_over(some[i].id, std::move(blocks[i]), moment)) return false;
     }
-    ++state_->under_way;
-    const auto done = [state = state_, id = unit.id](const auto& outcome) {
-      --state->under_way;
-      const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
-      if (refusal == nullptr || state->is_over) return;
-      // A map that is full refuses one after the other.
-      constexpr std::size_t kSaidEvery = 1000;
-      const std::size_t count = ++state->refused;
-      if (count == 1 || count % kSaidEvery == 0)
-        spdlog::warn("{} is refused: {} ({} units so far)", id, refusal->reason, count);
-    };
-    if (unit.mesh.triangles.empty()) {
-      map_.remove(unit.id, done, MapKeeper::WhenFull::Take);
-      continue;
-    }
-    auto block = incoming_block(unit.id, unit_query(up_, moment.eye));
-    if (!block) {
-      --state_->under_way;
-      spdlog::error("{}: {}", unit.id, block.error().message);
-      return false;
-    }
-    block.value().ply = std::make_shared<const std::string>(mapping::block_ply(unit.mesh, moment.begin_unix_s));
-    map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
   }
   return !state_->is_over;
+}
+
+bool UnitHandOver::hand_over(const std::string& id, std::string ply, const FeedMoment& moment) {
+  constexpr std::chrono::milliseconds kWait{10};
+  // A map that is behind is waited for: what is told then is newer.
+  while (state_->under_way >= kUnderWay) {
+    if (state_->is_over) return false;
+    std::this_thread::sleep_for(kWait);
+  }
+  ++state_->under_way;
+  const auto done = [state = state_, id](const auto& outcome) {
+    --state->under_way;
+    const auto* refusal = std::get_if<net::BlockRefusal>(&outcome);
+    if (refusal == nullptr || state->is_over) return;
+    // A map that is full refuses one after the other.
+    constexpr std::size_t kSaidEvery = 1000;
+    const std::size_t count = ++state->refused;
+    if (count == 1 || count % kSaidEvery == 0)
+      spdlog::warn("{} is refused: {} ({} units so far)", id, refusal->reason, count);
+  };
+  if (ply.empty()) {
+    map_.remove(id, done, MapKeeper::WhenFull::Take);
+    return true;
+  }
+  auto block = incoming_block(id, unit_query(up_, moment.eye));
+  if (!block) {
+    --state_->under_way;
+    spdlog::error("{}: {}", id, block.error().message);
+    return false;
+  }
+  block.value().ply = std::make_shared<const std::string>(std::move(ply));
+  map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
+  return true;
 }
 
 }  // namespace spectra::sources

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/jobs/worker_pool.hpp"
 #include "server/mapping/unit_publisher.hpp"
 #include "server/sources/map_keeper.hpp"
 
@@ -45,6 +46,9 @@ class UnitHandOver {
   bool is_over() const { return state_->is_over; }
 
  private:
+  /// A unit without a surface has no bytes.
+  bool hand_over(const std::string& id, std::string ply, const FeedMoment& moment);
+
   MapKeeper& map_;
   const std::string up_;
   /// Shared with answers that may come when this is gone.
@@ -53,6 +57,7 @@ class UnitHandOver {
     std::atomic<std::size_t> under_way{0}, refused{0};
   };
   const std::shared_ptr<State> state_ = std::make_shared<State>();
+  jobs::WorkerPool pool_{1};
 };
 
 }  // namespace spectra::sources

@@ -92,10 +92,10 @@ int main(int argc, char** argv) {
     std::vector<std::string> blocks;
     const Eigen::Vector3d eye = folder.value().trajectory().at(time_s).pose.translation();
     units.add_to_last([&] { changed = mapper.changed_units(publisher, eye, pool, most); });
-    hand_over.add_to_last([&] {
-      for (const PublishedUnit& unit : changed) blocks.push_back(block_ply(unit.mesh, 0));
-    });
-    for (const std::string& block : blocks) {
+    hand_over.add_to_last([&] { blocks = block_plys(changed, 0, pool); });
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (blocks[i].empty()) blocks[i] = block_ply(changed[i].mesh, 0);
+      const std::string& block = blocks[i];
       byte_count += block.size();
       checksum = checksum * 31 + std::hash<std::string>()(block);
     }
