@@ -4,14 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 namespace spectra::mesh {
 
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kNone = PairedSides::kNone;
 
 /// Side `side` of face f runs from its corner `side` to the next; sides are numbered 3 f + side.
 std::uint32_t next_side(std::uint32_t side) {
@@ -22,8 +21,8 @@ std::uint32_t previous_side(std::uint32_t side) {
 }
 
 /// Which side lies against which, kNone where there is none, or the edge is cut.
-std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
-                                        HalfEdges& result) {
+std::vector<std::uint32_t> opposite_sides(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
+                                          ManifoldCuts& result) {
   const auto from = [&faces](std::uint32_t side) { return faces[side / 3][side % 3]; };
   const auto to = [&](std::uint32_t side) { return from(next_side(side)); };
   const auto side_count = static_cast<std::uint32_t>(3 * faces.size());
@@ -71,7 +70,7 @@ std::vector<std::uint32_t> paired_sides(std::size_t vertex_count, const std::vec
 
 /// Gives every fan of a vertex but the first a vertex of its own, in `faces`.
 void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& opposite,
-                  std::vector<base::Triangle>& faces, HalfEdges& result) {
+                  std::vector<base::Triangle>& faces, ManifoldCuts& result) {
   std::vector<bool> is_done(opposite.size(), false);
   std::vector<bool> is_seen(vertex_count, false);
   for (std::uint32_t start = 0; start < opposite.size(); ++start) {
@@ -145,22 +144,29 @@ void fill_kernel(std::size_t vertex_count, const std::vector<base::Triangle>& fa
 
 }  // namespace
 
+PairedSides paired_sides(std::size_t vertex_count, std::span<const base::Triangle> triangles,
+                         const base::Progress& progress) {
+  base::report(progress, base::kTopologyPhase, 0);
+  PairedSides result;
+  const auto takes_part = [vertex_count](const base::Triangle& triangle) {
+    const auto& [a, b, c] = triangle;
+    return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
+  };
+  result.faces.reserve(static_cast<std::size_t>(std::count_if(triangles.begin(), triangles.end(), takes_part)));
+  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(result.faces), takes_part);
+  result.opposite = opposite_sides(vertex_count, result.faces, result);
+  base::report(progress, base::kTopologyPhase, 0.4);
+  cut_vertices(vertex_count, result.opposite, result.faces, result);
+  base::report(progress, base::kTopologyPhase, 0.5);
+  return result;
+}
+
 HalfEdges half_edges(std::size_t vertex_count, std::span<const base::Triangle> triangles,
                      const base::Progress& progress) {
-  base::report(progress, base::kTopologyPhase, 0);
+  PairedSides sides = paired_sides(vertex_count, triangles, progress);
   HalfEdges result;
-  std::vector<base::Triangle> faces;
-  faces.reserve(triangles.size());
-  std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(faces),
-               [vertex_count](const base::Triangle& triangle) {
-                 const auto& [a, b, c] = triangle;
-                 return a != b && b != c && c != a && std::max({a, b, c}) < vertex_count;
-               });
-  const std::vector<std::uint32_t> opposite = paired_sides(vertex_count, faces, result);
-  base::report(progress, base::kTopologyPhase, 0.4);
-  cut_vertices(vertex_count, opposite, faces, result);
-  base::report(progress, base::kTopologyPhase, 0.5);
-  fill_kernel(vertex_count + result.source_vertex.size(), faces, opposite, result.kernel);
+  static_cast<ManifoldCuts&>(result) = std::move(static_cast<ManifoldCuts&>(sides));
+  fill_kernel(vertex_count + result.source_vertex.size(), sides.faces, sides.opposite, result.kernel);
   return result;
 }
 

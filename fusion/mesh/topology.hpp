@@ -17,8 +17,7 @@ struct TopologyFacts {
   std::uint64_t component_count = 0;            ///< Pieces of surface connected over edges, flipped or not.
 };
 
-/// Builds the half-edge connectivity of the mesh with OpenMesh (see half_edges.hpp) and reads the facts off it. `progress` is told
-/// of kTopologyPhase.
+/// Pairs the sides of the triangles (see paired_sides) and reads the facts off that. `progress` is told of kTopologyPhase.
 TopologyFacts topology_facts(const MultispectralMesh& mesh, const base::Progress& progress = {});
 
 }  // namespace spectra::mesh

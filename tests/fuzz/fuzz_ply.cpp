@@ -77,9 +77,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto again = files::read_ply(file.path());
   check(again.has_value());
   check_scene(again.value());
-  check(again.value().mesh.triangles() == mesh.triangles());
-  check(again.value().mesh.vertex_count() == mesh.vertex_count());
-  // Doubles are rounded to the precision of the scene's extent, which may move the origin.
-  if (!mesh.double_positions) check(written(again.value().mesh) == bytes);
+  const mesh::MultispectralMesh& second = again.value().mesh;
+  if (mesh.double_positions) {
+    // Doubles are rounded to the precision of the scene's extent: the origin may move, and vertices that stood apart may come to one
+    // place, which is then taken for holes.
+    check(second.vertex_count() <= mesh.vertex_count());
+    check(second.vertex_count() < mesh.vertex_count() || second.triangles() == mesh.triangles());
+    return 0;
+  }
+  check(second.triangles() == mesh.triangles());
+  check(second.vertex_count() == mesh.vertex_count());
+  check(written(second) == bytes);
   return 0;
 }

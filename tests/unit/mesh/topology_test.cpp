@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "../files/allocation_meter.hpp"
 #include "fusion/mesh/half_edges.hpp"
 
 namespace spectra::mesh {
@@ -155,6 +156,42 @@ TEST(Topology, OfTwoTrianglesThatDisagreeAboutOutside) {
   EXPECT_EQ(facts.non_manifold_edge_count, 0U);
   EXPECT_EQ(facts.boundary_edge_count, 4U);
   EXPECT_EQ(facts.component_count, 1U);
+}
+
+TEST(Topology, IsWhatOpenMeshSays) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 100; ++round) {
+    SCOPED_TRACE(round);
+    const std::uint32_t vertex_count = 4 + static_cast<std::uint32_t>(random() % 20);
+    std::vector<base::Triangle> triangles;
+    for (int i = 0; i < 25; ++i)
+      triangles.push_back({static_cast<std::uint32_t>(random() % vertex_count),
+                           static_cast<std::uint32_t>(random() % vertex_count),
+                           static_cast<std::uint32_t>(random() % vertex_count)});
+    const TopologyFacts facts = topology_facts(mesh_of(vertex_count, triangles));
+    const HalfEdges topology = half_edges(vertex_count, triangles);
+    const MeshKernel& kernel = topology.kernel;
+    const auto edges = kernel.edges();
+    const auto boundary_count =
+        std::count_if(edges.begin(), edges.end(), [&kernel](auto edge) { return kernel.is_boundary(edge); });
+    EXPECT_EQ(facts.boundary_edge_count, static_cast<std::uint64_t>(boundary_count) - topology.cut_edge_side_count);
+    const auto vertices = kernel.vertices();
+    EXPECT_EQ(facts.unreferenced_vertex_count,
+              static_cast<std::uint64_t>(std::count_if(vertices.begin(), vertices.end(),
+                                                       [&kernel](auto vertex) { return kernel.is_isolated(vertex); })));
+  }
+}
+
+/// A polygon of very many corners on few vertices: every edge is one of very many triangles.
+TEST(Topology, OfWhatIsNoManifoldAtAllTakesLittleMemory) {
+  constexpr std::uint32_t kTriangles = 200'000;
+  std::vector<base::Triangle> triangles;
+  for (std::uint32_t i = 0; i < kTriangles; ++i) triangles.push_back({0, 1 + i % 254, 2 + i % 254});
+  const MultispectralMesh mesh = mesh_of(256, std::move(triangles));
+  const test::AllocationMeter meter;
+  const TopologyFacts facts = topology_facts(mesh);
+  EXPECT_GT(facts.non_manifold_edge_count, 0U);
+  EXPECT_LT(meter.peak_bytes(), 130 * kTriangles);
 }
 
 TEST(Topology, OfAPointCloud) {
