@@ -141,6 +141,9 @@ HttpReply encrypted_elsewhere(const http::request<http::string_body>& request, s
 
 /// A token or a role.
 constexpr std::size_t kSessionBodyBytes = 1024;
+/// For a peer who is refused while he is sending.
+constexpr std::chrono::seconds kFarewell{1};
+constexpr std::size_t kFarewellBytes = std::size_t{4} << 20U;
 
 /// Counts a sender of blocks, as long as it is there.
 class SenderPlace {
@@ -212,6 +215,7 @@ asio::awaitable<void> HttpConnection::run() {
       stream_.next_layer().expires_after(context_.options.limits.header_timeout);
       bool goes_on = co_await begin_encryption();
       for (bool is_first = true; goes_on; is_first = false) goes_on = co_await serve_one(is_first);
+      if (is_body_unread_ && !is_handed_over_ && !is_stopping_) co_await see_off();
     } catch (const std::exception& failure) {
       spdlog::error("a connection failed: {}", failure.what());
     }
@@ -235,6 +239,19 @@ asio::awaitable<bool> HttpConnection::begin_encryption() {
   context_.metrics.handshakes_failed += 1;
   spdlog::debug("{}: no encryption: {}", peer_address_, failure.message());
   co_return false;
+}
+
+asio::awaitable<void> HttpConnection::see_off() {
+  error_code failed;
+  stream_.next_layer().socket().shutdown(asio::ip::tcp::socket::shutdown_send, failed);
+  stream_.next_layer().expires_after(kFarewell);
+  for (std::size_t left = kFarewellBytes; !failed && left > 0;) {
+    buffer_.clear();
+    const auto [error, size] =
+        co_await stream_.next_layer().async_read_some(buffer_.prepare(std::min(left, buffer_.max_size())), kAwait);
+    failed = error;
+    left -= size;
+  }
 }
 
 asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
@@ -271,6 +288,7 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
     room.emplace(context_, most_bytes);
     if (!room->is_there()) {
       context_.metrics.requests_refused += 1;
+      is_body_unread_ = true;
       const auto busy = refused({503, "busy", "", "too many bytes of blocks are being received",
                                  std::to_string(limits.block_bytes_at_once) + " bytes at once"});
       co_return co_await write(busy, 11, false, false);
@@ -289,6 +307,7 @@ asio::awaitable<bool> HttpConnection::serve_one(bool is_first) {
                                error != http::error::end_of_stream && error != http::error::partial_message;
   if (error && !is_syntax_error) co_return false;
   context_.metrics.requests += 1;
+  is_body_unread_ = !parser.is_done();
   if (error) {
     context_.metrics.requests_refused += 1;
     if (is_change && error == http::error::body_limit) {

@@ -36,6 +36,8 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<bool> begin_encryption();
   /// `is_first`: its time runs since the connection began.
   boost::asio::awaitable<bool> serve_one(bool is_first);
+  /// Ends towards a peer who may still be sending, so that he sees the answer: bytes that come after a close would take it from him.
+  boost::asio::awaitable<void> see_off();
   /// The connection becomes a session, or the upgrade is refused; it ends in any case.
   boost::asio::awaitable<void> serve_viewer(Request request, const RequestTarget& target);
   boost::asio::awaitable<void> serve_sender(Request request);
@@ -67,6 +69,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   access::AccessControl::Outcome who_;  ///< Asks now.
   bool is_from_here_ = false;           ///< The peer is on this machine.
   bool is_bare_ = false;                ///< Not encrypted where connections are to be.
+  bool is_body_unread_ = false;         ///< The answer went before it had come.
   bool is_handed_over_ = false;         ///< The stream is a session's.
   bool is_stopping_ = false;
   bool is_waiting_for_request_ = false;

@@ -315,6 +315,21 @@ TEST_F(ViewerSessionTest, BlocksBeyondTheBoundAreRefusedBeforeTheyAreRead) {
   EXPECT_NE(refused.find("Retry-After"), std::string::npos);
 }
 
+TEST_F(ViewerSessionTest, ARefusalReachesWhoIsStillSending) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.block_size_bytes = 2000;
+  start(options);
+  ASSERT_EQ(map_.restore(), std::nullopt);
+  const std::string body(1'000'000, 'x');
+  for (int i = 0; i < 10; ++i) {
+    RawClient sender(server_->port());
+    sender.send("PUT /api/v1/blocks/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(body.size()) +
+                "\r\n\r\n" + body);
+    EXPECT_EQ(status_of(sender.receive_all().value_or("")), 413);
+  }
+}
+
 TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
   serve(sheet(60));
   Viewer viewer(server_->port());
