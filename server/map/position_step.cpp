@@ -160,6 +160,8 @@ void PositionSteps::ask_cells(jobs::WorkerPool& pool) {
 void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
   std::uint32_t source_count = 0;
   for (const Point& point : points_) source_count = std::max(source_count, point.source + 1);
+  // Of coincident points one alone was kept, and triangles know the others.
+  for (const auto& [kept, other] : coincident_) source_count = std::max({source_count, kept + 1, other + 1});
   bool has_triangles = false;
   Pieces pieces(source_count);
   for (const auto& leaf : leaves) {

@@ -263,6 +263,27 @@ TEST(PositionSteps, AreTheSameForATriangleSoup) {
   EXPECT_EQ(form_of(*shared, 100).torn_count, 0u);
 }
 
+TEST(PositionSteps, KnowTheLastVerticesWhereOthersLieInTheSamePlace) {
+  // Patches, and behind all of them fans of as many vertices in the first place of each.
+  constexpr int kPatches = 200, kSide = 17, kFan = 100;
+  Parts parts;
+  for (int i = 0; i < kPatches; ++i) {
+    parts.grid(kSide, kSide, {static_cast<float>(i), 0, 0}, {0.01F, 0, 0}, {0, 0.01F, 0},
+               [](int column, int row) { return 0.001 * (column * row % 7); });
+  }
+  const auto without = scene_of(parts.mesh());
+  for (int i = 0; i < kPatches; ++i) {
+    const auto first = static_cast<std::uint32_t>(kSide * kSide * i);
+    for (int k = 0; k < kFan; ++k) {
+      const std::uint32_t v = parts.add(i, 0, 0);
+      parts.triangles.push_back({v, first + 1, first + kSide});
+    }
+  }
+  const auto with = scene_of(parts.mesh());
+  EXPECT_EQ(with->vertex_count(), without->vertex_count() + kPatches * kFan);
+  EXPECT_EQ(form_of(*with, 100).torn_count, 0U);
+}
+
 TEST(PositionSteps, AreNotCoarsenedByAStrayPoint) {
   mesh::MultispectralMesh cloud = spectra::testing::point_cloud(20'000, 3);
   const auto without = scene_of(spectra::testing::copy_of(cloud));
