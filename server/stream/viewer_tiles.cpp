@@ -41,6 +41,7 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
         slot->held.bytes = known->second->held.bytes;
         slot->held.earlier_colour_epoch =
             known->second->is_drawable() ? known->second->held.colour_epoch : known->second->held.earlier_colour_epoch;
+        slot->held.had_raw_layers = known->second->has_raw_layers() || known->second->held.had_raw_layers;
         abandon(*known->second);
       }
       known_slots.erase(known);
@@ -209,6 +210,7 @@ bool ViewerTiles::hold_resumed(TileSlot& slot, const ResumedTile& claim, const T
   const std::uint64_t colour_epoch =
       says_colours && before.picture == demand.picture() ? demand.colour_epoch : Demand::kEarlierColourEpoch;
   slot.held.earlier_colour_epoch = colour_epoch;
+  slot.held.had_raw_layers = claim.has_raw_layers;
   const std::uint32_t revision = before.revision != 0 ? before.revision : claim.revision;
   if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
   slot.held.revision = revision;
@@ -294,7 +296,9 @@ bool ViewerTiles::is_hidden(const TileSlot& slot, const Demand& demand) const {
   return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
     const TileSlot& child = *slots_[index];
     const bool is_current = child.is_drawable() && child.held.colour_epoch == demand.colour_epoch;
-    return is_current || child.held.earlier_colour_epoch == demand.colour_epoch || is_hidden(child, demand);
+    const bool is_drawn = demand.fused ? is_current || child.held.earlier_colour_epoch == demand.colour_epoch
+                                       : child.has_raw_layers() || child.held.had_raw_layers;
+    return is_drawn || is_hidden(child, demand);
   });
 }
 

@@ -61,7 +61,8 @@ struct TileSlot {
     std::uint32_t colour_sequence = 0;  ///< Of the frame that brought the colours; 0: an earlier connection did.
     /// Of colours of an earlier version of the tile, which the viewer draws until those of this one are there.
     std::uint64_t earlier_colour_epoch = 0;
-    float position_step_m = 0;  ///< The coarsest of the tile.
+    bool had_raw_layers = false;  ///< The viewer has both raw layers of an earlier version.
+    float position_step_m = 0;    ///< The coarsest of the tile.
     std::array<float, 3> origin_m{};
   };
   /// Of the demand for which the tile could not be encoded; 0 = none.
@@ -178,7 +179,7 @@ class ViewerTiles {
   bool are_children_drawable(const TileSlot& slot) const;
   /// All of it is drawn by tiles beneath that are as demanded.
   bool is_answered_beneath(const TileSlot& slot, const Demand& demand) const;
-  /// All of it is drawn by tiles beneath under the settings of now, be it by earlier versions of them.
+  /// All of it is drawn by tiles beneath under the settings of now, or made of raw layers, be it by earlier versions of them.
   bool is_hidden(const TileSlot& slot, const Demand& demand) const;
   /// All of it is drawn by tiles beneath that have the newest colours.
   bool is_covered(const TileSlot& slot, const Demand& demand) const;

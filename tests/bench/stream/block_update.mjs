@@ -1,18 +1,22 @@
 // A block of 10,000 vertices that is put again and again into a scene, while a Node viewer who sees all of it at full detail decodes:
 // how long until the changed leaves are decoded and until everything is, what is sent, and what it costs the server.
-//   node tests/bench/stream/block_update.mjs [--live] [--rounds N] [SCENE.ply ...]
-// Without a scene: demo scenes of 100,000 and 1,000,000 vertices. With --live the scene is a block of a map that began empty.
+//   node tests/bench/stream/block_update.mjs [--live | --cut VERTICES] [--raw] [--rounds N] [SCENE.ply ...]
+// Without a scene: demo scenes of 100,000 and 1,000,000 vertices. With --live the scene is a block of a map that began empty; with
+// --cut it comes in blocks of so many vertices, and one of these is replaced, a tenth of a degree warmer or colder each time. With
+// --raw the viewer makes the colours itself, of raw layers.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { parseArgs } from "node:util";
 import { patch } from "../../integration/node/patch.mjs";
-import { isColours, SpectraClient } from "../../integration/node/spectra_client.mjs";
+import { readPly } from "../../integration/node/ply.mjs";
+import { isColours, KIND, SpectraClient } from "../../integration/node/spectra_client.mjs";
 import { binary, serve } from "../../integration/node/spectra_server.mjs";
+import { cutScene } from "./cut_scene.mjs";
 
 const { values: options, positionals: scenes } = parseArgs({
-  options: { live: { type: "boolean", default: false }, rounds: { type: "string", default: "20" } },
+  options: { live: { type: "boolean", default: false }, cut: { type: "string", default: "0" }, raw: { type: "boolean", default: false }, rounds: { type: "string", default: "20" } },
   allowPositionals: true,
 });
 const ROUNDS = Number(options.rounds);
@@ -34,13 +38,21 @@ function cpuSeconds(pid) {
 }
 
 for (const scene of scenes) {
-  const server = await serve(options.live ? ["--live"] : [scene]);
-  if (options.live) {
-    const response = await fetch(`${server.url}/api/v1/blocks/scene`, { method: "PUT", body: readFileSync(scene) });
+  const most = Number(options.cut);
+  const server = await serve(options.live || most > 0 ? ["--live"] : [scene]);
+  const put = async (id, body) => {
+    const response = await fetch(`${server.url}/api/v1/blocks/${id}`, { method: "PUT", body });
     if (!response.ok) throw new Error(await response.text());
+  };
+  if (options.live) await put("scene", readFileSync(scene));
+  const blocks = most > 0 ? cutScene(readPly(scene), most) : [];
+  for (const [place, block] of blocks.entries()) await put(`b${place}`, block.warmer(0));
+  for (let before = null, now = 0; before !== now; await new Promise((resolve) => setTimeout(resolve, 1000))) {
+    before = now;
+    now = (await (await fetch(`${server.url}/api/v1/scene`)).json()).revision;
   }
   const client = await SpectraClient.connect(server.url);
-  await client.request("scene.subscribe", { channels: ["fused"] });
+  await client.request("scene.subscribe", { channels: options.raw ? ["temperature", "visible"] : ["fused"], colour_transform: "subtract_green" });
   await client.notification("stream.complete", 120_000, ({ vertices }) => vertices > 0);
   const { bounds, origin } = client.hello.scene;
   const middle = bounds.min.map((low, axis) => (low + bounds.max[axis]) / 2);
@@ -48,25 +60,31 @@ for (const scene of scenes) {
   const times = { leaf_ms: [], all_ms: [], cpu_ms: [], bytes: [], tiles: [] };
   let body;
   for (let round = 0; round < ROUNDS; round += 1) {
-    body = patch(0, 0, {
-      side: 101,
-      height: round / 10,
-      scale: extent / 2000,
-      at: middle.map((value, axis) => value + origin[axis]),
-    });
+    const place = (7 * round) % Math.max(1, blocks.length);
+    body =
+      blocks.length > 0
+        ? blocks[place].warmer(round % 2 === 0 ? 0.1 : -0.1)
+        : patch(0, 0, {
+            side: 101,
+            height: round / 10,
+            scale: extent / 2000,
+            at: middle.map((value, axis) => value + origin[axis]),
+          });
     const first = client.frames.length;
     const before_s = cpuSeconds(server.process.pid);
     const begin = performance.now();
     const { revision } = client.notifications.findLast(({ method }) => method === "scene.changed")?.params.scene ?? client.hello.scene;
     const complete = client.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision > revision);
-    const put = fetch(`${server.url}/api/v1/blocks/patch`, { method: "PUT", body });
+    const answered = put(blocks.length > 0 ? `b${place}` : "patch", body);
     let leaf_ms = null;
     while (leaf_ms === null) {
       await new Promise((resolve) => setTimeout(resolve, 1));
-      if (client.frames.slice(first).some(isColours)) leaf_ms = performance.now() - begin;
+      if (client.frames.slice(first).some((frame) => isColours(frame) || frame.kind === KIND.visible_subtract_green)) leaf_ms = performance.now() - begin;
     }
-    await Promise.all([put, complete]);
+    await Promise.all([answered, complete]);
     times.all_ms.push(performance.now() - begin);
+    // Coarse tiles that follow count, too.
+    if (blocks.length > 0) await new Promise((resolve) => setTimeout(resolve, 1500));
     times.leaf_ms.push(leaf_ms);
     times.cpu_ms.push((cpuSeconds(server.process.pid) - before_s) * 1000);
     const frames = client.frames.slice(first);

@@ -277,6 +277,40 @@ TEST_F(RawLayers, SigmaIsNoPartOfWhatIsFused) {
 
 class RawLayersInView : public testing::StreamOfATree {};
 
+TEST_F(RawLayersInView, OfAChangedTileAndAllAboveItOnlyWhatIsDrawnIsSent) {
+  const Subscription raw_alone{.fused = false, .temperature = true, .visible = true};
+  const auto settle = [this](TestViewer& viewer) {
+    for (int i = 0; i < 5; ++i) {
+      wait_until_idle(pool_);
+      viewer.take();
+    }
+  };
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe(raw_alone);
+  show(viewer, 0.3);
+  viewer.complete();
+  settle(viewer);
+  const std::size_t before = viewer.frames.size();
+  std::vector<std::shared_ptr<const map::Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
+  for (const std::size_t changed : {0U, 1U, 5U}) {
+    auto tile = std::make_shared<map::Tile>(*tiles[changed]);
+    tile->positions[0].z += 0.01F;
+    tiles[changed] = tile;
+  }
+  viewer.stream().set_scene(scene_of(tiles, 2));
+  viewer.complete();
+  settle(viewer);
+  ASSERT_EQ(viewer.frames.size(), before + 3) << "geometry, temperatures and visible colours";
+  for (std::size_t i = before; i < viewer.frames.size(); ++i) EXPECT_EQ(viewer.frames[i].tile, tiles[5]->id);
+
+  // From far away it is the top that is drawn.
+  viewer.stream().set_camera(camera_over(2, 2, 5000));
+  viewer.complete();
+  settle(viewer);
+  EXPECT_EQ(viewer.frames.size(), before + 6);
+  EXPECT_EQ(viewer.frames.back().tile, tiles[0]->id);
+}
+
 TEST_F(RawLayersInView, ComeOfWhatIsDrawnAndOfTheTopHotAndNearFirst) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().set_camera(camera_over(0.5F, 0.5F, 1.5F));
