@@ -160,6 +160,31 @@ TEST_F(MapperTest, TakesEachSensorAtItsOwnTime) {
   EXPECT_LT(sum / static_cast<double>(count), 0.02);
 }
 
+TEST_F(MapperTest, AVignettingPictureOfNothingChangesNothing) {
+  // What is reflected is the middle of each picture, found in another way where one is subtracted.
+  calibration_.thermal->reflected_celsius.reset();
+  calibration_.thermal->emissivity = 0.9;
+  Mapper plain(calibration_, settings_, pool_), mapper(calibration_, settings_, pool_);
+  PictureFloat nothing;
+  nothing.width = calibration_.thermal->camera.width;
+  nothing.height = calibration_.thermal->camera.height;
+  nothing.pixels.assign(static_cast<std::size_t>(nothing.width * nothing.height), 0);
+  ASSERT_TRUE(mapper.set_vignetting(nothing));
+  for (int i = 0; i < 3; ++i) {
+    for (Mapper* one : {&plain, &mapper}) one->fuse(frame_at(0.1 * i), trajectory_, faults_);
+  }
+  const UnitMesh a = plain.whole_mesh(), b = mapper.whole_mesh();
+  ASSERT_EQ(a.celsius.size(), b.celsius.size());
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < a.celsius.size(); ++i) {
+    if (std::isnan(a.celsius[i]) && std::isnan(b.celsius[i])) continue;
+    ASSERT_EQ(a.celsius[i], b.celsius[i]) << i;
+    ASSERT_EQ(a.sigma_kelvin[i], b.sigma_kelvin[i]) << i;
+    ++known;
+  }
+  EXPECT_GT(known, a.celsius.size() / 2);
+}
+
 TEST_F(MapperTest, RefusesAVignettingPictureOfAnotherSize) {
   Mapper mapper(calibration_, settings_, pool_);
   EXPECT_FALSE(mapper.set_vignetting({10, 10, std::vector<float>(100, 0)}));
