@@ -18,7 +18,7 @@ constexpr int kReach = 4;
 /// The blocks of a map about a place, found once.
 class BlocksAround {
  public:
-  BlocksAround(const VoxelMap& map, GridPlace first) : map_(map), first_(first) {
+  BlocksAround(const VoxelMap& map, GridPlace first) : first_(first) {
     for (int i = 0; i < kReach * kReach * kReach; ++i) {
       blocks_[static_cast<std::size_t>(i)] =
           map.find({first.x + i % kReach, first.y + i / kReach % kReach, first.z + i / (kReach * kReach)});
@@ -34,7 +34,6 @@ class BlocksAround {
   }
 
  private:
-  const VoxelMap& map_;
   const GridPlace first_;
   std::array<std::int32_t, kReach * kReach * kReach> blocks_{};
 };
