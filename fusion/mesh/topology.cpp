@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "fusion/mesh/disjoint_sets.hpp"
-#include "fusion/mesh/half_edges.hpp"
+#include "fusion/mesh/paired_sides.hpp"
 
 namespace spectra::mesh {
 

@@ -9,10 +9,13 @@
 #include <vector>
 
 #include "../files/allocation_meter.hpp"
-#include "fusion/mesh/half_edges.hpp"
+#include "half_edges.hpp"
 
 namespace spectra::mesh {
 namespace {
+
+using testing::half_edges;
+using testing::HalfEdges;
 
 MultispectralMesh mesh_of(std::size_t vertex_count, std::vector<base::Triangle> triangles) {
   MultispectralMesh mesh;
@@ -26,7 +29,7 @@ MultispectralMesh mesh_of(std::size_t vertex_count, std::vector<base::Triangle> 
 void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std::vector<base::Triangle>& triangles) {
   const MeshKernel& kernel = topology.kernel;
   ASSERT_EQ(kernel.n_faces(), triangles.size());
-  ASSERT_EQ(kernel.n_vertices(), vertex_count + topology.source_vertex.size());
+  ASSERT_EQ(kernel.n_vertices(), vertex_count + topology.sides.source_vertex.size());
   std::vector<std::size_t> outgoing(kernel.n_vertices(), 0);
   for (const auto halfedge : kernel.halfedges()) {
     EXPECT_EQ(kernel.prev_halfedge_handle(kernel.next_halfedge_handle(halfedge)), halfedge);
@@ -58,7 +61,7 @@ void expect_sound(const HalfEdges& topology, std::size_t vertex_count, const std
       ASSERT_LT(i, 3U);
       const auto index = static_cast<std::size_t>((*it).idx());
       corners[i] =
-          static_cast<std::uint32_t>(index < vertex_count ? index : topology.source_vertex[index - vertex_count]);
+          static_cast<std::uint32_t>(index < vertex_count ? index : topology.sides.source_vertex[index - vertex_count]);
     }
     // OpenMesh may begin at any corner.
     base::Triangle expected = triangles[static_cast<std::size_t>(face.idx())];
@@ -78,7 +81,7 @@ const std::vector<base::Triangle> kTetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3
 TEST(HalfEdges, OfAClosedSurface) {
   const HalfEdges topology = sound_half_edges(4, kTetrahedron);
   EXPECT_EQ(topology.kernel.n_edges(), 6U);
-  EXPECT_TRUE(topology.source_vertex.empty());
+  EXPECT_TRUE(topology.sides.source_vertex.empty());
 }
 
 TEST(HalfEdges, OfAnOpenFan) {
@@ -88,14 +91,14 @@ TEST(HalfEdges, OfAnOpenFan) {
 
 TEST(HalfEdges, CutsABowTieAtItsVertex) {
   const HalfEdges topology = sound_half_edges(5, {{0, 1, 2}, {0, 3, 4}});
-  EXPECT_EQ(topology.source_vertex, std::vector<std::uint32_t>{0});
+  EXPECT_EQ(topology.sides.source_vertex, std::vector<std::uint32_t>{0});
 }
 
 TEST(HalfEdges, CutsAlongAnEdgeOfThreeTriangles) {
   const HalfEdges topology = sound_half_edges(5, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}});
-  EXPECT_EQ(topology.non_manifold_edge_count, 1U);
-  EXPECT_EQ(topology.cut_edge_side_count, 3U);
-  EXPECT_EQ(topology.source_vertex.size(), 4U);
+  EXPECT_EQ(topology.sides.non_manifold_edge_count, 1U);
+  EXPECT_EQ(topology.sides.cut_edge_side_count, 3U);
+  EXPECT_EQ(topology.sides.source_vertex.size(), 4U);
 }
 
 TEST(HalfEdges, LeavesOutWhatIsNoTriangle) {
@@ -174,7 +177,8 @@ TEST(Topology, IsWhatOpenMeshSays) {
     const auto edges = kernel.edges();
     const auto boundary_count =
         std::count_if(edges.begin(), edges.end(), [&kernel](auto edge) { return kernel.is_boundary(edge); });
-    EXPECT_EQ(facts.boundary_edge_count, static_cast<std::uint64_t>(boundary_count) - topology.cut_edge_side_count);
+    EXPECT_EQ(facts.boundary_edge_count,
+              static_cast<std::uint64_t>(boundary_count) - topology.sides.cut_edge_side_count);
     const auto vertices = kernel.vertices();
     EXPECT_EQ(facts.unreferenced_vertex_count,
               static_cast<std::uint64_t>(std::count_if(vertices.begin(), vertices.end(),

@@ -1,4 +1,4 @@
-#include "fusion/mesh/half_edges.hpp"
+#include "fusion/mesh/paired_sides.hpp"
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@ std::uint32_t previous_side(std::uint32_t side) {
 
 /// Which side lies against which, kNone where there is none, or the edge is cut.
 std::vector<std::uint32_t> opposite_sides(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
-                                          ManifoldCuts& result) {
+                                          PairedSides& result) {
   const auto from = [&faces](std::uint32_t side) { return faces[side / 3][side % 3]; };
   const auto to = [&](std::uint32_t side) { return from(next_side(side)); };
   const auto side_count = static_cast<std::uint32_t>(3 * faces.size());
@@ -70,7 +70,7 @@ std::vector<std::uint32_t> opposite_sides(std::size_t vertex_count, const std::v
 
 /// Gives every fan of a vertex but the first a vertex of its own, in `faces`.
 void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& opposite,
-                  std::vector<base::Triangle>& faces, ManifoldCuts& result) {
+                  std::vector<base::Triangle>& faces, PairedSides& result) {
   std::vector<bool> is_done(opposite.size(), false);
   std::vector<bool> is_seen(vertex_count, false);
   for (std::uint32_t start = 0; start < opposite.size(); ++start) {
@@ -100,48 +100,6 @@ void cut_vertices(std::size_t vertex_count, const std::vector<std::uint32_t>& op
   }
 }
 
-void fill_kernel(std::size_t vertex_count, const std::vector<base::Triangle>& faces,
-                 const std::vector<std::uint32_t>& opposite, MeshKernel& kernel) {
-  using OpenMesh::FaceHandle;
-  using OpenMesh::HalfedgeHandle;
-  using OpenMesh::VertexHandle;
-  const auto side_count = static_cast<std::uint32_t>(opposite.size());
-  const auto vertex_of = [&faces](std::uint32_t side) {
-    return VertexHandle(static_cast<int>(faces[side / 3][side % 3]));
-  };
-
-  std::vector<int> halfedge_of(side_count);
-  int halfedge_count = 0;
-  for (std::uint32_t side = 0; side < side_count; ++side) {
-    const bool is_second = opposite[side] < side;
-    halfedge_of[side] = is_second ? halfedge_of[opposite[side]] + 1 : halfedge_count;
-    if (!is_second) halfedge_count += 2;
-  }
-  kernel.resize(vertex_count, static_cast<std::size_t>(halfedge_count) / 2, faces.size());
-
-  for (std::uint32_t side = 0; side < side_count; ++side) {
-    const HalfedgeHandle halfedge(halfedge_of[side]);
-    const FaceHandle face(static_cast<int>(side / 3));
-    kernel.set_vertex_handle(halfedge, vertex_of(next_side(side)));
-    kernel.set_face_handle(halfedge, face);
-    kernel.set_next_halfedge_handle(halfedge, HalfedgeHandle(halfedge_of[next_side(side)]));
-    if (side % 3 == 0) kernel.set_halfedge_handle(face, halfedge);
-    kernel.set_halfedge_handle(vertex_of(side), halfedge);
-  }
-  // A boundary half-edge leaves the vertex that its side arrives at; each vertex has at most one, and refers to it.
-  for (std::uint32_t side = 0; side < side_count; ++side) {
-    if (opposite[side] != kNone) continue;
-    const HalfedgeHandle boundary(halfedge_of[side] + 1);
-    kernel.set_vertex_handle(boundary, vertex_of(side));
-    kernel.set_boundary(boundary);
-    kernel.set_halfedge_handle(vertex_of(next_side(side)), boundary);
-  }
-  for (std::uint32_t side = 0; side < side_count; ++side) {
-    if (opposite[side] != kNone) continue;
-    kernel.set_next_halfedge_handle(HalfedgeHandle(halfedge_of[side] + 1), kernel.halfedge_handle(vertex_of(side)));
-  }
-}
-
 }  // namespace
 
 PairedSides paired_sides(std::size_t vertex_count, std::span<const base::Triangle> triangles,
@@ -158,15 +116,6 @@ PairedSides paired_sides(std::size_t vertex_count, std::span<const base::Triangl
   base::report(progress, base::kTopologyPhase, 0.4);
   cut_vertices(vertex_count, result.opposite, result.faces, result);
   base::report(progress, base::kTopologyPhase, 0.5);
-  return result;
-}
-
-HalfEdges half_edges(std::size_t vertex_count, std::span<const base::Triangle> triangles,
-                     const base::Progress& progress) {
-  PairedSides sides = paired_sides(vertex_count, triangles, progress);
-  HalfEdges result;
-  static_cast<ManifoldCuts&>(result) = std::move(static_cast<ManifoldCuts&>(sides));
-  fill_kernel(vertex_count + result.source_vertex.size(), sides.faces, sides.opposite, result.kernel);
   return result;
 }
 
