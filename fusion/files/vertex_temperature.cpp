@@ -13,6 +13,11 @@ constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max
 /// Compared as a float, because that is how files have it: the nearest float lies above the real number.
 constexpr float kAbsoluteZeroCelsius = -273.15F;
 
+/// A small negative number is 0 as a float, and not -0: what is written of it reads as 0.
+float rounded(double celsius) {
+  return static_cast<float>(celsius) + 0.0F;
+}
+
 /// Takes note of finite temperatures.
 void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   float lowest = facts.lowest;
@@ -88,7 +93,7 @@ float TemperatureConversion::converted(double value, TemperatureFacts& facts) co
     ++facts.impossible_count;
     return kNone;
   }
-  const auto celsius = static_cast<float>(scaled);
+  const float celsius = rounded(scaled);
   describe({&celsius, 1}, facts);
   return celsius;
 }
@@ -100,7 +105,7 @@ void TemperatureConversion::convert(std::span<const double> values, std::span<fl
     bool all_usual = true;
     for (std::size_t i = 0; i < values.size(); ++i) {
       const double scaled = scale_.factor * values[i] + scale_.offset;
-      celsius[i] = static_cast<float>(scaled);
+      celsius[i] = rounded(scaled);
       all_usual = all_usual & (scaled <= kFloatMax) & (celsius[i] > kAbsoluteZeroCelsius);
     }
     if (all_usual) return describe(celsius, facts);

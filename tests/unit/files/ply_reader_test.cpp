@@ -231,6 +231,15 @@ TEST(PlyReader, CountsTemperaturesThatAreNone) {
   EXPECT_EQ(scene.mesh.temperature_celsius()[5], 3e38F);
 }
 
+TEST(PlyReader, HasOneZeroOfTemperature) {
+  for (const std::string other : {"5", "nan"}) {
+    const LoadedScene scene = loaded(ascii_head(3, std::string(kXyz) + "property double temperature\n") +
+                                     "0 0 0 -1e-60\n1 0 0 -0.0\n2 0 0 " + other + "\n");
+    EXPECT_FALSE(std::signbit(scene.mesh.temperature_celsius()[0]));
+    EXPECT_FALSE(std::signbit(scene.mesh.temperature_celsius()[1]));
+  }
+}
+
 TEST(PlyReader, KeepsWhatIsBeyondTheRangeOfTheSensor) {
   const LoadedScene scene = loaded(ascii_head(4, std::string(kXyz) + "property double temperature\n") +
                                    "0 0 0 inf\n1 0 0 -inf\n2 0 0 1e39\n3 0 0 1e999\n");
