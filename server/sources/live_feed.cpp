@@ -20,6 +20,8 @@ using protocol::FramesKind;
 
 constexpr std::chrono::milliseconds kLookEvery{50};
 constexpr double kPublishEveryS = 0.2;
+/// Without a word of the sender for so long, what is left is handed over without a pause.
+constexpr double kIdleAfterS = 0.1;
 /// After a picture was skipped fewer are asked for as long.
 constexpr double kOverloadS = 2;
 /// Of what it could do that is asked for, so that it catches up.
@@ -384,6 +386,7 @@ void LiveFeed::work() {
   double last_published_s = steady_s();
   for (;;) {
     std::optional<double> pose_end_s, newest_s;
+    bool is_idle = false;
     {
       std::unique_lock lock(mutex_);
       has_work_.wait_for(lock, kLookEvery, [&] { return is_over_ || is_ready() || !new_poses_.empty(); });
@@ -400,6 +403,7 @@ void LiveFeed::work() {
       } else if (waiting_.empty() && has_sender_) {
         is_flushing_ = false;
       }
+      is_idle = waiting_.empty() && !picture_in_hand_ && steady_s() - last_arrival_s_ > kIdleAfterS;
     }
     apply_poses();
     // Of pictures that wait the oldest may be as far from the newest pose as one may come, and wait as long.
@@ -413,8 +417,7 @@ void LiveFeed::work() {
       robot.is_lost = newest_s && *newest_s - *pose_end_s > kLostAfterS;
       if (latest.state != mapping::PoseState::Unknown) sinks_.moved(robot, false);
     }
-    const bool had_picture = picture_in_hand_.has_value();
-    if (had_picture) {
+    if (picture_in_hand_) {
       const double begun_s = steady_s();
       net::FrameOutcome outcome = map_picture(picture_in_hand_->first, picture_in_hand_->second.frame);
       {
@@ -431,8 +434,9 @@ void LiveFeed::work() {
     // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
     const std::size_t room = sinks_.room(), waiting_units = publisher_.waiting_count();
     const bool is_due = steady_s() - last_published_s >= kPublishEveryS && (has_changed_ || waiting_units > 0);
-    const bool is_idle = !had_picture && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
-    if (room == 0 || !(is_due || is_idle)) continue;
+    // While frames come, whoever makes tiles of it needs the time between.
+    const bool is_left = is_idle && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
+    if (room == 0 || !(is_due || is_left)) continue;
     last_published_s = steady_s();
     has_changed_ = false;
     if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_)) return;
