@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "fusion/base/distance_text.hpp"
 #include "fusion/files/ply_values.hpp"
 #include "fusion/files/scene_origin.hpp"
+#include "fusion/files/temperature_doubt.hpp"
 #include "fusion/files/temperature_name.hpp"
 
 namespace spectra::files {
@@ -25,24 +25,6 @@ std::string joined(const std::vector<std::string>& names) {
   }
   if (names.size() > kMaxNames) text += " and " + std::to_string(names.size() - kMaxNames) + " more";
   return text;
-}
-
-std::string short_number(double value) {
-  std::array<char, 32> text;
-  constexpr int kDigits = 6;
-  const auto [end, status] =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits);
-  return {text.data(), end};
-}
-
-/// The shortest text that is read back as a value of that type.
-std::string value_text(double value, PlyScalar type) {
-  if (type == PlyScalar::Float64) return number_text(value);
-  std::array<char, 32> text;
-  const bool is_float = type == PlyScalar::Float32 && std::abs(value) <= double{std::numeric_limits<float>::max()};
-  const auto [end, status] = is_float ? std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value))
-                                      : std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end};
 }
 
 bool is_used(const PlySlots& slots, std::size_t property) {
@@ -326,102 +308,10 @@ class Notes {
     add("under_range_temperatures", facts.under_range_count,
         counted(facts.under_range_count, "temperature", "temperatures") +
             " under the range of the sensor (-infinite), shown as the coldest");
-    if (!options_.celsius_scale() && facts.finite_count > 0) about_plausibility(facts);
-  }
-
-  /// Nobody has said what unit it is, and degrees Celsius are hard to believe.
-  void about_plausibility(const TemperatureFacts& facts) {
-    const std::string range = "Temperatures from " + short_number(static_cast<double>(facts.lowest)) + " to " +
-                              short_number(static_cast<double>(facts.highest)) + ", taken as degC, ";
-    const std::uint64_t measured_count = facts.finite_count - facts.zero_count - facts.full_count;
-    const auto most = [measured_count](std::uint64_t count) {
-      constexpr std::uint64_t kMost = 9;
-      return count > 0 && 10 * count >= kMost * measured_count;
-    };
-    const std::string no_data = facts.full_count > 0 ? "; if 65535 stands for no data, --no-data 65535" : "";
-    const PlyProperty& property = *temperature_property();
-    const std::optional<TemperatureUnit> named = temperature_name(property.name).unit;
-    const std::string call = "'" + printable(property.name) + "'";
-    const char* const kId = "implausible_temperatures";
-    if (named == TemperatureUnit::Fahrenheit) {
-      add(kId, facts.finite_count, range + "are in Fahrenheit by the name " + call + ": --temperature-unit fahrenheit");
-    } else if (const char* const unit =
-                   named_unit(named, most(facts.kelvin_like_count), most(facts.centikelvin_like_count));
-               unit != nullptr) {
-      const double factor = named == TemperatureUnit::Kelvin ? 1 : 0.01;
-      const auto celsius = [factor](float value) { return short_number(factor * static_cast<double>(value) - 273.15); };
-      add(kId, facts.finite_count,
-          range + "are in " + unit + " by the name " + call + " (which would make them " + celsius(facts.lowest) +
-              " to " + celsius(facts.highest) + " degC): --temperature-unit " + unit + " where the name is right");
-    } else if (most(facts.centikelvin_like_count)) {
-      add(kId, facts.finite_count, range + "look like hundredths of kelvin: --temperature-unit centikelvin" + no_data);
-    } else if (most(facts.kelvin_like_count)) {
-      add(kId, facts.finite_count, range + "look like kelvin: --temperature-unit kelvin" + no_data);
-    } else if (most(facts.tenth_kelvin_like_count)) {
-      // The same numbers may be either: what they would be tells.
-      const auto from_to = [&facts](double scale, double offset) {
-        const auto celsius = [&](float value) { return short_number(scale * static_cast<double>(value) + offset); };
-        return " (" + celsius(facts.lowest) + " to " + celsius(facts.highest) + " degC): --temperature-scale ";
-      };
-      add(kId, facts.finite_count,
-          range + "look like hundredths of a degree" + from_to(0.01, 0) + "0.01, or like tenths of kelvin" +
-              from_to(0.1, -273.15) + "0.1 --temperature-offset -273.15" + no_data);
-    } else if (size_bytes(property.type) == 1) {
-      add(kId, facts.finite_count,
-          range + "are of type " + std::string(to_string(property.type)) +
-              " and look like grey values: --temperature-scale A --temperature-offset B (degC = A value + B)");
-    } else if (facts.too_hot_count - facts.full_count > measured_count / 2) {
-      add(kId, facts.finite_count,
-          range +
-              "look like counts of a sensor or another quantity: --temperature-scale A --temperature-offset B "
-              "(degC = A value + B), or --temperature-property NAME" +
-              no_data);
-    } else if (constexpr double kColdestBelieved = 200;
-               property.type != PlyScalar::Float32 && property.type != PlyScalar::Float64 && facts.too_hot_count == 0 &&
-               static_cast<double>(facts.lowest) >= kColdestBelieved) {
-      add(kId, facts.finite_count,
-          range +
-              "are whole numbers that are hard to believe: hundredths of a degree are --temperature-scale 0.01, tenths "
-              "0.1");
-    } else if (facts.too_hot_count > 0) {
-      const std::string value = value_text(static_cast<double>(facts.highest), PlyScalar::Float32);
-      add(kId, facts.too_hot_count,
-          range + counted(facts.too_hot_count, "is", "are") + " above 3000: if " + value +
-              " stands for no data, --no-data " + value);
-    } else if (facts.too_cold_count > 0) {
-      const std::string value = value_text(static_cast<double>(facts.lowest), PlyScalar::Float32);
-      add(kId, facts.too_cold_count,
-          range + counted(facts.too_cold_count, "is", "are") + " below -100: if " + value +
-              " stands for no data, --no-data " + value);
-    } else if (zero_stands_alone(facts)) {
-      add(kId, facts.zero_count,
-          range + counted(facts.zero_count, "is", "are") + " exactly 0 and no other is nearer to it than " +
-              short_number(static_cast<double>(facts.nearest_zero)) + ": if 0 stands for no data, --no-data 0");
-    } else if (facts.lowest >= 0 && facts.highest <= 1 && facts.highest > facts.lowest) {
-      add(kId, facts.finite_count,
-          range +
-              "look like shares of a range: --temperature-scale A --temperature-offset B (degC = A value + B), or "
-              "--temperature-property NAME");
+    if (options_.celsius_scale() || facts.finite_count == 0) return;
+    if (const auto doubt = temperature_doubt(facts, *temperature_property())) {
+      add("implausible_temperatures", doubt->count, doubt->message);
     }
-  }
-
-  /// The unit of kelvin that a name tells where the values do not look like it; nullptr for none.
-  static const char* named_unit(std::optional<TemperatureUnit> named, bool is_kelvin_like, bool is_centikelvin_like) {
-    if (is_kelvin_like || is_centikelvin_like) return nullptr;
-    if (named == TemperatureUnit::Kelvin) return "kelvin";
-    return named == TemperatureUnit::Centikelvin ? "centikelvin" : nullptr;
-  }
-
-  /// Many are exactly 0, and all others keep away from it as measured ones do not.
-  static bool zero_stands_alone(const TemperatureFacts& facts) {
-    constexpr std::uint64_t kFewest = 12;
-    constexpr std::uint64_t kOneIn = 1000;
-    constexpr float kFewestCelsius = 5;
-    if (facts.zero_count < kFewest || kOneIn * facts.zero_count < facts.finite_count) return false;
-    if (facts.zero_count == facts.finite_count || facts.nearest_zero < kFewestCelsius) return false;
-    const float lowest = facts.lowest < 0 ? facts.lowest : facts.nearest_zero;
-    const float highest = facts.highest > 0 ? facts.highest : -facts.nearest_zero;
-    return 4 * facts.nearest_zero >= highest - lowest;
   }
 
   /// What was said of the file and has changed nothing.

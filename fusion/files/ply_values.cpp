@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <system_error>
@@ -54,6 +55,23 @@ std::optional<double> unusual_number(std::string_view token) {
 std::string number_text(double value) {
   std::array<char, 32> text;
   const auto [end, status] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
+std::string short_number(double value) {
+  std::array<char, 32> text;
+  constexpr int kDigits = 6;
+  const auto [end, status] =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits);
+  return {text.data(), end};
+}
+
+std::string value_text(double value, PlyScalar type) {
+  if (type == PlyScalar::Float64) return number_text(value);
+  std::array<char, 32> text;
+  const bool is_float = type == PlyScalar::Float32 && std::abs(value) <= double{std::numeric_limits<float>::max()};
+  const auto [end, status] = is_float ? std::to_chars(text.data(), text.data() + text.size(), static_cast<float>(value))
+                                      : std::to_chars(text.data(), text.data() + text.size(), value);
   return {text.data(), end};
 }
 

@@ -75,6 +75,10 @@ void load_column(PlyScalar type, const unsigned char* bytes, std::size_t stride,
 
 /// The shortest text that is read back as that number.
 std::string number_text(double value);
+/// At most six digits of it, for people.
+std::string short_number(double value);
+/// The shortest text that is read back as a value of that type.
+std::string value_text(double value, PlyScalar type);
 /// A number as text files have it: with a leading '+', with an exponent as Fortran writes it (1.5D+01), "inf", and nan in
 /// every spelling that programs have for it, "null" and "NA" among them. nullopt: not a number.
 std::optional<double> parse_number(std::string_view token);

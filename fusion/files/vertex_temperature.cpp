@@ -12,6 +12,9 @@ constexpr float kBeyond = std::numeric_limits<float>::infinity();
 constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max());
 /// Compared as a float, because that is how files have it: the nearest float lies above the real number.
 constexpr float kAbsoluteZeroCelsius = -273.15F;
+/// Hundredths of a degree are hardly ever outside of these.
+constexpr float kMostHundredths = 12'000;
+constexpr float kLeastHundredths = -10'000;
 
 /// A small negative number is 0 as a float, and not -0: what is written of it reads as 0.
 float rounded(double celsius) {
@@ -22,6 +25,9 @@ float rounded(double celsius) {
 void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   float lowest = facts.lowest;
   float highest = facts.highest;
+  float highest_but_full = facts.highest_but_full;
+  float hot_low = facts.hot_low;
+  float hot_high = facts.hot_high;
   float nearest_zero = facts.nearest_zero;
   std::uint32_t zero = 0;
   std::uint32_t full = 0;
@@ -30,6 +36,8 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   std::uint32_t hundredths = 0;
   std::uint32_t hot = 0;
   std::uint32_t cold = 0;
+  std::uint32_t large = 0;
+  std::uint32_t fraction = 0;
   for (const float c : celsius) {
     lowest = c < lowest ? c : lowest;
     highest = c > highest ? c : highest;
@@ -42,6 +50,17 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
     hundredths += static_cast<std::uint32_t>(c >= 20'000.0F) & static_cast<std::uint32_t>(c < 40'000.0F);
     hot += static_cast<std::uint32_t>(c > 3000.0F);
     cold += static_cast<std::uint32_t>(c < -100.0F);
+    const float size = std::abs(c);
+    large += static_cast<std::uint32_t>(size >= 150.0F) & static_cast<std::uint32_t>(size <= kMostHundredths);
+    const float kept = c < kLeastHundredths ? kLeastHundredths : c > kMostHundredths ? kMostHundredths : c;
+    fraction += static_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept)) != kept);
+    const float counted = c == 65'535.0F ? -kBeyond : c;
+    highest_but_full = counted > highest_but_full ? counted : highest_but_full;
+    const bool is_hot = (c > 3000.0F) & (c <= kMostHundredths);
+    const float hot_or_high = is_hot ? c : kBeyond;
+    const float hot_or_low = is_hot ? c : -kBeyond;
+    hot_low = hot_or_high < hot_low ? hot_or_high : hot_low;
+    hot_high = hot_or_low > hot_high ? hot_or_low : hot_high;
   }
   facts.finite_count += celsius.size();
   facts.lowest = lowest;
@@ -54,6 +73,11 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   facts.centikelvin_like_count += hundredths;
   facts.too_hot_count += hot;
   facts.too_cold_count += cold;
+  facts.large_count += large;
+  facts.fraction_count += fraction;
+  facts.highest_but_full = highest_but_full;
+  facts.hot_low = hot_low;
+  facts.hot_high = hot_high;
 }
 
 }  // namespace
@@ -91,6 +115,10 @@ float TemperatureConversion::converted(double value, TemperatureFacts& facts) co
   }
   if (scaled < -kFloatMax || static_cast<float>(scaled) <= kAbsoluteZeroCelsius) {
     ++facts.impossible_count;
+    if (scaled >= static_cast<double>(kLeastHundredths)) {
+      facts.cold_low = std::min(facts.cold_low, static_cast<float>(scaled));
+      facts.cold_high = std::max(facts.cold_high, static_cast<float>(scaled));
+    }
     return kNone;
   }
   const float celsius = rounded(scaled);

@@ -31,6 +31,17 @@ struct TemperatureFacts {
   std::uint64_t centikelvin_like_count = 0;   ///< 20000 to 40000.
   std::uint64_t too_hot_count = 0;            ///< Above 3000.
   std::uint64_t too_cold_count = 0;           ///< Below -100.
+
+  // Which may be hundredths or tenths of a degree.
+  std::uint64_t fraction_count = 0;                                  ///< Not whole, of those from -10000 to 12000.
+  std::uint64_t large_count = 0;                                     ///< 150 to 12000 away from 0.
+  float highest_but_full = -std::numeric_limits<float>::infinity();  ///< Of those that are not 65535.
+  /// Of those above 3000, up to 12000.
+  float hot_low = std::numeric_limits<float>::infinity();
+  float hot_high = -std::numeric_limits<float>::infinity();
+  /// Of the impossible ones, down to -10000.
+  float cold_low = std::numeric_limits<float>::infinity();
+  float cold_high = -std::numeric_limits<float>::infinity();
 };
 
 /// Turns the numbers of a file into temperatures in degC: NaN where nothing was measured, +inf and -inf where the sensor

@@ -1,0 +1,75 @@
+// Which unit temperatures may be in that are hard to believe as degrees Celsius.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "loaded.hpp"
+
+namespace spectra::files {
+namespace {
+
+using test::kXyz;
+using test::loaded;
+using test::note_text;
+
+/// What is said of `count` values from `low` on in even steps, then of the others.
+std::string said(std::string_view type, double low, double step, int count,
+                 const std::vector<std::string>& others = {}) {
+  std::string body;
+  for (int i = 0; i < count; ++i) body += std::to_string(i) + " 0 0 " + std::to_string(low + step * i) + "\n";
+  for (const std::string& other : others) body += "0 1 0 " + other + "\n";
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex " +
+                           std::to_string(static_cast<std::size_t>(count) + others.size()) + "\n" + std::string(kXyz) +
+                           "property " + std::string(type) + " temperature\nend_header\n";
+  return note_text(loaded(head + body), "implausible_temperatures");
+}
+
+void expect_in(const std::string& part, const std::string& text) {
+  EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
+}
+
+TEST(TemperatureDoubt, SeveralJustAboveWhatCanBeAreHundredthsAndNoMissingOnes) {
+  for (const char* type : {"short", "int", "float", "double"}) {
+    for (const std::vector<std::string>& warm :
+         {std::vector<std::string>{"3601", "3644", "3620"}, {"3001", "3100"}, {"4400", "4500", "3100"}}) {
+      const std::string text = said(type, 1800, 6, 100, warm);
+      expect_in("hundredths of a degree (18 to ", text);
+      expect_in("--temperature-scale 0.01", text);
+      EXPECT_EQ(text.find("no-data"), std::string::npos) << text;
+    }
+  }
+  // Means of hundredths are not whole.
+  expect_in("hundredths of a degree", said("float", 1800.5, 6.25, 100, {"3601.5", "3644.25"}));
+  expect_in("hundredths of a degree (5 to 59.45 degC): --temperature-scale 0.01, or like counts of a sensor",
+            said("int", 500, 55, 100));
+  // One value that stands alone, beside degrees or hundredths.
+  expect_in("--no-data 9999", said("int", 18, 1, 30, {"9999", "9999"}));
+  expect_in("--no-data 9999", said("int", 18, 1, 30, {"9999", "9000"}));
+}
+
+TEST(TemperatureDoubt, SeveralBelowAbsoluteZeroAreHundredths) {
+  for (const char* type : {"short", "float"}) {
+    const std::string text = said(type, -500, 40, 100, {"3590"});
+    expect_in("hundredths of a degree (-5 to 35.9 degC): --temperature-scale 0.01", text);
+    EXPECT_EQ(text.find("no-data"), std::string::npos) << text;
+  }
+  EXPECT_EQ(said("float", 15, 1, 40, {"-9999", "-999", "-9999"}), "");
+}
+
+TEST(TemperatureDoubt, TenthsAreNamedBesideKelvin) {
+  for (const char* type : {"short", "float"}) {
+    expect_in("tenths of a degree (18 to 35.7 degC): --temperature-scale 0.1", said(type, 180, 3, 60));
+    const std::string both = said(type, 200, 2, 60, {"2499"});
+    expect_in("tenths of a degree (20 to 249.9 degC): --temperature-scale 0.1, or like kelvin (-73.15 to 2225.85 degC)",
+              both);
+    expect_in("--temperature-unit kelvin", both);
+  }
+  // No fractions of a kelvin are known to have tenths of a degree; and degrees are degrees.
+  EXPECT_EQ(said("float", 290.05, 0.1, 60).find("tenths"), std::string::npos);
+  EXPECT_EQ(said("short", 18, 3, 60), "");
+}
+
+}  // namespace
+}  // namespace spectra::files
