@@ -47,6 +47,13 @@ base::Result<ScenePair> read_pair(const std::filesystem::path& path, const std::
                              (note == thermal.notes.end() ? "none of its properties can be one" : note->message),
                          thermal.mesh.name);
   }
+  const auto celsius = thermal.mesh.temperature_celsius();
+  if (std::all_of(celsius.begin(), celsius.end(), [](float t) { return std::isnan(t); })) {
+    return base::failure(base::ErrorCode::Unsupported,
+                         thermal.mesh.name + ": the thermal file has no temperature in it: none of its " +
+                             std::to_string(celsius.size()) + " vertices has one",
+                         thermal.mesh.name);
+  }
   BOOST_OUTCOME_TRY(LoadedScene scene, read_ply(path, scene_options));
   base::Result<void> overlap = check_overlap(scene, thermal);
   if (!overlap && options.scale() != 1) {
@@ -58,12 +65,13 @@ base::Result<ScenePair> read_pair(const std::filesystem::path& path, const std::
     ReadOptions unscaled = options;
     unscaled.metres_per_unit = 1;
     BOOST_OUTCOME_TRY(LoadedScene thermal_as_it_is, read_ply(thermal_path, unscaled));
-    if (check_overlap(scene, thermal_as_it_is)) {
+    if (check_overlap(scene, thermal_as_it_is) && sizes_agree(scene, thermal_as_it_is)) {
       tell(scene, scene.mesh.name, thermal.mesh.name);
       return ScenePair{std::move(scene), std::move(thermal_as_it_is)};
     }
-    BOOST_OUTCOME_TRY(LoadedScene scene_as_it_is, read_ply(path));
-    if (check_overlap(scene_as_it_is, thermal)) {
+    scene_options.metres_per_unit = 1;
+    BOOST_OUTCOME_TRY(LoadedScene scene_as_it_is, read_ply(path, scene_options));
+    if (check_overlap(scene_as_it_is, thermal) && sizes_agree(scene_as_it_is, thermal)) {
       tell(scene_as_it_is, thermal.mesh.name, scene.mesh.name);
       return ScenePair{std::move(scene_as_it_is), std::move(thermal)};
     }

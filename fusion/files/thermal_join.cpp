@@ -33,6 +33,10 @@ constexpr double kMostReach = 0.02;
 /// Of an edge: how far the surface may be from the triangles that stand for it.
 constexpr double kCutOff = 0.5;
 constexpr double kLeastShare = 0.1;
+/// Of the scene's diagonal: how far the points of a cloud reach at most.
+constexpr double kMostReachOfPoints = 0.1;
+/// By how much the directions of two boxes of one shape differ.
+constexpr double kSameShape = 0.03;
 
 /// A box in the coordinates of the file.
 struct Box {
@@ -59,22 +63,28 @@ Box core_box(const mesh::MultispectralMesh& mesh) {
   return {absolute(core.min), absolute(core.max)};
 }
 
-/// How many times as large `b` is as `a` when that is so in all directions and the ratio of two units of length.
-std::optional<double> unit_ratio(const Box& a, const Box& b) {
+/// How many times as large `b` is as `a` where it is the same in all directions; absent where it has another shape.
+std::optional<double> ratio_of_same_shape(const Box& a, const Box& b) {
   if (!(a.diagonal() > 0) || !(b.diagonal() > 0)) return std::nullopt;
   constexpr double kFlat = 0.02;
-  constexpr double kSame = 0.03;
+  const double ratio = b.diagonal() / a.diagonal();
+  std::size_t agreeing_count = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (a.extent(axis) < kFlat * a.diagonal() && b.extent(axis) < kFlat * b.diagonal()) continue;
+    if (!(std::abs(b.extent(axis) / (a.extent(axis) * ratio) - 1) < kSameShape)) return std::nullopt;
+    ++agreeing_count;
+  }
+  return agreeing_count > 1 ? std::optional(ratio) : std::nullopt;
+}
+
+/// How many times as large `b` is as `a` when that is so in all directions and the ratio of two units of length.
+std::optional<double> unit_ratio(const Box& a, const Box& b) {
+  const std::optional<double> found = ratio_of_same_shape(a, b);
+  if (!found) return std::nullopt;
   // A million: millimetres beside metres, and the metres scaled as if they were the millimetres.
-  for (const double unit : {1e6, 1000.0, 100.0, 10.0, 1000 / 304.8, 1000 / 25.4, 25.4, 304.8}) {
+  for (const double unit : {1e6, 1000.0, 100.0, 10.0, 1000 / 304.8, 1000 / 25.4, 25.4, 304.8, 12.0, 30.48, 2.54}) {
     for (const double ratio : {unit, 1 / unit}) {
-      std::size_t agreeing_count = 0;
-      bool agrees = std::abs(b.diagonal() / a.diagonal() / ratio - 1) < kSame;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (a.extent(axis) < kFlat * a.diagonal() && b.extent(axis) < kFlat * b.diagonal()) continue;
-        agrees = agrees && std::abs(b.extent(axis) / (a.extent(axis) * ratio) - 1) < kSame;
-        ++agreeing_count;
-      }
-      if (agrees && agreeing_count > 1) return ratio;
+      if (std::abs(*found / ratio - 1) < kSameShape) return ratio;
     }
   }
   return std::nullopt;
@@ -264,8 +274,8 @@ class PlaceJoin {
     // Triangles cut off what is round by a share of their size.
     const double coarser = std::max(spacing_, mesh::median_edge(scene_.positions(), scene_.triangles()));
     const double cut = std::min(kCutOff * coarser, kMostReach * diagonal);
-    const double near =
-        std::max(cut, has_surface ? std::min(kSpacings * spacing_, kLeastReach * diagonal) : kSpacings * spacing_);
+    const double most_of_spacings = (has_surface ? kLeastReach : kMostReachOfPoints) * diagonal;
+    const double near = std::max(cut, std::min(kSpacings * spacing_, most_of_spacings));
     const double most = std::max(near, kMostReach * diagonal);
     look(most);
     std::vector<float> found = found_distances(most);
@@ -387,6 +397,22 @@ std::string percent_text(std::uint64_t part, std::uint64_t whole) {
   return number_text(std::round(percent * 10) / 10) + " %";
 }
 
+/// Whether the thermal file is more than one place of a scene whose vertices take what is within `reach`.
+base::Result<void> check_extent(const LoadedScene& scene, const LoadedScene& thermal, const Box& scene_box,
+                                const Box& thermal_box, double reach) {
+  if (!(scene_box.diagonal() > 0) || thermal_box.diagonal() > reach) return base::success();
+  const std::size_t count = thermal.mesh.vertex_count();
+  const std::string what = count == 1 ? "it has one point only"
+                           : thermal_box.diagonal() == 0
+                               ? "all positions of the thermal file are in one place"
+                               : "it spans only " + base::distance_text(thermal_box.diagonal()) + ", less than the " +
+                                     base::distance_text(reach) +
+                                     " within which places are joined; see --scale if their units differ";
+  return BOOST_OUTCOME_V2_NAMESPACE::failure(no_overlap(
+      scene, thermal,
+      what + " (the scene spans " + range_text(scene_box) + ", the thermal file " + range_text(thermal_box) + ")"));
+}
+
 base::Result<void> join_by_place(const LoadedScene& thermal, double join_distance_m, const Box& scene_box,
                                  const Box& thermal_box, LoadedScene& scene, const base::Progress& progress) {
   mesh::MultispectralMesh& mesh = scene.mesh;
@@ -398,6 +424,7 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
     reach = join.reach(scene_box.diagonal());
   }
   std::vector<float> found = join.found_distances(reach);
+  BOOST_OUTCOME_TRYV(check_extent(scene, thermal, scene_box, thermal_box, join_distance_m == 0 ? reach : 0));
   const std::uint64_t count = mesh.vertex_count();
   const std::uint64_t joined_count = found.size();
   const double share = static_cast<double>(joined_count) / static_cast<double>(count);
@@ -468,6 +495,16 @@ base::Result<void> check_overlap(const LoadedScene& scene, const LoadedScene& th
                        "); bring both into one frame, and see --scale if their units differ"));
   }
   return base::success();
+}
+
+bool sizes_agree(const LoadedScene& scene, const LoadedScene& thermal) {
+  constexpr double kSameSize = 0.1;
+  constexpr double kLeastOfUnits = 2.5;  // an inch has 2.54 centimetres
+  const Box scene_box = core_box(scene.mesh);
+  const Box thermal_box = core_box(thermal.mesh);
+  if (const auto ratio = ratio_of_same_shape(scene_box, thermal_box)) return std::abs(*ratio - 1) < kSameSize;
+  const double ratio = thermal_box.diagonal() / scene_box.diagonal();
+  return ratio < kLeastOfUnits && ratio > 1 / kLeastOfUnits;
 }
 
 base::Result<void> join_thermal(const LoadedScene& thermal, double join_distance_m, LoadedScene& scene,

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "fusion/files/ply_reader.hpp"
@@ -363,6 +364,81 @@ TEST(ThermalJoin, RefusesWhatIsElsewhere) {
                        "end_header\n-1 -1 -2 20\n4 -1 -2 30\n4 4 2 20\n-1 4 2 40\n3 0 1 2\n3 0 2 3\n";
   EXPECT_NE(refusal(square_file(40, 3, 1, {0, 0, -1}, false, true), around).find("vertices have a thermal place"),
             std::string::npos);
+}
+
+TEST(ThermalJoin, ScalesOneFileOnlyWhereTheSizesThenAgree) {
+  const test::TemporaryFolder folder;
+  const auto scaled = [&](double scene_units, double thermal_units, double scale, base::Vec3d shift) {
+    ReadOptions options;
+    options.metres_per_unit = scale;
+    return read_ply_with_thermal(folder.write("v.ply", square_file(12, 3, scene_units, shift, false, true)),
+                                 folder.write("t.ply", square_file(14, 3, thermal_units, shift, true, false)), options);
+  };
+  for (const double far : {0.0, 412345.0}) {
+    for (const auto& [scene_units, thermal_units, of] :
+         {std::tuple{1000.0, 1.0, "taken for v.ply alone"}, std::tuple{1.0, 1000.0, "taken for t.ply alone"}}) {
+      const auto one = scaled(scene_units, thermal_units, 0.001, {far, far, 0});
+      ASSERT_TRUE(one) << one.error().message;
+      EXPECT_NE(note_text(one.value(), "scaled_one_file").find(of), std::string::npos);
+      EXPECT_GT(note_count(one.value(), "thermal_joined_nearest"), 140U);
+    }
+    // Of neither is 0.001 the unit, and whichever is scaled alone, they are a thousand times apart or more.
+    for (const auto& [scene_units, thermal_units, larger] :
+         {std::tuple{100.0, 1000.0, "t.ply is 10 times"}, std::tuple{1000.0, 100.0, "v.ply is 10 times"}}) {
+      for (const double wrong : {0.001, 0.0254, 0.05, 0.3048}) {
+        const auto scene = scaled(scene_units, thermal_units, wrong, {far, far, 0});
+        ASSERT_FALSE(scene) << wrong;
+        EXPECT_EQ(scene.error().code, base::ErrorCode::Unsupported);
+        EXPECT_NE(scene.error().message.find(larger), std::string::npos) << scene.error().message;
+        EXPECT_NE(scene.error().message.find("--scale"), std::string::npos);
+      }
+    }
+  }
+  EXPECT_NE(refusal(square_file(12, 3, 100, {}, false, true), square_file(12, 3, 1 / 0.0254, {}, true, false))
+                .find("v.ply is 2.54 times"),
+            std::string::npos);
+}
+
+TEST(ThermalJoin, PointsOfACloudReachATenthOfTheSceneAtMost) {
+  const auto scene = joined(square_file(12, 1, 1, {}, false, true), square_file(4, 3, 1, {}, true, false));
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto& mesh = scene.value().mesh;
+  for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const base::Vec3f& p = mesh.positions()[v];
+    // Points 1 m apart, of which the scene holds four at its corners, but for their height.
+    const bool is_near = std::hypot(std::min(p.x, 1 - p.x), std::min(p.y, 1 - p.y)) < 0.15F;
+    EXPECT_TRUE(is_near || std::isnan(mesh.temperature_celsius()[v])) << v;
+  }
+}
+
+TEST(ThermalJoin, RefusesWhatIsAllInOnePlace) {
+  const std::string scene = square_file(36, 3, 1, {}, false, true);
+  const auto in_one_place = [](int count, const std::string& place) {
+    std::string lines;
+    for (int i = 0; i < count; ++i) lines += place + " 20\n";
+    return thermal_file(lines, count);
+  };
+  for (const char* const place : {"0 0 0", "1 1 0.1"}) {
+    EXPECT_NE(refusal(scene, in_one_place(1296, place)).find("all positions of the thermal file are in one place"),
+              std::string::npos);
+    EXPECT_NE(refusal(scene, in_one_place(7, place)).find("in one place"), std::string::npos);
+    EXPECT_NE(refusal(scene, in_one_place(1, place)).find("one point only"), std::string::npos);
+  }
+  // Of 0.1 m, where the vertices are 0.09 m apart, it is a patch; of 5 mm it is not.
+  EXPECT_EQ(refusal(scene, square_file(8, 0.1, 1, {}, true, true)), "not refused");
+  const std::string message = refusal(scene, square_file(8, 0.005, 1, {}, true, true));
+  EXPECT_NE(message.find("it spans only"), std::string::npos) << message;
+  EXPECT_NE(message.find("--scale"), std::string::npos) << message;
+  const auto told = joined(scene, square_file(8, 0.005, 1, {}, true, true), 0.2);
+  ASSERT_TRUE(told) << "whoever tells the distance may";
+  EXPECT_EQ(note_count(told.value(), "thermal_joined_nearest"), 1U);
+}
+
+TEST(ThermalJoin, RefusesAThermalFileWithoutAnyTemperature) {
+  const std::string places = "0 0 0\n1 0 0\n2 0 0\n";
+  EXPECT_EQ(refusal(visible_file(places, 3), thermal_file(visible_with(places, " nan"), 3)),
+            "t.ply: the thermal file has no temperature in it: none of its 3 vertices has one");
+  EXPECT_EQ(refusal(visible_file(places, 3), thermal_file(visible_with(places, " inf"), 3)), "not refused");
 }
 
 TEST(ThermalJoin, TakesAThermalPatchOfALargeScene) {
