@@ -133,7 +133,9 @@ void add_metadata(draco::Mesh& mesh, const DracoFileInput& input, const DracoFil
   mesh.AddAttributeMetadata(temperature_attribute, std::move(temperature));
 }
 
-void count_left_out(const DracoFileInput& input, DracoFile& file) {
+/// Where the vertices of a shape are; those that are of no triangle, which are left out, lie where another one is: they make the lattice no
+/// larger. Counts what is left out.
+std::vector<std::array<float, 3>> positions_of_shape(const DracoFileInput& input, DracoFile& file) {
   std::vector<bool> is_used(input.positions_m.size());
   for (const auto& [a, b, c] : input.triangles) {
     if (a == b || b == c || c == a) {
@@ -143,6 +145,14 @@ void count_left_out(const DracoFileInput& input, DracoFile& file) {
     }
   }
   file.left_out_vertex_count = static_cast<std::uint64_t>(std::count(is_used.begin(), is_used.end(), false));
+  std::vector<std::array<float, 3>> positions(input.positions_m.begin(), input.positions_m.end());
+  const auto used = std::find(is_used.begin(), is_used.end(), true);
+  if (used == is_used.end()) return positions;
+  const std::array<float, 3> place = positions[static_cast<std::size_t>(used - is_used.begin())];
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (!is_used[v]) positions[v] = place;
+  }
+  return positions;
 }
 
 Result<void> check(const DracoFileInput& input, DracoKeeping keeping, int speed) {
@@ -152,8 +162,8 @@ Result<void> check(const DracoFileInput& input, DracoKeeping keeping, int speed)
   if (input.colours.size() != vertex_count) return internal("not one colour per vertex");
   if (!input.temperature_celsius.empty() && input.temperature_celsius.size() != vertex_count)
     return internal("not one temperature per vertex");
-  if (keeping != DracoKeeping::Everything && !(input.position_step_m > 0))
-    return internal("the position step is not a positive length");
+  if (keeping != DracoKeeping::Everything && !(input.position_step_m >= 0))
+    return internal("the position step is no length");
   if (speed < 0 || speed > 10) return internal("speed " + std::to_string(speed) + " is not within 0..10");
   for (const TileTriangle& triangle : input.triangles)
     for (const std::uint32_t vertex : triangle)
@@ -182,10 +192,10 @@ bool has_crowded_edge(std::size_t vertex_count, std::span<const TileTriangle> tr
   return false;
 }
 
-int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
+int encoding_method(bool is_point_cloud, DracoKeeping keeping, bool has_lattice) {
   if (is_point_cloud)
-    return keeping == DracoKeeping::Shape ? draco::POINT_CLOUD_KD_TREE_ENCODING
-                                          : draco::POINT_CLOUD_SEQUENTIAL_ENCODING;
+    return keeping == DracoKeeping::Shape && has_lattice ? draco::POINT_CLOUD_KD_TREE_ENCODING
+                                                         : draco::POINT_CLOUD_SEQUENTIAL_ENCODING;
   return keeping == DracoKeeping::Shape ? draco::MESH_EDGEBREAKER_ENCODING : draco::MESH_SEQUENTIAL_ENCODING;
 }
 
@@ -208,10 +218,16 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   const auto add_temperatures = [&](std::span<const float> values) {
     return add_attribute<float>(mesh, draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 1, false, values);
   };
-  if (is_exact) {
-    add_positions(input.positions_m);
+  const bool is_point_cloud = input.triangles.empty();
+  const bool is_shape = !is_point_cloud && keeping == DracoKeeping::Shape;
+  const bool has_lattice = !is_exact && input.position_step_m > 0;
+  std::vector<std::array<float, 3>> of_shape;
+  if (is_shape) of_shape = positions_of_shape(input, file);
+  const std::span<const std::array<float, 3>> positions_m = is_shape ? of_shape : input.positions_m;
+  if (!has_lattice) {
+    add_positions(positions_m);
   } else {
-    const auto lattice = quantised_positions(input.positions_m, input.position_step_m);
+    const auto lattice = quantised_positions(positions_m, input.position_step_m);
     if (!lattice) return internal("the scene is too large for its position step");
     options.SetAttributeOptions(add_positions(lattice->values),
                                 quantisation_options(lattice->origin, lattice->largest, lattice->step));
@@ -226,7 +242,6 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
     options.SetAttributeOptions(temperature_attribute,
                                 quantisation_options({&lattice.origin, 1}, lattice.largest, lattice.step));
   }
-  const bool is_point_cloud = input.triangles.empty();
   if (!is_point_cloud && keeping != DracoKeeping::Shape) {
     const std::uint64_t fewest = (input.positions_m.size() + 2) / 3;
     file.added_triangle_count = std::max<std::uint64_t>(fewest, input.triangles.size()) - input.triangles.size();
@@ -242,13 +257,12 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   draco::ExpertEncoder encoder =
       is_point_cloud ? draco::ExpertEncoder(static_cast<const draco::PointCloud&>(mesh)) : draco::ExpertEncoder(mesh);
   encoder.Reset(options);
-  encoder.SetEncodingMethod(encoding_method(is_point_cloud, keeping));
+  encoder.SetEncodingMethod(encoding_method(is_point_cloud, keeping, has_lattice));
   encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;
   if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())
     return internal("not encoded: " + status.error_msg_string());
-  if (!is_point_cloud && keeping == DracoKeeping::Shape) {
-    count_left_out(input, file);
+  if (is_shape) {
     if (encoder.num_encoded_faces() + file.left_out_triangle_count != input.triangles.size())
       return internal("triangles were lost");
     file.split_vertex_count = encoder.num_encoded_points() + file.left_out_vertex_count - input.positions_m.size();

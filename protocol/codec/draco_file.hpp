@@ -24,7 +24,8 @@ struct DracoFileInput {
   std::span<const float> temperature_celsius;  ///< Empty: none. NaN: missing. Infinite: beyond what was measurable.
   std::span<const TileTriangle> triangles;     ///< Empty: point cloud.
   std::array<double, 3> origin_m{};
-  float position_step_m = 0;  ///< A lattice step as encoded_geometry() takes it; no meaning with Everything.
+  /// A lattice step as encoded_geometry() takes it; 0: positions as they are. No meaning with Everything.
+  float position_step_m = 0;
 };
 
 /// One Draco stream and what it has lost.
@@ -49,7 +50,7 @@ inline constexpr float kDracoTemperatureStepCelsius = 1.0F / 64;
 
 /// Attributes: POSITION (float, metres), COLOR (3 bytes, sRGB), GENERIC (float, degC) with the metadata name
 /// "temperature", unit "degC", step, missing, over_range and under_range; metadata of the whole: origin_m and
-/// position_step_m. Decoded values are within half a step of those that went in. `speed` 0 (smallest) .. 10 (fastest).
+/// position_step_m, if there is one. Decoded values are within half a step of those that went in. `speed` 0 (smallest) .. 10 (fastest).
 /// A decoder takes no more than three vertices for every triangle of a mesh whose order is kept: where there are too few,
 /// triangles that name the first vertex three times follow. InternalError for arrays that do not belong together.
 Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed);

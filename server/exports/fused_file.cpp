@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "fusion/base/box.hpp"
 #include "fusion/files/glb_file.hpp"
 #include "fusion/files/output_file.hpp"
 #include "fusion/files/ply_writer.hpp"
@@ -46,6 +47,9 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
   add("under_range_written", file.under_range_count,
       fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
                   file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
+  add("no_lattice", options.position_step_m > 0 ? 0 : 1,
+      "In the file positions are floats, which makes it larger: the scene reaches too far for one lattice of its own "
+      "step");
   if (options.keeping == protocol::codec::DracoKeeping::Order) return losses;
   losses.push_back({"vertex_order", 0,
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
@@ -182,7 +186,17 @@ base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::Multisp
       for (const std::uint32_t v : triangle) round(v);
     }
   }
-  options.position_step_m = stream::one_step_for_all(finest_m, scene.bounds());
+  // Of what is written.
+  std::vector<base::Vec3f> written;
+  if (options.keeping == protocol::codec::DracoKeeping::Shape && !mesh.triangles().empty()) {
+    for (const auto& [a, b, c] : mesh.triangles()) {
+      if (a != b && b != c && c != a) written.insert(written.end(), {positions[a], positions[b], positions[c]});
+    }
+  } else {
+    written.assign(positions.begin(), positions.end());
+  }
+  const float step_m = stream::one_step_for_all(finest_m, base::bounds_of(written));
+  options.position_step_m = step_m <= usual_step_m ? step_m : 0;
   options.largest_position_step_m = std::max(options.largest_position_step_m, options.position_step_m);
   return base::success();
 }

@@ -40,7 +40,7 @@ struct SceneFileOptions {
   SceneFileFormat format = SceneFileFormat::Ply;
   protocol::codec::DracoKeeping keeping =
       protocol::codec::DracoKeeping::Shape;  ///< Of a Draco file; the others keep everything.
-  float position_step_m = 0;                 ///< Of a Draco file that does not keep everything.
+  float position_step_m = 0;                 ///< Of a Draco file that does not keep everything; 0: it has no lattice.
   float largest_position_step_m = 0;         ///< The step of those vertices that are rounded most.
 };
 
@@ -64,7 +64,8 @@ base::Result<std::vector<files::Note>> write_scene_file(const std::filesystem::p
                                                         const base::Progress& progress = {});
 
 /// Rounds the whole mesh of a scene for a Draco file that does not keep everything, as the scene is streamed: each vertex as finely
-/// as its surroundings need. Sets the options' steps; the file's is the finest, doubled until all of the scene fits on it.
+/// as its surroundings need. Sets the options' steps; the file's is the finest, doubled until all that is written fits on it, or none (0) where it would have to be
+/// coarser than the scene's.
 base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::MultispectralMesh& mesh,
                                   SceneFileOptions& options);
 

@@ -302,7 +302,7 @@ TEST(DracoFile, RefusesArraysThatDoNotMatch) {
   scene = numbered({{0, 0, 0}, {1, 0, 0}}, {{0, 1, 2}});
   EXPECT_TRUE(draco_file(scene.input(1), DracoKeeping::Shape, 7).has_error());
   scene = numbered({{0, 0, 0}, {1, 0, 0}}, {});
-  EXPECT_TRUE(draco_file(scene.input(0), DracoKeeping::Shape, 7).has_error());
+  EXPECT_TRUE(draco_file(scene.input(-1), DracoKeeping::Shape, 7).has_error());
 }
 
 TEST(DracoFile, WithAnEdgeOfVeryManyTrianglesKeepsEveryOne) {
@@ -324,6 +324,30 @@ TEST(DracoFile, RefusesASceneThatIsTooLargeForItsStep) {
     const auto file = draco_file(scene.input(0.01F), DracoKeeping::Shape, 5);
     ASSERT_FALSE(file) << far;
     EXPECT_NE(file.error().message.find("too large for its position step"), std::string::npos);
+  }
+}
+
+TEST(DracoFile, OfAShapeIsRoundedByWhatIsInIt) {
+  // The far one is of no triangle.
+  const Scene scene = numbered({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5e5F, 4e6F, 0}}, {{0, 1, 2}});
+  const auto file = draco_file(scene.input(0.0009765625F), DracoKeeping::Shape, 5);
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file.value().left_out_vertex_count, 1U);
+  EXPECT_EQ(decoded(file.value().bytes).positions.size(), 3U);
+}
+
+TEST(DracoFile, WithoutAStepHasPositionsAsTheyAre) {
+  const Scene mesh = numbered({{0, 0, 0}, {1e-5F, 0, 0}, {0, 1e-5F, 4e6F}}, {{0, 1, 2}});
+  Scene cloud = mesh;
+  cloud.triangles.clear();
+  for (const Scene& scene : {mesh, cloud}) {
+    for (const DracoKeeping keeping : {DracoKeeping::Shape, DracoKeeping::Order}) {
+      const auto file = draco_file(scene.input(0), keeping, 5);
+      ASSERT_TRUE(file) << file.error().message;
+      const Decoded seen = decoded(file.value().bytes);
+      EXPECT_EQ(std::set(seen.positions.begin(), seen.positions.end()),
+                std::set(scene.positions.begin(), scene.positions.end()));
+    }
   }
 }
 

@@ -200,6 +200,41 @@ TEST(RoundForFile, MovesEveryVertexByItsStepAtMostInAMapOfSeveralBlocks) {
   EXPECT_LT(options.largest_position_step_m, 1);
 }
 
+/// A patch of a few centimetres, and a vertex hundreds of kilometres from it, of no triangle.
+mesh::MultispectralMesh patch_with_a_stray(bool is_cloud) {
+  constexpr std::uint32_t kSide = 12;
+  mesh::MultispectralMesh mesh;
+  mesh.has_visible = true;
+  mesh.resize_vertices(kSide * kSide + 1);
+  for (std::uint32_t v = 0; v < kSide * kSide; ++v)
+    mesh.positions()[v] = {0.01F * static_cast<float>(v % kSide), 0.01F * static_cast<float>(v / kSide), 0};
+  mesh.positions()[kSide * kSide] = {-500'000, -4'000'000, 0};
+  for (std::uint32_t v = 0; !is_cloud && v + kSide < kSide * kSide; ++v) {
+    if (v % kSide + 1 < kSide) mesh.triangles().push_back({v, v + 1, v + kSide});
+  }
+  return mesh;
+}
+
+TEST(RoundForFile, KeepsTheFormBesideAVertexFarAway) {
+  jobs::WorkerPool pool(1);
+  for (const bool is_cloud : {false, true}) {
+    for (const auto keeping : {protocol::codec::DracoKeeping::Shape, protocol::codec::DracoKeeping::Order}) {
+      const auto scene = map::SceneSnapshot::build(patch_with_a_stray(is_cloud), 1, pool);
+      auto rounded = patch_with_a_stray(is_cloud);
+      SceneFileOptions options{.format = SceneFileFormat::Draco, .keeping = keeping};
+      ASSERT_TRUE(round_for_file(*scene, rounded, options));
+      EXPECT_EQ(options.position_step_m > 0, keeping == protocol::codec::DracoKeeping::Shape && !is_cloud);
+      EXPECT_LT(options.position_step_m, 0.003F);
+      // A cloud's stray is drawn, and its tile reaches as far.
+      if (!is_cloud) {
+        EXPECT_LT(options.largest_position_step_m, 0.005F);
+      }
+      const auto file = scene_file(rounded, std::vector<base::Rgb8>(rounded.vertex_count()), options);
+      ASSERT_TRUE(file) << file.error().message;
+    }
+  }
+}
+
 TEST(TemperatureOfMesh, LeavesMissingValuesOut) {
   const auto mesh = two_triangles();
   const auto temperature = temperature_of(mesh);
