@@ -54,6 +54,27 @@ std::vector<std::string_view> words_of(std::string_view line) {
   return words;
 }
 
+/// The bytes of the UTF-8 character that the text begins with; 0 when it is none, or one that a terminal obeys or that turns
+/// the text beside it round.
+std::size_t visible_character_bytes(std::string_view text) {
+  const auto byte = [text](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(text[i])); };
+  const std::uint32_t first = byte(0);
+  if (first < 0x80U) return first >= ' ' && first <= '~' ? 1 : 0;
+  const std::size_t size = first >= 0xF0U ? 4 : first >= 0xE0U ? 3 : 2;
+  if (first < 0xC2U || first > 0xF4U || text.size() < size) return 0;
+  std::uint32_t code = first & (0x7FU >> size);
+  for (std::size_t i = 1; i < size; ++i) {
+    if ((byte(i) & 0xC0U) != 0x80U) return 0;
+    code = code << 6U | (byte(i) & 0x3FU);
+  }
+  constexpr std::array<std::uint32_t, 5> kLeast = {0, 0, 0x80, 0x800, 0x10000};
+  const bool is_well_formed = code >= kLeast[size] && code <= 0x10FFFFU && (code < 0xD800U || code > 0xDFFFU);
+  const bool is_control = code < 0xA0U || (code >= 0x200BU && code <= 0x200FU) ||
+                          (code >= 0x2028U && code <= 0x202EU) || (code >= 0x2060U && code <= 0x206FU) ||
+                          code == 0xFEFFU;
+  return is_well_formed && !is_control ? size : 0;
+}
+
 class HeaderParser {
  public:
   explicit HeaderParser(std::string_view text) : text_(text) {}
@@ -221,8 +242,12 @@ std::string lower_case(std::string_view text) {
 std::string printable(std::string_view name) {
   constexpr std::size_t kMaxShown = 40;
   std::string shown;
-  for (const char c : name.substr(0, kMaxShown)) shown += c >= ' ' && c <= '~' ? c : '?';
-  if (name.size() > kMaxShown) shown += "...";
+  for (std::size_t count = 0; !name.empty() && count < kMaxShown; ++count) {
+    const std::size_t size = visible_character_bytes(name);
+    shown += size > 0 ? name.substr(0, size) : "?";
+    name.remove_prefix(std::max<std::size_t>(1, size));
+  }
+  if (!name.empty()) shown += "...";
   return shown;
 }
 

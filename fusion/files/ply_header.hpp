@@ -58,7 +58,7 @@ base::Result<PlyHeader> parse_ply_header(std::string_view text);
 /// A word in lower case; ASCII only.
 std::string lower_case(std::string_view text);
 
-/// A name from a file for a message: short, and without anything that a terminal would obey.
+/// A name from a file for a message, in UTF-8: short, and with '?' for what is no UTF-8 or what a terminal would obey.
 std::string printable(std::string_view name);
 
 /// The fewest bytes that the element's entries can take in the body, each; for ascii with its separators.

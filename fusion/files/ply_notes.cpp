@@ -261,14 +261,14 @@ class Notes {
     if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
       look(*faces, schema_.face);
     }
-    if (text.empty() && (schema_.is_temperature_doubtful || names.empty())) text = about_bare_t(names);
+    if (text.empty()) text = about_bare_t(names);
     if (text.empty() && names.empty()) return;
     if (text.empty()) text = "No property is called a temperature";
     if (!names.empty()) text += "; --temperature-property NAME takes one of: " + joined(names);
     add("no_temperature", std::max<std::size_t>(1, names.size()), text);
   }
 
-  /// Why a bare t is no temperature; adds it to the names where it may be one nevertheless.
+  /// Why a bare t is no temperature; puts it before the names where it may be one nevertheless.
   std::string about_bare_t(std::vector<std::string>& names) const {
     const auto is_bare_t = [](const PlyProperty& one) { return !one.is_list && temperature_name(one.name).is_bare_t; };
     const auto speaks_against = [](const PlyProperty& one) { return temperature_name(one.name).speaks_against_t; };
@@ -277,19 +277,19 @@ class Notes {
     if (t == properties.end()) return {};
     const auto other = std::find_if(properties.begin(), properties.end(), speaks_against);
     std::string reason;
-    bool may_be_one = names.empty();
+    bool may_be_one = true;
     if (schema_.is_temperature_doubtful) {
       // No sensor of temperatures counts further.
       constexpr double kMostCounts = 65'535;
-      may_be_one = may_be_one && survey_.most_doubtful <= kMostCounts;
+      may_be_one = survey_.most_doubtful <= kMostCounts;
       reason = "its values (" + number_text(survey_.least_doubtful) + " to " + number_text(survey_.most_doubtful) + ")";
     } else if (other != properties.end()) {
       reason = "'" + printable(other->name) + "' beside it";
     } else {
-      may_be_one = may_be_one && size_bytes(t->type) < 4;
+      may_be_one = size_bytes(t->type) < 4;
       reason = "its type, " + std::string(to_string(t->type)) + ": whole numbers of that name count time";
     }
-    if (may_be_one) names.push_back(t->name);
+    if (may_be_one) names.insert(names.begin(), t->name);
     return "'" + printable(t->name) + "' is not taken for a temperature, because of " + reason;
   }
 

@@ -51,11 +51,12 @@ constexpr std::array<std::string_view, 9> kAgainstT = {"u",    "v",     "s",    
                                                        "ring", "stamp", "gpstime", "texture"};
 
 /// Words of properties that are known to be something else.
-constexpr std::array<std::string_view, 39> kOthers = {
-    "x",        "y",     "z",     "nx",      "ny",      "nz",  "normal",    "normals", "red",       "green",
-    "blue",     "alpha", "rgb",   "rgba",    "r",       "g",   "b",         "a",       "diffuse",   "ambient",
-    "specular", "u",     "v",     "s",       "texture", "tex", "texnumber", "time",    "timestamp", "ring",
-    "flags",    "id",    "label", "opacity", "scale",   "rot", "rest",      "dc",      "t"};
+constexpr std::array<std::string_view, 50> kOthers = {
+    "x",        "y",       "z",     "nx",      "ny",      "nz",      "normal",    "normals", "red",       "green",
+    "blue",     "alpha",   "rgb",   "rgba",    "r",       "g",       "b",         "a",       "diffuse",   "ambient",
+    "specular", "u",       "v",     "s",       "texture", "tex",     "texnumber", "time",    "timestamp", "ring",
+    "flags",    "id",      "label", "opacity", "scale",   "rot",     "rest",      "dc",      "t",         "stamp",
+    "times",    "gpstime", "sec",   "secs",    "second",  "seconds", "nanosec",   "nsec",    "ns",        "epoch"};
 
 bool has(std::span<const std::string_view> words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();

@@ -471,6 +471,16 @@ TEST(FieldKinds, WhatIsNotTakenForATemperatureIsSaidWithTheTrueReason) {
   EXPECT_NE(said("property float t\nproperty float GPS_time\n", "20 7").find("because of 'GPS_time' beside it"),
             std::string::npos);
   EXPECT_EQ(said("property float time\n", "20"), "");
+  EXPECT_EQ(
+      said("property float stamp\nproperty float t\n", "0.5 20"),
+      "'t' is not taken for a temperature, because of 'stamp' beside it; --temperature-property NAME takes one of: t");
+  EXPECT_EQ(
+      said("property float stamp\nproperty float quality\nproperty float t\n", "0.5 1 20"),
+      "'t' is not taken for a temperature, because of 'stamp' beside it; --temperature-property NAME takes one of: t, "
+      "quality");
+  EXPECT_EQ(said("property uint t\nproperty float quality\n", "20 1"),
+            "'t' is not taken for a temperature, because of its type, uint: whole numbers of that name count time; "
+            "--temperature-property NAME takes one of: quality");
 }
 
 TEST(FieldKinds, ANameThatTheValuesContradictIsNotCalledTheirLook) {

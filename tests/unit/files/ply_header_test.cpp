@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "loaded.hpp"
+
 namespace spectra::files {
 namespace {
 
@@ -84,6 +86,25 @@ TEST(PlyHeader, TellsPropertiesOfOneNameApart) {
   std::string many = head;
   for (int i = 0; i < 200; ++i) many += "property int i\n";
   EXPECT_FALSE(parse_ply_header(many + "end_header\n"));
+}
+
+TEST(PlyHeader, NamesAreShownAsTheyAreUnlessTheyCannotBe) {
+  for (const char* name : {"temperature", "W\u00e4rme", "\u6e29\u5ea6", "\u2603 \U0001f321", "temp [\u00b0C]"}) {
+    EXPECT_EQ(printable(name), name);
+  }
+  EXPECT_EQ(printable("a\x1b[31m\r\n\x7f\t"), "a?[31m????");
+  EXPECT_EQ(printable("W\xe4rme"), "W?rme");                            // Latin-1
+  EXPECT_EQ(printable("\xc0\xaf|\xed\xa0\x80|\xe6\xb8"), "??|???|??");  // Overlong, half a pair, cut short.
+  EXPECT_EQ(printable("\xf4\x90\x80\x80|\xf5|\x80"), "????|?|?");
+  EXPECT_EQ(printable("a\u009bb\u202ec\u2028d"), "a??b???c???d");  // They move a terminal or turn a line round.
+  std::string forty;
+  for (int i = 0; i < 40; ++i) forty += "\u6e29";
+  EXPECT_EQ(printable(forty), forty);
+  EXPECT_EQ(printable(forty + "\u6e29"), forty + "...");
+  const auto unknown =
+      test::read_bytes("ply\nformat ascii 1.0\nelement vertex 1\nproperty float \u6e29\u5ea6\nend_header\n1\n");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().message.find("(it has \u6e29\u5ea6)"), std::string::npos) << unknown.error().message;
 }
 
 TEST(PlyHeader, IsBoundedInSize) {
