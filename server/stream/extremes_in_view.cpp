@@ -254,8 +254,8 @@ ExtremesInView extremes_in_view(const map::SceneSnapshot& scene, const Camera& c
       if (point.depth < eye.near()) continue;
       const Place place = eye.place(point);
       if (!eye.is_inside(place)) continue;
-      const double front = 1 / map.nearness_around(place);
-      if (point.depth - point.depth / eye.pixels_per_tangent() > front) continue;
+      const double nearness = map.nearness_around(place);  // 0 where nothing is drawn.
+      if (nearness > 0 && point.depth - point.depth / eye.pixels_per_tangent() > 1 / nearness) continue;
       choices.offer(*tile, i, scene.vertex_index(*tile, i));
     }
   }
