@@ -203,6 +203,7 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     facts_.is_finer_than_declared = facts_.is_finer_than_declared || (origin[axis] != 0 && has_more_digits_[axis]);
   }
+  facts_.shared_coordinate = sample_.shared_coordinate();
   if (interpretation_.hole) return;
   facts_.hole = sample_.coordinate_hole();
   const auto& hole = sample_.hole();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fusion/base/distance_text.hpp"
+#include "fusion/files/colour_names.hpp"
 #include "fusion/files/ply_values.hpp"
 #include "fusion/files/scene_origin.hpp"
 #include "fusion/files/temperature_doubt.hpp"
@@ -42,10 +43,20 @@ std::vector<std::string> unused_names(const PlyElement& element, const PlySlots&
 }
 
 /// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
-constexpr std::array<std::string_view, 12> kNeedAttention = {
-    "hole_vertices",     "crowded_place",  "rounded_positions", "coarse_positions",         "clamped_colours",
-    "texture",           "unused_options", "no_temperature",    "implausible_temperatures", "absurd_times",
-    "crossing_polygons", "large_polygons"};
+constexpr std::array<std::string_view, 14> kNeedAttention = {"hole_vertices",
+                                                             "crowded_place",
+                                                             "shared_coordinate",
+                                                             "rounded_positions",
+                                                             "coarse_positions",
+                                                             "clamped_colours",
+                                                             "texture",
+                                                             "unused_options",
+                                                             "no_temperature",
+                                                             "no_colours",
+                                                             "implausible_temperatures",
+                                                             "absurd_times",
+                                                             "crossing_polygons",
+                                                             "large_polygons"};
 
 class Notes {
  public:
@@ -103,6 +114,14 @@ class Notes {
                    : ", among the others, so that they are kept; where they stand for holes, write nan or 0 0 0 "
                      "there"));
     }
+    if (facts_.shared_coordinate) {
+      constexpr double kPercent = 100;
+      const auto& [as_hole, share] = *facts_.shared_coordinate;
+      add("shared_coordinate", 1,
+          short_number(std::max(0.1, std::round(10 * kPercent * share) / 10)) + " % of the vertices share " +
+              axis_text(as_hole, " = ") +
+              ", far from all others, and are kept; where they stand for holes, write nan or -9999 there");
+    }
     add("left_out_faces", facts_.faces.left_out_face_count,
         counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
     about_rounding();
@@ -111,9 +130,12 @@ class Notes {
   /// What tells the holes, in the numbers of the file.
   std::string hole_text() const {
     if (hole_->axes == std::array{true, true, true}) return " in exactly one place, " + place_text(hole_->place);
+    return " whose " + axis_text(*hole_, " is ");
+  }
+  std::string axis_text(const Hole& hole, const char* is) const {
     for (const auto& [slot, axis, name] : {std::tuple{kX, 0U, "x"}, std::tuple{kY, 1U, "y"}, std::tuple{kZ, 2U, "z"}}) {
-      const double metres = std::array{hole_->place.x, hole_->place.y, hole_->place.z}[axis];
-      if (hole_->axes[axis]) return std::string(" whose ") + name + " is " + coordinate_text(slot, metres);
+      const double metres = std::array{hole.place.x, hole.place.y, hole.place.z}[axis];
+      if (hole.axes[axis]) return std::string(name) + is + coordinate_text(slot, metres);
     }
     return "";
   }
@@ -173,6 +195,11 @@ class Notes {
       const bool is_of_faces = !schema_.has_vertex_colours();
       const PlySlots& slots = is_of_faces ? schema_.face : schema_.vertex;
       const PlyElement& element = is_of_faces ? *faces : vertices_;
+      if (schema_.has_unusual_colour_names) {
+        const auto name = [&](PlySlot slot) { return element.properties[*slots[slot]].name; };
+        add("colour_properties", element.count,
+            "The colours are taken from the properties " + joined({name(kRed), name(kGreen), name(kBlue)}));
+      }
       PlyScalar type = element.properties[*slots[kRed]].type;
       for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
         if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
@@ -209,12 +236,28 @@ class Notes {
     }
     is_textured =
         is_textured || std::any_of(vertices_.properties.begin(), vertices_.properties.end(), is_texture_property);
-    if (!is_textured) return;
+    if (!is_textured) return about_possible_colours();
     add("texture", vertices_.count,
         "The colours are in a texture" + (file.empty() ? "" : " (" + file + ")") +
             ", which is not read: everything is grey; bake it into the vertices first, in MeshLab with Filters, "
             "Texture, "
             "Transfer Color: Texture to Vertex");
+  }
+
+  void about_possible_colours() {
+    std::vector<std::string> names;
+    const auto look = [&](const PlyElement& element, const PlySlots& slots) {
+      for (const std::size_t property : possible_colours(element)) {
+        if (!is_used(slots, property)) names.push_back(element.properties[property].name);
+      }
+    };
+    look(vertices_, schema_.vertex);
+    if (const PlyElement* const faces = header_.find("face"); names.empty() && faces != nullptr && faces->count > 0) {
+      look(*faces, schema_.face);
+    }
+    add("no_colours", names.size(),
+        "No colours found, everything is grey; these could be them: " + joined(names) +
+            " (call them red, green and blue; one alone gray, or rgb where it is packed)");
   }
 
   void about_temperature_property() {

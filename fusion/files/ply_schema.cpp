@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "fusion/files/colour_names.hpp"
 #include "fusion/files/temperature_name.hpp"
 
 namespace spectra::files {
@@ -42,8 +43,8 @@ base::Result<void> find_positions(const PlyElement& element, PlySlots& slots) {
   return base::success();
 }
 
-/// The coding of the colours, nullopt when there are none.
-std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& slots) {
+/// The coding of colours with customary names, nullopt when there are none.
+std::optional<ColourCoding> find_customary_colours(const PlyElement& element, PlySlots& slots) {
   struct Names {
     std::array<std::string_view, 3> names;
     ColourCoding coding;
@@ -67,6 +68,17 @@ std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& sl
     return coding;
   }
   return std::nullopt;
+}
+
+/// The coding of the colours, nullopt when there are none. Three channels with plain names go before a single number.
+std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& slots, bool& has_unusual_names) {
+  const auto coding = find_customary_colours(element, slots);
+  if (coding && slots[kRed] != slots[kGreen]) return coding;
+  const auto channels = plain_colour_channels(element);
+  if (!channels) return coding;
+  std::copy(channels->begin(), channels->end(), slots.begin() + kRed);
+  has_unusual_names = true;
+  return ColourCoding::Channels;
 }
 
 /// The property whose name says temperature most plainly.
@@ -195,8 +207,8 @@ base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& o
   if (const PlyElement* const strips = with_entries(header, "tristrips")) {
     BOOST_OUTCOME_TRY(schema.strip_list, find_corner_list(*strips));
   }
-  auto coding = find_colours(*vertices, schema.vertex);
-  if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face);
+  auto coding = find_colours(*vertices, schema.vertex, schema.has_unusual_colour_names);
+  if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face, schema.has_unusual_colour_names);
   schema.colour_coding = coding.value_or(ColourCoding::Channels);
   BOOST_OUTCOME_TRY(find_temperatures(*vertices, faces, options, schema));
   find_confidence(*vertices, schema.vertex);

@@ -31,6 +31,8 @@ struct PlySchema {
   /// Colours and temperature of the faces, when the vertices have none.
   PlySlots face;
   ColourCoding colour_coding = ColourCoding::Channels;
+  /// The colours have names that are customary nowhere, but say what they are.
+  bool has_unusual_colour_names = false;
   /// The type that the vertices' colours of a text really have, where they are declared as uchar but hold something else.
   std::optional<PlyScalar> true_colour_type;
   /// The temperature is a property of a name that says too little: its values must be looked at.

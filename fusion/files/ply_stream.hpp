@@ -57,15 +57,16 @@ struct PlyBodyFacts {
   std::optional<Hole> hole;
   FaceFacts faces;
   TemperatureFacts temperature;
-  std::uint64_t left_out_vertex_count = 0;       ///< Without a position within 1e30 m, and holes.
-  std::uint64_t hole_count = 0;                  ///< Left out because they are at the place of holes.
-  std::optional<base::Vec3d> crowded_place;      ///< Many vertices are there, and are kept: it may be a hole.
-  bool is_crowded_place_used = false;            ///< By faces.
-  std::uint64_t unreferenced_vertex_count = 0;   ///< Vertices of no triangle; 0 when there is no triangle at all.
-  std::uint64_t absurd_time_count = 0;           ///< Vertices that were seen at no Unix time.
-  std::uint64_t clamped_colour_count = 0;        ///< Vertices whose colour was out of range or no number.
-  std::uint64_t trailing_byte_count = 0;         ///< After the last element; white space does not count in ascii.
-  std::uint64_t packed_trailing_byte_count = 0;  ///< After the end of the gzip data.
+  std::uint64_t left_out_vertex_count = 0;            ///< Without a position within 1e30 m, and holes.
+  std::uint64_t hole_count = 0;                       ///< Left out because they are at the place of holes.
+  std::optional<base::Vec3d> crowded_place;           ///< Many vertices are there, and are kept: it may be a hole.
+  bool is_crowded_place_used = false;                 ///< By faces.
+  std::optional<SharedCoordinate> shared_coordinate;  ///< The same of one coordinate.
+  std::uint64_t unreferenced_vertex_count = 0;        ///< Vertices of no triangle; 0 when there is no triangle at all.
+  std::uint64_t absurd_time_count = 0;                ///< Vertices that were seen at no Unix time.
+  std::uint64_t clamped_colour_count = 0;             ///< Vertices whose colour was out of range or no number.
+  std::uint64_t trailing_byte_count = 0;              ///< After the last element; white space does not count in ascii.
+  std::uint64_t packed_trailing_byte_count = 0;       ///< After the end of the gzip data.
 };
 
 /// How the values of a file are taken.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <tuple>
 
@@ -38,6 +39,52 @@ double distance(const Bulk& box, const base::Vec3d& p) {
     gap[axis] = std::max({0.0, box.min.*kAxes[axis] - at, at - box.max.*kAxes[axis]});
   }
   return std::hypot(gap[0], gap[1], gap[2]);
+}
+
+/// The least or greatest of many numbers, and how it stands to the others.
+struct Extreme {
+  double value = 0;
+  std::size_t count = 0;
+  double gap = 0;                  ///< To the nearest other.
+  double range_of_others = 0;      ///< From the least to the greatest of them.
+  std::size_t most_of_others = 0;  ///< That are one number.
+};
+
+template <class Iterator>
+Extreme extreme_of(Iterator first, Iterator last) {
+  Extreme extreme;
+  if (first == last) return extreme;
+  extreme.value = *first;
+  const Iterator others = std::find_if(first, last, [&](double value) { return value != extreme.value; });
+  extreme.count = static_cast<std::size_t>(others - first);
+  if (others == last) return extreme;
+  extreme.gap = std::abs(*others - extreme.value);
+  extreme.range_of_others = std::abs(*std::prev(last) - *others);
+  for (Iterator begin = others, end = others; begin != last; begin = end) {
+    while (end != last && *end == *begin) ++end;
+    extreme.most_of_others = std::max(extreme.most_of_others, static_cast<std::size_t>(end - begin));
+  }
+  return extreme;
+}
+
+Extreme lowest_of(const std::vector<double>& sorted) {
+  return extreme_of(sorted.begin(), sorted.end());
+}
+Extreme highest_of(const std::vector<double>& sorted) {
+  return extreme_of(sorted.rbegin(), sorted.rend());
+}
+
+/// Numbers that are written for none: powers of ten, nines (also -9999.9), and the ends of whole numbers of 16 bits and more.
+bool is_customary_none(double number) {
+  const double size = std::abs(number);
+  const auto is = [size](double other) { return std::abs(size - other) <= 1e-7 * other; };
+  constexpr double kLeastBelow = 998, kLeastAbove = 9990;
+  if (size < (number < 0 ? kLeastBelow : kLeastAbove)) return false;
+  for (const int bits : {15, 16, 31, 32, 63, 64}) {
+    if (is(std::ldexp(1, bits)) || is(std::ldexp(1, bits) - 1)) return true;
+  }
+  const double power = std::pow(10, std::round(std::log10(size)));
+  return is(power) || is(power - 1) || is(power - 0.1) || is(power - 0.01);
 }
 
 }  // namespace
@@ -106,30 +153,38 @@ void PositionSample::find_hole() {
 }
 
 void PositionSample::find_coordinate_hole(double metres) {
-  constexpr std::array kCustomary{-9999.0, -99999.0, -32768.0, -32767.0, -999.0, 9999.0, 32767.0, 99999.0, -1e30, 1e30};
-  for (std::size_t axis = 0; axis < kAxes.size() && !coordinate_hole_; ++axis) {
-    for (const double number : kCustomary) {
-      const double value = number * metres;
-      std::size_t count = 0;
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (const Entry& entry : entries_) {
-        const double at = entry.position.*kAxes[axis];
-        if (at == value) {
-          ++count;
-        } else {
-          low = std::min(low, at);
-          high = std::max(high, at);
-        }
-      }
-      if (count < kFewestInAHole || entries_.size() - count < kFewestElsewhere) continue;
-      const double gap = std::max(low - value, value - high);
-      if (!(gap > high - low)) continue;
+  std::vector<double> sorted(entries_.size());
+  const auto sort = [&](std::size_t axis) {
+    std::transform(entries_.begin(), entries_.end(), sorted.begin(),
+                   [axis](const Entry& entry) { return entry.position.*kAxes[axis]; });
+    std::sort(sorted.begin(), sorted.end());
+  };
+  std::array<double, 3> ranges{};
+  for (std::size_t axis = 0; axis < kAxes.size() && !sorted.empty(); ++axis) {
+    sort(axis);
+    ranges[axis] = sorted.back() - sorted.front();
+  }
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+    sort(axis);
+    for (const Extreme& extreme : {lowest_of(sorted), highest_of(sorted)}) {
+      if (extreme.count < kFewestInAHole || entries_.size() - extreme.count < kFewestElsewhere) continue;
+      if (!(extreme.gap > extreme.range_of_others)) continue;
       Hole hole{{}, {false, false, false}};
-      hole.place.*kAxes[axis] = value;
+      hole.place.*kAxes[axis] = extreme.value;
       hole.axes[axis] = true;
-      std::erase_if(entries_, [&hole](const Entry& entry) { return hole.has(entry.position); });
-      coordinate_hole_ = hole;
-      break;
+      // A floor far below all else is as wide as the scene.
+      const double size = std::hypot(ranges[(axis + 1) % 3], ranges[(axis + 2) % 3], extreme.range_of_others);
+      constexpr double kCertain = 2, kLikely = 1.0 / 8, kMoreThanOthersAre = 4;
+      if (is_customary_none(extreme.value / metres) || extreme.gap > kCertain * size) {
+        std::erase_if(entries_, [&hole](const Entry& entry) { return hole.has(entry.position); });
+        coordinate_hole_ = hole;
+        shared_coordinate_.reset();
+        return;
+      }
+      if (extreme.gap > kLikely * size && extreme.gap > kMoreThanOthersAre * extreme.range_of_others &&
+          extreme.count >= kMoreThanAnyOther * extreme.most_of_others) {
+        shared_coordinate_ = {hole, static_cast<double>(extreme.count) / static_cast<double>(entries_.size())};
+      }
     }
   }
 }

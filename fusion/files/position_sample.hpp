@@ -34,6 +34,12 @@ struct HolePlace {
   bool is_far = false;                  ///< Farther from the bulk than that is large.
 };
 
+/// A number that many vertices have for one of their coordinates, far from all others.
+struct SharedCoordinate {
+  Hole as_hole;
+  double share = 0;  ///< Of all vertices.
+};
+
 /// Up to 16,384 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a
 /// grid alone). Tells what a few strays cannot disturb.
 class PositionSample {
@@ -47,9 +53,11 @@ class PositionSample {
   void conclude(double metres);
   /// One place that has a dozen vertices of the sample and eight times as many as any other, when the others are a dozen too.
   const std::optional<HolePlace>& hole() const { return hole_; }
-  /// One coordinate that is a customary number for "none" (-9999, -32768, ...) in a dozen vertices of the sample, farther from all others than
-  /// those are from each other.
+  /// One coordinate that a dozen vertices of the sample share exactly, farther from all others than those are from each other:
+  /// a customary number for "none" (-9999, -10000, -32768, ...), or any that is twice as far away as the scene is large.
   const std::optional<Hole>& coordinate_hole() const { return coordinate_hole_; }
+  /// One that may be such a number, but is not as far away.
+  const std::optional<SharedCoordinate>& shared_coordinate() const { return shared_coordinate_; }
   /// Around the medians of the coordinates, 32 times as far as half of the vertices are; nullopt when that is one place.
   const std::optional<Bulk>& bulk() const { return bulk_; }
 
@@ -69,6 +77,7 @@ class PositionSample {
   std::vector<Entry> entries_;
   std::optional<HolePlace> hole_;
   std::optional<Hole> coordinate_hole_;
+  std::optional<SharedCoordinate> shared_coordinate_;
   std::optional<Bulk> bulk_;
 };
 

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "fusion/files/name_words.hpp"
 
 namespace spectra::files {
 
@@ -67,27 +68,6 @@ const Unit* find_unit(std::string_view word) {
   return found == kUnits.end() ? nullptr : &*found;
 }
 
-/// "scalar_surfaceTemp1 (degC)" as scalar, surface, temp, degc: lower case, without digits.
-std::vector<std::string> words_of(std::string_view name) {
-  std::vector<std::string> words;
-  bool is_inside = false;
-  bool was_lower = false;
-  for (const char c : name) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (std::isalpha(byte) == 0) {
-      is_inside = false;
-      was_lower = false;
-      continue;
-    }
-    const bool is_upper = std::isupper(byte) != 0;
-    if (!is_inside || (is_upper && was_lower)) words.emplace_back();
-    words.back() += static_cast<char>(std::tolower(byte));
-    is_inside = true;
-    was_lower = !is_upper;
-  }
-  return words;
-}
-
 /// A word such as "tempc" or "temperaturekelvin" cut in two.
 void cut_units_off(std::vector<std::string>& words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -105,7 +85,7 @@ void cut_units_off(std::vector<std::string>& words) {
 }  // namespace
 
 TemperatureName temperature_name(std::string_view name) {
-  std::vector<std::string> words = words_of(name);
+  std::vector<std::string> words = name_words(name);
   cut_units_off(words);
   TemperatureName result;
   bool is_plain = true;

@@ -204,15 +204,40 @@ LoadedScene terrain(const std::string& height) {
 }
 
 TEST(FieldKinds, HeightsWrittenAsANumberForNoneAreHoles) {
-  for (const char* none : {"-9999", "-32768", "-3.4028234663852886e38", "99999"}) {
+  for (const char* none : {"-9999", "-32768", "-3.4028234663852886e38", "99999", "-10000", "10000", "-9999.9",
+                           "-32767.5", "-999999", "1e20", "-1e10", "-2147483648", "-1000000", "-12345.5", "-3.4e25"}) {
     const LoadedScene scene = terrain(none);
     EXPECT_EQ(scene.mesh.vertex_count(), 2500U - 125U) << none;
     EXPECT_EQ(note_count(scene, "hole_vertices") + note_count(scene, "left_out_vertices"), 125U) << none;
+    EXPECT_EQ(note_text(scene, "shared_coordinate"), "") << none;
   }
   EXPECT_NE(note_text(terrain("-9999"), "hole_vertices").find("125 vertices whose z is -9999"), std::string::npos);
-  // A height that could be one is kept: among the others, or no customary number.
+  EXPECT_NE(note_text(terrain("1e20"), "hole_vertices").find("125 vertices whose z is 1e+20"), std::string::npos);
+  // A height that could be one is kept: among the others, or not as far away as the scene is large, and no customary number.
   EXPECT_EQ(terrain("999").mesh.vertex_count(), 2500U);
-  EXPECT_EQ(terrain("-9998").mesh.vertex_count(), 2500U);
+  EXPECT_EQ(note_text(terrain("999"), "shared_coordinate"), "");
+  const LoadedScene kept = terrain("-5000");
+  EXPECT_EQ(kept.mesh.vertex_count(), 2500U);
+  EXPECT_NE(note_text(kept, "shared_coordinate")
+                .find("5 % of the vertices share z = -5000, far from all others, and are kept"),
+            std::string::npos)
+      << note_text(kept, "shared_coordinate");
+}
+
+TEST(FieldKinds, AFloorFarBelowIsNoHole) {
+  // A floor of 5 m at z = 0 and a lamp or a table above it.
+  for (const bool is_flat : {false, true}) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 400; ++i)
+      lines.push_back(std::to_string(i % 20 * 0.25) + ' ' + std::to_string(i / 20 * 0.25) + " 0");
+    for (int i = 0; i < 100; ++i) {
+      const std::string z = std::to_string(is_flat ? 3 : 3 + 0.3 * std::sin(i));
+      lines.push_back(std::to_string(2 + i % 10 * 0.02) + ' ' + std::to_string(2 + i / 10 * 0.02) + ' ' + z);
+    }
+    const LoadedScene scene = loaded(text_file("", lines));
+    EXPECT_EQ(scene.mesh.vertex_count(), 500U);
+    EXPECT_EQ(note_text(scene, "shared_coordinate").empty(), is_flat);
+  }
 }
 
 TEST(FieldKinds, ASpotThatIsMeasuredOftenIsNoHole) {
@@ -606,6 +631,51 @@ TEST(FieldKinds, ASensorsLargestCountDoesNotHideTheUnit) {
   }
   EXPECT_NE(said(15, 1, 40).find("--no-data 65535"), std::string::npos) << said(15, 1, 40);
   EXPECT_EQ(said(29000, 20, 0).find("65535"), std::string::npos);
+}
+
+TEST(FieldKinds, ColoursUnderPlainNamesAreTakenAndOthersAreNamed) {
+  const auto scene_of = [](const std::vector<std::string>& names, const std::string& type = "uchar") {
+    std::string properties, values;
+    for (const std::string& name : names) {
+      properties += "property " + type + ' ' + name + "\n";
+      values += ' ' + std::to_string(10 * (1 + values.size()));
+    }
+    return loaded(text_file(properties, {"0 0 0" + values, "1 0 0" + values}));
+  };
+  for (const std::vector<std::string>& names : {std::vector<std::string>{"colour_red", "colour_green", "colour_blue"},
+                                                {"color_r", "color_g", "color_b"},
+                                                {"vertex_red", "vertex_green", "vertex_blue"},
+                                                {"red_", "green_", "blue_"},
+                                                {"vertexRed", "vertexGreen", "vertexBlue"},
+                                                {"scalar_R", "scalar_G", "scalar_B"},
+                                                {"Point_Color_Red", "Point_Color_Green", "Point_Color_Blue"}}) {
+    const LoadedScene scene = scene_of(names);
+    ASSERT_TRUE(scene.mesh.has_visible) << names[0];
+    EXPECT_EQ(scene.mesh.visible()[1], (base::Rgb8{10, 40, 70})) << names[0];
+    EXPECT_EQ(note_text(scene, "no_colours"), "") << names[0];
+    if (names[0] != "scalar_R") {
+      EXPECT_NE(note_text(scene, "colour_properties").find(names[0] + ", " + names[1]), std::string::npos) << names[0];
+    }
+  }
+  EXPECT_EQ(scene_of({"color_b", "color_g", "color_r"}).mesh.visible()[0], (base::Rgb8{70, 40, 10}));
+  EXPECT_EQ(scene_of({"gray", "color_r", "color_g", "color_b"}).mesh.visible()[0], (base::Rgb8{40, 70, 100}));
+  for (const std::vector<std::string>& names : {std::vector<std::string>{"Rf", "Gf", "Bf"},
+                                                {"scalar_Rf", "scalar_Gf", "scalar_Bf"},
+                                                {"ambient_red", "ambient_green", "ambient_blue"},
+                                                {"s_red", "s_green", "s_blue"},
+                                                {"scalar_rgb"},
+                                                {"intensity"}}) {
+    const LoadedScene scene = scene_of(names, "ushort");
+    EXPECT_FALSE(scene.mesh.has_visible) << names[0];
+    EXPECT_NE(note_text(scene, "no_colours").find("everything is grey; these could be them: " + names[0]),
+              std::string::npos)
+        << names[0];
+    EXPECT_EQ(note_count(scene, "no_colours"), names.size()) << names[0];
+  }
+  for (const std::vector<std::string>& names :
+       {std::vector<std::string>{"quality"}, {"n_r", "n_g"}, {"red", "green", "blue", "intensity"}}) {
+    EXPECT_EQ(note_text(scene_of(names), "no_colours"), "") << names[0];
+  }
 }
 
 TEST(FieldKinds, TexturesAreSeenWhereverTheyAreSaid) {
