@@ -28,6 +28,14 @@ namespace {
 using Run = std::function<int()>;
 constexpr const char* kQuietHelp = "No progress on the terminal";
 
+constexpr std::array kReadingOptions{"--temperature-property",
+                                     "--temperature-unit",
+                                     "--temperature-scale",
+                                     "--temperature-offset",
+                                     "--no-data",
+                                     "--scale",
+                                     "--up"};
+
 /// The options of every command that reads a scene: what a person knows of the file.
 void add_reading(CLI::App& command, files::ReadOptions& options) {
   command.add_option("--temperature-property", options.temperature_property,
@@ -172,7 +180,15 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
       ->check(CLI::Range(0, 1024));
   command->fallthrough();  // --config belongs to the whole program
-  command->final_callback([&options, &run] { run = [&options] { return run_serve(options); }; });
+  command->final_callback([&options, &run, command] {
+    for (const char* name : kReadingOptions) {
+      if (!options.scene && command->count(name) > 0) {
+        throw CLI::ValidationError(
+            name, "it says something of a scene file, and there is none; a block that is put says it in its query");
+      }
+    }
+    run = [&options] { return run_serve(options); };
+  });
 }
 
 /// What a Draco file is asked to keep.

@@ -65,6 +65,11 @@ test("a failed job is 1 and names the file", () => {
 test("what would be lost is not overwritten, and what could not be written is said", () => {
   const before = readFileSync(demo);
   fails(2, /demo\.ply: the output is the input/, "fuse", demo, demo, "--method", "thermal_only");
+  for (const option of [["--up", "y"], ["--scale", "0.001"], ["--temperature-unit", "kelvin"], ["--no-data", "0"]]) {
+    for (const source of [["--live"], ["--demo"], ["--demo-drive"], []]) {
+      fails(2, new RegExp(`${option[0]}: it says something of a scene file, and there is none`), "serve", ...source, ...option);
+    }
+  }
   fails(2, /demo\.ply: the output is the input/, "fuse", inFolder("cut.ply"), demo, "--method", "thermal_only", "--thermal", demo);
   assert.ok(readFileSync(demo).equals(before));
   const full = openSync("/dev/full", "w");

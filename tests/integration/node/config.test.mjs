@@ -115,7 +115,9 @@ test("every option of serve is in the sample, and every line of the sample is go
   writeFileSync(at("map_thermal.ply"), "");
   writeFileSync(at("map.store"), "");
   const here = (value) => value.replace(/"\/(?:[\w.]+\/)*([\w.]+)"/, (_, name) => `"${at(name)}"`);
-  const needed = { thermal: ["scene"], history: ["store"], at: ["store"], invite: ["tokens"], certificate: ["key"], key: ["certificate"], track: ["map"], submaps: ["map"] };
+  const ofAScene = ["temperature-property", "temperature-unit", "temperature-scale", "temperature-offset", "no-data", "scale", "up"];
+  const needed = {
+    ...Object.fromEntries(ofAScene.map((name) => [name, ["scene"]])), thermal: ["scene"], history: ["store"], at: ["store"], invite: ["tokens"], certificate: ["key"], key: ["certificate"], track: ["map"], submaps: ["map"] };
   for (const key of settings.keys()) {
     const lines = [...(needed[key] ?? []), key].map((name) => `${name} = ${here(settings.get(name))}\n`);
     const { status, stderr } = spectra("check-config", config(`[serve]\n${lines.join("")}`));
