@@ -431,7 +431,9 @@ class Notes {
     add("incomplete_faces", faces.incomplete_face_count,
         counted(faces.incomplete_face_count, "face", "faces") + " of fewer than three corners left out");
     add("unreferenced_vertices", facts_.unreferenced_vertex_count,
-        counted(facts_.unreferenced_vertex_count, "vertex", "vertices") + " of no triangle kept");
+        counted(facts_.unreferenced_vertex_count, "vertex", "vertices") +
+            " of no triangle: not drawn, though kept, and their temperatures count; what is to be seen of them belongs "
+            "into a file of points alone");
   }
 
   const PlyHeader& header_;
