@@ -68,6 +68,11 @@ void places(CrossedEdges& edges, double voxel_m, CrossedEdges::Array<float>& sha
   const HalfTag df;
   const HalfIntTag di;
   const Doubles zero = hn::Zero(d), one = hn::Set(d, 1.0), size = hn::Set(d, voxel_m);
+  // Lanes beyond the last edge divide, too.
+  for (std::size_t i = edges.count; i % hn::Lanes(d) != 0; ++i) {
+    edges.first.distance[i] = 1;
+    edges.second.distance[i] = 0;
+  }
   for (std::size_t i = 0; i < edges.count; i += hn::Lanes(d)) {
     const Doubles first = doubles_of(&edges.first.distance[i]), second = doubles_of(&edges.second.distance[i]);
     const Doubles share = hn::Div(first, hn::Sub(first, second));
