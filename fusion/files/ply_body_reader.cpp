@@ -56,7 +56,8 @@ base::Result<PlyBodyFacts> PlyBodyReader::read() {
   facts_.min = {kInfinity, kInfinity, kInfinity};
   facts_.max = {-kInfinity, -kInfinity, -kInfinity};
   facts_.temperature = interpretation_.survey.face_temperature;
-  facts_.temperature.missing_count = 0;  // That was of faces.
+  // Those are of faces.
+  facts_.temperature.missing_count = facts_.temperature.over_range_count = facts_.temperature.under_range_count = 0;
   facts_.clamped_colour_count = interpretation_.survey.clamped_colour_count;
 
   const PlyElement* const vertices = header_.find("vertex");
@@ -183,9 +184,7 @@ base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& 
   } else if (schema.has_face_temperature()) {
     block.temperature_celsius = std::span(interpretation_.survey.face_temperature_celsius)
                                     .subspan(static_cast<std::size_t>(raw.first_vertex), count);
-    facts_.temperature.missing_count +=
-        static_cast<std::uint64_t>(std::count_if(block.temperature_celsius.begin(), block.temperature_celsius.end(),
-                                                 [](float celsius) { return std::isnan(celsius); }));
+    count_carried_temperatures(block);
   }
   if (!handlers_.vertices) return base::success();
   auto result = handlers_.vertices(block);
@@ -300,6 +299,21 @@ void PlyBodyReader::convert_temperatures(const PlyRawVertices& raw) {
                        is_left_out ? ignored : facts_.temperature);
   }
   facts_.temperature.no_data_seen |= ignored.no_data_seen;
+}
+
+/// As those of vertices are counted; several may have the temperature of one face.
+void PlyBodyReader::count_carried_temperatures(const PlyVertexBlock& block) {
+  auto next = left_out_.begin();
+  for (std::size_t i = 0; i < block.temperature_celsius.size(); ++i) {
+    if (next != left_out_.end() && *next == i) {
+      ++next;
+      continue;
+    }
+    const float celsius = block.temperature_celsius[i];
+    facts_.temperature.missing_count += std::isnan(celsius) ? 1U : 0U;
+    if (!std::isinf(celsius)) continue;
+    ++(celsius > 0 ? facts_.temperature.over_range_count : facts_.temperature.under_range_count);
+  }
 }
 
 /// What has no temperature has no deviation.

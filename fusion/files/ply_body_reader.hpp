@@ -31,6 +31,7 @@ class PlyBodyReader {
   base::Result<void> convert_colours(const PlyRawVertices& raw, const PlyElement& element);
   void conclude_positions(const PlyFaceReader& faces);
   void convert_temperatures(const PlyRawVertices& raw);
+  void count_carried_temperatures(const PlyVertexBlock& block);
   void convert_confidence(const PlyRawVertices& raw);
   base::Result<std::span<const base::Vec3f>> polygon_positions();
 

@@ -205,7 +205,7 @@ class Notes {
         if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
       }
       std::string text =
-          conversion_text(schema_.colour_coding, schema_.true_colour_type.value_or(type), survey_.largest_colour);
+          conversion_text(schema_.colour_coding, schema_.true_colour_type.value_or(type), survey_.colour_range);
       if (schema_.true_colour_type) text = "The header says uchar, but the text has others: c" + text.substr(1);
       if (!text.empty()) add("converted_colours", vertices_.count, text);
     } else {

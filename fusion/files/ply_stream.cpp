@@ -138,7 +138,7 @@ base::Result<void> PlyStream::interpret() {
     }
     type = schema.true_colour_type.value_or(type);
     BOOST_OUTCOME_TRY(interpretation_.colours,
-                      colour_conversion(schema.colour_coding, type, interpretation_.survey.largest_colour));
+                      colour_conversion(schema.colour_coding, type, interpretation_.survey.colour_range));
     interpretation_.colours.is_bytes = schema.colour_coding == ColourCoding::Channels &&
                                        header_.format != PlyFormat::Ascii && std::all_of(first, first + 3, is_byte);
   }

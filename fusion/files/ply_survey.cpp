@@ -8,7 +8,6 @@
 #include "fusion/files/ply_cursor.hpp"
 #include "fusion/files/ply_face_reader.hpp"
 #include "fusion/files/ply_vertex_reader.hpp"
-#include "fusion/files/vertex_colour.hpp"
 
 namespace spectra::files {
 
@@ -54,18 +53,11 @@ class DoubtfulTemperature {
   double last_ = -std::numeric_limits<double>::infinity();
 };
 
-double largest_finite(std::span<const double> values, double largest) {
-  for (const double value : values) {
-    if (std::isfinite(value)) largest = std::max(largest, value);
-  }
-  return largest;
-}
-
 /// Sums over the faces of every vertex.
 class FaceSums {
  public:
-  FaceSums(const PlySchema& schema, std::uint64_t vertex_count, const ReadOptions& options)
-      : schema_(schema), conversion_(options) {
+  FaceSums(const PlySchema& schema, PlyScalar colour_type, std::uint64_t vertex_count, const ReadOptions& options)
+      : schema_(schema), colour_type_(colour_type), conversion_(options) {
     const auto count = static_cast<std::size_t>(vertex_count);
     if (schema.has_face_colours()) colours_.resize(count);
     if (schema.has_face_temperature()) temperatures_.resize(count);
@@ -83,13 +75,13 @@ class FaceSums {
     }
   }
 
-  base::Result<void> conclude(PlyScalar colour_type, PlySurvey& survey) {
+  base::Result<void> conclude(PlySurvey& survey) {
     if (!colours_.empty()) {
       // Packed colours were unpacked before they were added.
       const bool is_packed = schema_.colour_coding == ColourCoding::Packed;
       BOOST_OUTCOME_TRY(const ColourConversion conversion,
                         is_packed ? base::Result<ColourConversion>(ColourConversion{})
-                                  : colour_conversion(schema_.colour_coding, colour_type, survey.largest_colour));
+                                  : colour_conversion(schema_.colour_coding, colour_type_, survey.colour_range));
       survey.face_colours.resize(colours_.size());
       for (std::size_t v = 0; v < colours_.size(); ++v) {
         std::array<double, 3> means{};
@@ -124,7 +116,10 @@ class FaceSums {
       unpacking.convert({std::span<const double>(&channels[0], 1), {}, {}}, {&colour, 1}, ignored);
       channels = {static_cast<double>(colour.r), static_cast<double>(colour.g), static_cast<double>(colour.b)};
     }
-    survey.largest_colour = largest_finite(channels, survey.largest_colour);
+    if (colour_type_ == PlyScalar::Int8) {
+      for (double& channel : channels) channel += channel < 0 ? 256 : 0;
+    }
+    survey.colour_range.add(channels);
     for (const std::uint32_t corner : corners) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
         colours_[corner].sums[channel] += static_cast<float>(channels[channel]);
@@ -143,6 +138,7 @@ class FaceSums {
   };
 
   const PlySchema& schema_;
+  const PlyScalar colour_type_;
   const TemperatureConversion conversion_;
   std::vector<Colour> colours_;
   std::vector<Temperature> temperatures_;
@@ -262,7 +258,9 @@ base::Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, con
   const PlyElement* const faces = header.find("face");
   const bool surveys_faces = schema.has_face_colours() || schema.has_face_temperature();
   DoubtfulTemperature doubtful(options);
-  FaceSums sums(schema, surveys_faces ? vertices->count : 0, options);
+  const PlyScalar face_colour_type =
+      schema.has_face_colours() ? faces->properties[*schema.face[kRed]].type : PlyScalar::UInt8;
+  FaceSums sums(schema, face_colour_type, surveys_faces ? vertices->count : 0, options);
   PlyCursor cursor(file, header);
   for (const PlyElement& element : header.elements) {
     cursor.begin_element(element);
@@ -272,9 +270,7 @@ base::Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, con
         BOOST_OUTCOME_TRY(const PlyRawVertices block, reader.next());
         if (block.positions.empty()) break;
         if (schema.colour_coding != ColourCoding::Packed) {
-          for (const auto& channel : block.colours) {
-            survey.largest_colour = largest_finite(channel, survey.largest_colour);
-          }
+          for (const auto& channel : block.colours) survey.colour_range.add(channel);
         }
         if (schema.is_temperature_doubtful) doubtful.add(block.temperatures);
       }
@@ -286,9 +282,7 @@ base::Result<PlySurvey> ply_survey(BlockFile& file, const PlyHeader& header, con
   }
   if (schema.is_temperature_doubtful) doubtful.conclude(survey);
   if (surveys_faces) {
-    const PlyScalar colour_type =
-        schema.has_face_colours() ? faces->properties[*schema.face[kRed]].type : PlyScalar::UInt8;
-    BOOST_OUTCOME_TRY(sums.conclude(colour_type, survey));
+    BOOST_OUTCOME_TRY(sums.conclude(survey));
   }
   return survey;
 }

@@ -11,6 +11,7 @@
 #include "fusion/files/ply_header.hpp"
 #include "fusion/files/ply_schema.hpp"
 #include "fusion/files/read_options.hpp"
+#include "fusion/files/vertex_colour.hpp"
 #include "fusion/files/vertex_temperature.hpp"
 
 namespace spectra::files {
@@ -18,8 +19,8 @@ namespace spectra::files {
 /// What the values of a PLY file tell that its header does not, for the few files whose reading depends on it: how far
 /// their colours go, whether a doubtful property is a temperature, and what the faces around a vertex carry.
 struct PlySurvey {
-  /// Largest finite channel of the colours that are neither bytes nor packed.
-  double largest_colour = 0;
+  /// Of the colours that are neither bytes nor packed.
+  ColourRange colour_range;
 
   /// Of a doubtful temperature: what was seen of it.
   double least_doubtful = std::numeric_limits<double>::infinity();

@@ -90,9 +90,16 @@ std::vector<base::UpAxis> told_by(const std::string& line) {
       return is_one_of(w, {"axis", "vector", "direction", "dir", "is", "along", "="});
     };
     while (next < words.size() && is_filler(words[next])) ++next;
-    // "up x" within a sentence may mean anything.
-    const bool is_phrase = i > 0 && words[i - 1] == "," && (next + 1 >= words.size() || words[next + 1] == ",");
-    const bool is_meant = i == 0 || is_phrase || word != "up" || next > i + 1;
+    // "up x" within a sentence may mean anything, and "pick up: x" something else.
+    const std::string_view before = i > 0 ? std::string_view(words[i - 1]) : std::string_view();
+    const bool is_end = next + 1 >= words.size() || is_one_of(words[next + 1], {",", "forward"});
+    const bool is_phrase = is_one_of(before, {",", "=", "axis", "axes"}) && is_end;
+    const bool is_of_scene =
+        is_one_of(before, {",", "=", "the", "scene", "world", "camera", "model", "mesh", "map", "frame", "view", "axis",
+                           "axes", "coordinate", "coordinates", "system", "handed"});
+    const bool is_named =
+        next > i + 1 && (is_of_scene || is_one_of(words[i + 1], {"axis", "vector", "direction", "dir"}));
+    const bool is_meant = i == 0 || is_phrase || word != "up" || is_named;
     if (!is_meant || next == words.size()) continue;
     auto axis = base::up_axis(words[next]);
     if (!axis) axis = axis_of_vector(words, next);

@@ -31,7 +31,20 @@ std::uint32_t packed_bits(double value) {
   return std::bit_cast<std::uint32_t>(static_cast<float>(value));
 }
 
+bool are_shares(PlyScalar type, const ColourRange& range) {
+  return is_floating(type) && (range.largest <= kMostShare || range.has_mostly_shares());
+}
+
 }  // namespace
+
+void ColourRange::add(std::span<const double> values) {
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    largest = std::max(largest, value);
+    lit_count += value > 0 ? 1U : 0U;
+    share_count += value > 0 && value < 1 ? 1U : 0U;
+  }
+}
 
 void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,
                                std::uint64_t& outside_count) const {
@@ -56,7 +69,8 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
   for (std::size_t i = 0; i < colours.size(); ++i) {
     bool is_outside = false;
     for (std::size_t channel = 0; channel < 3; ++channel) {
-      const double level = factor * values[channel][i] + offset;
+      const double value = values[channel][i];
+      const double level = factor * (is_wrapped && value < 0 ? value + 256 : value) + offset;
       is_outside = is_outside || !(level >= -kHair && level <= 255 + kHair);
       colours[i].*kMembers[channel] =
           std::isnan(level) ? kMidGrey : static_cast<std::uint8_t>(std::floor(std::clamp(level, 0.0, 255.0) + 0.5));
@@ -65,14 +79,16 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
   }
 }
 
-base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest) {
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range) {
+  const double largest = range.largest;
   ColourConversion conversion;
+  conversion.is_wrapped = coding == ColourCoding::Channels && type == PlyScalar::Int8;
   if (coding == ColourCoding::Packed) {
     conversion.is_packed = true;
   } else if (coding == ColourCoding::Splat) {
     conversion.factor = 255 * kSplatFactor;
     conversion.offset = 255 * 0.5;
-  } else if (is_floating(type) && largest <= kMostShare) {
+  } else if (are_shares(type, range)) {
     conversion.factor = 255;
   } else if (largest <= kMostByte) {
     conversion.factor = 1;
@@ -87,7 +103,7 @@ base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar 
   return conversion;
 }
 
-std::string conversion_text(ColourCoding coding, PlyScalar type, double largest) {
+std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range_of_all) {
   const std::string name(to_string(type));
   switch (coding) {
     case ColourCoding::Packed:
@@ -98,8 +114,10 @@ std::string conversion_text(ColourCoding coding, PlyScalar type, double largest)
       break;
   }
   if (type == PlyScalar::UInt8) return {};
+  if (type == PlyScalar::Int8) return "Colours of type char taken as bytes: negative ones are 128 to 255";
+  const double largest = range_of_all.largest;
   const std::string range = "Colours of type " + name + " with values up to " + number_text(largest) + " ";
-  if (is_floating(type) && largest <= kMostShare) return range + "taken as shares of 1, times 255";
+  if (are_shares(type, range_of_all)) return range + "taken as shares of 1, times 255";
   if (largest <= kMostByte) return range + "taken as 0 to 255";
   return range + "taken as 16 bits, divided by 257";
 }

@@ -11,10 +11,22 @@
 
 namespace spectra::files {
 
+/// How far the channels of a file's colours go.
+struct ColourRange {
+  double largest = 0;             ///< Of the finite ones.
+  std::uint64_t lit_count = 0;    ///< Above 0.
+  std::uint64_t share_count = 0;  ///< Between 0 and 1.
+
+  void add(std::span<const double> values);
+  /// Most of them are shares of white, so that what is larger is over-exposed.
+  bool has_mostly_shares() const { return 4 * share_count > 3 * lit_count; }
+};
+
 /// Turns the numbers of a file into visible colours: byte = round(factor * value + offset), or a packed one unpacked.
 struct ColourConversion {
   bool is_packed = false;
-  bool is_bytes = false;  ///< They are whole numbers from 0 to 255 already.
+  bool is_bytes = false;    ///< They are whole numbers from 0 to 255 already.
+  bool is_wrapped = false;  ///< Bytes that were declared as char: negative ones are 128 to 255.
   double factor = 1;
   double offset = 0;
 
@@ -24,11 +36,11 @@ struct ColourConversion {
                std::uint64_t& outside_count) const;
 };
 
-/// The conversion for colours of that coding and type whose largest finite channel is `largest`: to 255 as they are,
-/// larger ones of 16 bits, floats up to about 1 as shares of white. An error tells what is too large.
-base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, double largest);
+/// The conversion for colours of that coding, type and range: to 255 as they are, larger ones of 16 bits, floats up to about 1,
+/// or nearly all of them, as shares of white. An error tells what is too large.
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range);
 
 /// What was done to colours that are no bytes, for people; empty when nothing was.
-std::string conversion_text(ColourCoding coding, PlyScalar type, double largest);
+std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range);
 
 }  // namespace spectra::files

@@ -197,6 +197,54 @@ TEST(PlyReader, ConvertsColoursOfOtherTypes) {
   EXPECT_EQ(loaded(binary.bytes()).mesh.visible()[0], (base::Rgb8{7, 8, 9}));
 }
 
+TEST(PlyReader, AnOverExposedColourDoesNotDarkenTheOthers) {
+  const std::string head = std::string(kXyz) + "property float red\nproperty float green\nproperty float blue\n";
+  std::string shares, levels;
+  for (int i = 0; i < 20; ++i) {
+    shares += std::to_string(i) + " 0 0 0.5 0.2 0.75\n";
+    levels += std::to_string(i) + " 0 0 " + std::to_string(i) + " 0.5 3\n";
+  }
+  for (const char* sun : {"7.06", "300", "100000"}) {
+    const LoadedScene scene = loaded(ascii_head(21, head) + shares + "0 1 0 " + sun + " 0 1\n");
+    EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{128, 51, 191})) << sun;
+    EXPECT_EQ(scene.mesh.visible()[20], (base::Rgb8{255, 0, 255})) << sun;
+    EXPECT_EQ(note_count(scene, "clamped_colours"), 1U) << sun;
+  }
+  const LoadedScene dark = loaded(ascii_head(20, head) + levels);
+  EXPECT_EQ(dark.mesh.visible()[19], (base::Rgb8{19, 1, 3}));
+}
+
+TEST(PlyReader, BytesDeclaredAsCharAreBytes) {
+  PlyBytes file;
+  file.text("ply\nformat binary_little_endian 1.0\nelement vertex 3\n" + std::string(kXyz) +
+            "property char red\nproperty char green\nproperty char blue\nelement face 1\n" + std::string(kFaces) +
+            "end_header\n");
+  for (float x = 0; x < 3; ++x) {
+    file.le(x).le(x * x).le(0.0F);
+    for (const int value : {200, 255, 12}) file.le(static_cast<std::uint8_t>(value));
+  }
+  file.le(std::uint8_t{3}).le(0).le(1).le(2);
+  const LoadedScene scene = loaded(file.bytes());
+  EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{200, 255, 12}));
+  EXPECT_EQ(note_count(scene, "clamped_colours"), 0U);
+  EXPECT_EQ(test::note_text(scene, "converted_colours"),
+            "Colours of type char taken as bytes: negative ones are 128 to 255");
+  // The same of faces.
+  const LoadedScene faces = loaded(ascii_head(3, std::string(kXyz) + "element face 1\n" + std::string(kFaces) +
+                                                     "property char red\nproperty char green\nproperty char blue\n") +
+                                   "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 -56 -1 12\n");
+  EXPECT_EQ(faces.mesh.visible()[2], (base::Rgb8{200, 255, 12}));
+}
+
+TEST(PlyReader, TemperaturesOfFacesAreCountedAtTheirVertices) {
+  const LoadedScene scene = loaded(
+      ascii_head(6, std::string(kXyz) + "element face 2\n" + std::string(kFaces) + "property float temperature\n") +
+      "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n2 2 0\n3 0 1 2 inf\n3 1 2 3 20\n");
+  EXPECT_EQ(note_count(scene, "over_range_temperatures"), 3U);
+  EXPECT_EQ(note_count(scene, "missing_temperatures"), 2U);
+  EXPECT_EQ(note_count(scene, "under_range_temperatures"), 0U);
+}
+
 TEST(PlyReader, FindsTheTemperatureUnderItsNames) {
   for (const char* name : {"temperature", "Temperature", "TEMP", "thermal", "t", "T", "scalar_Temperature"}) {
     for (const char* type : {"float", "double"}) {

@@ -52,6 +52,10 @@ TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
                            "comment y: height",
                            "comment yup",
                            "comment scene up: y",
+                           "comment axis up Y forward -Z",
+                           "comment axes: up Y, forward -Z",
+                           "comment right-handed, up Y forward -Z",
+                           "comment please use up axis: y",
                            "comment gravity 0 -9.81 0",
                            "obj_info gravity vector = [0, -1, 0]",
                            "comment gravity: -y",
@@ -69,12 +73,30 @@ TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
 }
 
 TEST(UpSearch, ReadsNothingIntoOtherWords) {
-  for (const char* line :
-       {"comment scaled up x 2", "comment cleaned up z noise", "comment max-z grid 3.0 m", "comment menu backup",
-        "comment xyz metres; single frame back-projected", "comment x, y, z, up to date", "comment y 12 up",
-        "comment up vector (1, 1, 0)", "comment up vector (0, 1", "comment up", "comment", "", "obj_info",
-        "comment height y", "comment up vector (0, nan, 0)", "comment not y up", "comment cleaned, up z noise",
-        "comment not up y", "comment gravity 1 1 1"}) {
+  for (const char* line : {"comment scaled up x 2",
+                           "comment cleaned up z noise",
+                           "comment max-z grid 3.0 m",
+                           "comment menu backup",
+                           "comment xyz metres; single frame back-projected",
+                           "comment x, y, z, up to date",
+                           "comment y 12 up",
+                           "comment up vector (1, 1, 0)",
+                           "comment up vector (0, 1",
+                           "comment up",
+                           "comment",
+                           "",
+                           "obj_info",
+                           "comment height y",
+                           "comment up vector (0, nan, 0)",
+                           "comment not y up",
+                           "comment cleaned, up z noise",
+                           "comment not up y",
+                           "comment gravity 1 1 1",
+                           "comment pick up: y",
+                           "comment backed up = y",
+                           "comment set up: x 3, y 2",
+                           "comment warm-up: y",
+                           "comment axis up to y"}) {
     EXPECT_EQ(told({line}), "nothing") << line;
   }
   EXPECT_EQ(told({"comment y up", "comment z up"}), "nothing") << "they do not agree";
