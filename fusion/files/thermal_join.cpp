@@ -9,7 +9,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -219,17 +218,6 @@ std::vector<bool> border_vertices(const mesh::MultispectralMesh& mesh) {
   return is_border;
 }
 
-/// Calls `work(begin, end)` for ranges that make up 0..count, in as many threads as there are processors.
-template <class Work>
-void for_ranges(std::size_t count, Work work) {
-  const std::size_t thread_count = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 1 + count / 4096);
-  std::vector<std::jthread> threads;
-  for (std::size_t i = 1; i < thread_count; ++i) {
-    threads.emplace_back([=] { work(count * i / thread_count, count * (i + 1) / thread_count); });
-  }
-  work(0, count / thread_count);
-}
-
 /// The thermal surface under a scene's vertices.
 class PlaceJoin {
  public:
@@ -250,22 +238,17 @@ class PlaceJoin {
   void look(double most) {
     places_.assign(scene_.vertex_count(), {});
     std::atomic<std::size_t> done_count = 0;
-    for_ranges(scene_.vertex_count(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) {
-        if (v % kReportedAt == 0) {
-          const std::size_t done = done_count += kReportedAt;
-          base::report(progress_, base::kJoiningPhase,
-                       kBuildingShare +
-                           (1 - kBuildingShare) *
-                               std::min(1.0, static_cast<double>(done) / static_cast<double>(scene_.vertex_count())));
-        }
-        const base::Vec3f& place = scene_.positions()[v];
-        const auto hit = surface_.find(place, most);
-        if (!hit) continue;
-        places_[v] = {static_cast<float>(hit->distance), static_cast<float>(beyond_border(place, *hit)),
-                      temperature(*hit)};
-      }
-    });
+    const std::span<const base::Vec3f> from = scene_.positions();
+    surface_.find_all(
+        from, most,
+        [&](std::size_t v, const mesh::NearestSurface::Hit& hit) {
+          places_[v] = {static_cast<float>(hit.distance), static_cast<float>(beyond_border(from[v], hit)),
+                        temperature(hit)};
+        },
+        [&](std::size_t count) {
+          const double share = static_cast<double>(done_count += count) / static_cast<double>(from.size());
+          base::report(progress_, base::kJoiningPhase, kBuildingShare + (1 - kBuildingShare) * std::min(1.0, share));
+        });
   }
 
   /// The distance up to which places are joined.
@@ -362,7 +345,6 @@ class PlaceJoin {
     return celsius[hit.corners[static_cast<std::size_t>(heaviest)]];
   }
 
-  static constexpr std::size_t kReportedAt = 4096;
   /// Of the time, until places can be looked for.
   static constexpr double kBuildingShare = 0.1;
 
@@ -382,13 +364,11 @@ double share_on_scene(const mesh::MultispectralMesh& scene, std::span<const base
   constexpr std::size_t kSampleCount = 1000;
   const mesh::NearestSurface surface(scene.positions(), scene.triangles());
   const std::size_t step = std::max<std::size_t>(1, thermal_positions.size() / kSampleCount);
-  std::size_t sample_count = 0;
-  std::size_t near_count = 0;
-  for (std::size_t v = 0; v < thermal_positions.size(); v += step) {
-    ++sample_count;
-    near_count += surface.find(thermal_positions[v], reach) ? 1U : 0U;
-  }
-  return static_cast<double>(near_count) / static_cast<double>(sample_count);
+  std::vector<base::Vec3f> samples;
+  for (std::size_t v = 0; v < thermal_positions.size(); v += step) samples.push_back(thermal_positions[v]);
+  std::atomic<std::size_t> near_count = 0;
+  surface.find_all(samples, reach, [&](std::size_t, const mesh::NearestSurface::Hit&) { ++near_count; });
+  return static_cast<double>(near_count) / static_cast<double>(samples.size());
 }
 
 std::string percent_text(std::uint64_t part, std::uint64_t whole) {

@@ -92,15 +92,6 @@ std::array<double, 3> nearest_on_triangle(const base::Vec3f& p, const base::Vec3
       {difference(vector_of(a), place), difference(vector_of(b), place), difference(vector_of(c), place)});
 }
 
-struct NearestSurface::Search {
-  Vector position;
-  double best_squared = 0;
-  bool elsewhere_only = false;  ///< What is at the very position does not count.
-  bool has_hit = false;
-  std::uint32_t element = 0;
-  Vector weights{};
-};
-
 NearestSurface::NearestSurface(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles)
     : positions_(positions), triangles_(triangles) {
   std::vector<bool> is_used(positions.size());
@@ -184,8 +175,9 @@ void NearestSurface::offer(std::uint32_t element, Search& search) const {
   search.weights = weights;
 }
 
-void NearestSurface::search(Search& search) const {
-  if (nodes_.empty()) return;
+bool NearestSurface::search(Search& search) const {
+  if (nodes_.empty()) return true;
+  std::uint32_t leaf_count = 0;
   std::array<std::pair<double, std::uint32_t>, kMostWaiting> waiting;
   std::size_t waiting_count = 0;
   waiting[waiting_count++] = {squared_distance_to_box(search.position, nodes_[0].box), 0};
@@ -207,9 +199,15 @@ void NearestSurface::search(Search& search) const {
       box_squared = near_squared;
     }
     if (search.has_hit ? box_squared >= search.best_squared : box_squared > search.best_squared) continue;
+    if (search.most_leaves > 0 && leaf_count++ == search.most_leaves) return false;
     const Node& leaf = nodes_[index];
     for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) offer(elements_[i], search);
   }
+  return true;
+}
+
+NearestSurface::Hit NearestSurface::hit_of(const Search& search) const {
+  return {corners(search.element), search.weights, std::sqrt(search.best_squared)};
 }
 
 std::optional<NearestSurface::Hit> NearestSurface::find(const base::Vec3f& position, double max_distance) const {
@@ -217,8 +215,7 @@ std::optional<NearestSurface::Hit> NearestSurface::find(const base::Vec3f& posit
   state.position = vector_of(position);
   state.best_squared = max_distance * max_distance;
   search(state);
-  if (!state.has_hit) return std::nullopt;
-  return Hit{corners(state.element), state.weights, std::sqrt(state.best_squared)};
+  return state.has_hit ? std::optional(hit_of(state)) : std::nullopt;
 }
 
 double median_edge(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -513,6 +516,91 @@ TEST(NearestSurface, AgreesWithLookingAtAll) {
       }
     }
   }
+}
+
+/// find() looks at all where boxes tell nothing, and is right there (above).
+void expect_all_as_one_by_one(std::span<const base::Vec3f> points, std::span<const base::Triangle> triangles,
+                              std::span<const base::Vec3f> from, double most) {
+  const mesh::NearestSurface nearest(points, triangles);
+  std::vector<std::optional<mesh::NearestSurface::Hit>> hits(from.size());
+  std::atomic<std::size_t> twice_count = 0, done_count = 0;
+  nearest.find_all(
+      from, most,
+      [&](std::size_t i, const mesh::NearestSurface::Hit& hit) {
+        twice_count += hits[i] ? 1U : 0U;
+        hits[i] = hit;
+      },
+      [&](std::size_t count) { done_count += count; });
+  EXPECT_EQ(twice_count, 0U);
+  EXPECT_LE(done_count, from.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const auto hit = nearest.find(from[i], most);
+    ASSERT_EQ(hits[i].has_value(), hit.has_value()) << i;
+    if (!hit) continue;
+    ASSERT_NEAR(hits[i]->distance, hit->distance, 1e-12 * (1 + hit->distance)) << i;
+    std::array<double, 3> away = {-double{from[i].x}, -double{from[i].y}, -double{from[i].z}};
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const base::Vec3f& p = points[hits[i]->corners[corner]];
+      away[0] += hits[i]->weights[corner] * double{p.x};
+      away[1] += hits[i]->weights[corner] * double{p.y};
+      away[2] += hits[i]->weights[corner] * double{p.z};
+    }
+    ASSERT_NEAR(std::hypot(away[0], away[1], away[2]), hit->distance, 1e-9 * (1 + hit->distance)) << i;
+  }
+}
+
+TEST(NearestSurface, FindsAllAmongLongTriangles) {
+  std::mt19937 random(3);
+  for (const float thickness : {1.0F, 0.05F, 0.0F}) {
+    for (const float offset : {0.0F, 1000.0F}) {
+      std::uniform_real_distribution<float> coordinate(0, 1);
+      std::vector<base::Vec3f> points(3000);
+      for (base::Vec3f& p : points) {
+        p = {offset + coordinate(random), coordinate(random), thickness * coordinate(random)};
+      }
+      std::vector<base::Triangle> triangles;
+      for (std::uint32_t i = 0; i + 3 < points.size(); i += 3) triangles.push_back({i, i + 1, i + 2});
+      for (std::uint32_t i = 0; i < 300; ++i) triangles.push_back({i, i + 1, i});  // lines
+      for (const float shift : {0.0F, 0.01F, 1.5F}) {
+        std::vector<base::Vec3f> from(points.rbegin(), points.rend());
+        from.resize(700);
+        for (base::Vec3f& p : from) p.z += shift;
+        for (const double most : {0.004, 0.5, 1e9}) expect_all_as_one_by_one(points, triangles, from, most);
+      }
+    }
+  }
+}
+
+TEST(NearestSurface, FindsAllWhereMostIsShort) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> coordinate(0, 1);
+  std::vector<base::Vec3f> points, from;
+  for (int i = 0; i < 2500; ++i) {
+    points.push_back({static_cast<float>(i % 50), static_cast<float>(i / 50), coordinate(random)});
+  }
+  for (int i = 0; i < 2000; ++i)
+    from.push_back({50 * coordinate(random), 50 * coordinate(random), 20 * coordinate(random)});
+  from.push_back(points[77]);
+  from.resize(from.size() + 500, points[78]);
+  std::vector<base::Triangle> triangles;
+  for (std::uint32_t v = 0; v + 51 < points.size(); ++v) {
+    if (v % 50 != 49) triangles.push_back({v, v + 1, v + 50});
+  }
+  expect_all_as_one_by_one(points, triangles, from, 3);
+  expect_all_as_one_by_one(points, {}, from, 3);
+  // A heap of long triangles in a corner: most positions are found one by one, the others in groups.
+  for (std::uint32_t i = 0; i < 3000; ++i) {
+    points.push_back({4 * coordinate(random), 4 * coordinate(random), 5 + 10 * coordinate(random)});
+    if (i % 3 == 2) triangles.push_back({2500 + i, 2500 + i - 1, 2500 + i - 2});
+  }
+  for (int i = 0; i < 300; ++i) {
+    from.push_back({4 * coordinate(random), 4 * coordinate(random), 5 + 10 * coordinate(random)});
+  }
+  for (const double most : {0.02, 3.0}) expect_all_as_one_by_one(points, triangles, from, most);
+  const std::vector<base::Vec3f> one(500, base::Vec3f{1, 2, 3});
+  expect_all_as_one_by_one(one, {}, from, 100);
+  expect_all_as_one_by_one(one, {}, {}, 100);
+  expect_all_as_one_by_one({}, {}, from, 100);
 }
 
 TEST(NearestSurface, FindsThePointOfATriangle) {
