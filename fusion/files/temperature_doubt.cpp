@@ -111,7 +111,7 @@ class Doubt {
   /// As counts of a fixed step are; a few floats may be whole by chance.
   bool are_whole() const {
     constexpr std::uint64_t kFewest = 12;
-    return facts_.fraction_count == 0 && (!is_floating(property_.type) || facts_.finite_count >= kFewest);
+    return !facts_.has_fractions && (!is_floating(property_.type) || facts_.finite_count >= kFewest);
   }
   /// Several different values are hotter than anything, or colder than absolute zero, and most of the others are no degrees
   /// either; one value alone may stand for no data.

@@ -21,13 +21,29 @@ float rounded(double celsius) {
   return static_cast<float>(celsius) + 0.0F;
 }
 
+constexpr float kSeldomDegrees = 150;
+
+/// Takes note of what only numbers have that may be hundredths or tenths.
+void describe_large(std::span<const float> celsius, TemperatureFacts& facts) {
+  for (const float c : celsius) {
+    const float size = std::abs(c);
+    facts.large_count += size >= kSeldomDegrees && size <= kMostHundredths ? 1U : 0U;
+    if (c != 65'535.0F) facts.highest_but_full = std::max(facts.highest_but_full, c);
+    if (c > 3000.0F && c <= kMostHundredths) {
+      facts.hot_low = std::min(facts.hot_low, c);
+      facts.hot_high = std::max(facts.hot_high, c);
+    }
+  }
+}
+
+bool is_fraction(float celsius) {
+  return celsius >= kLeastHundredths && celsius <= kMostHundredths && celsius != std::floor(celsius);
+}
+
 /// Takes note of finite temperatures.
 void describe(std::span<const float> celsius, TemperatureFacts& facts) {
-  float lowest = facts.lowest;
-  float highest = facts.highest;
-  float highest_but_full = facts.highest_but_full;
-  float hot_low = facts.hot_low;
-  float hot_high = facts.hot_high;
+  float lowest = kBeyond;
+  float highest = -kBeyond;
   float nearest_zero = facts.nearest_zero;
   std::uint32_t zero = 0;
   std::uint32_t full = 0;
@@ -36,8 +52,6 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   std::uint32_t hundredths = 0;
   std::uint32_t hot = 0;
   std::uint32_t cold = 0;
-  std::uint32_t large = 0;
-  std::uint32_t fraction = 0;
   for (const float c : celsius) {
     lowest = c < lowest ? c : lowest;
     highest = c > highest ? c : highest;
@@ -50,21 +64,10 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
     hundredths += static_cast<std::uint32_t>(c >= 20'000.0F) & static_cast<std::uint32_t>(c < 40'000.0F);
     hot += static_cast<std::uint32_t>(c > 3000.0F);
     cold += static_cast<std::uint32_t>(c < -100.0F);
-    const float size = std::abs(c);
-    large += static_cast<std::uint32_t>(size >= 150.0F) & static_cast<std::uint32_t>(size <= kMostHundredths);
-    const float kept = c < kLeastHundredths ? kLeastHundredths : c > kMostHundredths ? kMostHundredths : c;
-    fraction += static_cast<std::uint32_t>(static_cast<float>(static_cast<std::int32_t>(kept)) != kept);
-    const float counted = c == 65'535.0F ? -kBeyond : c;
-    highest_but_full = counted > highest_but_full ? counted : highest_but_full;
-    const bool is_hot = (c > 3000.0F) & (c <= kMostHundredths);
-    const float hot_or_high = is_hot ? c : kBeyond;
-    const float hot_or_low = is_hot ? c : -kBeyond;
-    hot_low = hot_or_high < hot_low ? hot_or_high : hot_low;
-    hot_high = hot_or_low > hot_high ? hot_or_low : hot_high;
   }
   facts.finite_count += celsius.size();
-  facts.lowest = lowest;
-  facts.highest = highest;
+  facts.lowest = std::min(facts.lowest, lowest);
+  facts.highest = std::max(facts.highest, highest);
   facts.nearest_zero = nearest_zero;
   facts.zero_count += zero;
   facts.full_count += full;
@@ -73,11 +76,12 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
   facts.centikelvin_like_count += hundredths;
   facts.too_hot_count += hot;
   facts.too_cold_count += cold;
-  facts.large_count += large;
-  facts.fraction_count += fraction;
-  facts.highest_but_full = highest_but_full;
-  facts.hot_low = hot_low;
-  facts.hot_high = hot_high;
+  facts.has_fractions = facts.has_fractions || std::any_of(celsius.begin(), celsius.end(), is_fraction);
+  if (lowest <= -kSeldomDegrees || highest >= kSeldomDegrees) {
+    describe_large(celsius, facts);
+  } else {
+    facts.highest_but_full = std::max(facts.highest_but_full, highest);
+  }
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ struct TemperatureFacts {
   std::uint64_t too_cold_count = 0;           ///< Below -100.
 
   // Which may be hundredths or tenths of a degree.
-  std::uint64_t fraction_count = 0;                                  ///< Not whole, of those from -10000 to 12000.
+  bool has_fractions = false;                                        ///< Not whole, of those from -10000 to 12000.
   std::uint64_t large_count = 0;                                     ///< 150 to 12000 away from 0.
   float highest_but_full = -std::numeric_limits<float>::infinity();  ///< Of those that are not 65535.
   /// Of those above 3000, up to 12000.
