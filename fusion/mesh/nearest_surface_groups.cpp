@@ -32,6 +32,18 @@ Vector cross(const Vector& a, const Vector& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+/// What is far beyond any surface stays so.
+float float_of(double value) {
+  constexpr double kLargest = 1e30;
+  return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+}
+
+/// A distance that is beyond that is any.
+float reach_of(double value) {
+  constexpr double kAny = 1e29;
+  return value < kAny ? static_cast<float>(value) : std::numeric_limits<float>::infinity();
+}
+
 /// Calls `work(i)` for each of 0..count once, in as many threads as there are processors.
 template <class Work>
 void for_each_of(std::size_t count, const Work& work) {
@@ -113,8 +125,8 @@ class NearestSurface::Groups {
     Place place;
     place.rounding = kRounding;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      place.centre[axis] = static_cast<float>((box.centre[axis] - middle_[axis]) / unit_);
-      place.half[axis] = static_cast<float>(box.half[axis] / unit_);
+      place.centre[axis] = float_of((box.centre[axis] - middle_[axis]) / unit_);
+      place.half[axis] = float_of(box.half[axis] / unit_);
       place.rounding += kRounding * (std::abs(place.centre[axis]) + place.half[axis]);
     }
     return place;
@@ -138,9 +150,9 @@ class NearestSurface::Groups {
     const double squared = dot(normal, normal);
     if (!(squared > kSliver * dot(u, u) * dot(v, v))) return plane;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      plane.normal[axis] = static_cast<float>(normal[axis] / std::sqrt(squared));
+      plane.normal[axis] = float_of(normal[axis] / std::sqrt(squared));
     }
-    plane.offset = static_cast<float>(dot(normal, from_middle) / std::sqrt(squared));
+    plane.offset = float_of(dot(normal, from_middle) / std::sqrt(squared));
     return plane;
   }
 
@@ -167,7 +179,7 @@ class NearestSurface::Groups {
   /// Offers those of the candidates that may be nearest; `all_least`, where it is given, is told of every one.
   void offer_all(std::span<const std::uint32_t> candidates, const Place& place, Search& search,
                  std::vector<float>* all_least) const {
-    const auto limit = [&] { return static_cast<float>(std::sqrt(search.best_squared) / unit_) + place.rounding; };
+    const auto limit = [&] { return reach_of(std::sqrt(search.best_squared) / unit_) + place.rounding; };
     float most = limit();
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const Least nearest = least(planes_[candidates[i]], place);
@@ -240,7 +252,7 @@ class NearestSurface::Groups {
     offer_all(candidates, place, centre, &all_least);
     const double most =
         std::min({std::sqrt(centre.best_squared) + radius, farthest(box, centre.element), max_distance_});
-    const float limit = static_cast<float>(most / unit_) + place.rounding;
+    const float limit = reach_of(most / unit_) + place.rounding;
     std::vector<std::uint32_t> kept;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (!(all_least[i] > limit)) kept.push_back(candidates[i]);

@@ -171,13 +171,19 @@ Result<void> check(const DracoFileInput& input, DracoKeeping keeping, int speed)
   return success();
 }
 
-/// An edge that very many triangles share, as no surface has one: Draco's edgebreaker takes time by the square of their number.
-bool has_crowded_edge(std::size_t vertex_count, std::span<const TileTriangle> triangles) {
+/// Vertices or an edge with very many triangles, as no surface has them: Draco's edgebreaker takes time by the square of their number.
+bool is_crowded(std::size_t vertex_count, std::span<const TileTriangle> triangles) {
   constexpr std::uint32_t kMost = 256;
+  constexpr double kMostSquares = 4e8;
   std::vector<std::uint32_t> valence(vertex_count);
   for (const TileTriangle& triangle : triangles) {
     for (const std::uint32_t vertex : triangle) ++valence[vertex];
   }
+  double squares = 0;
+  for (const std::uint32_t count : valence) {
+    if (count > kMost) squares += static_cast<double>(count) * static_cast<double>(count);
+  }
+  if (squares > kMostSquares) return true;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
   for (const TileTriangle& triangle : triangles) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
@@ -203,7 +209,7 @@ int encoding_method(bool is_point_cloud, DracoKeeping keeping, bool has_lattice)
 
 Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed) {
   BOOST_OUTCOME_TRYV(check(input, keeping, speed));
-  if (keeping == DracoKeeping::Shape && has_crowded_edge(input.positions_m.size(), input.triangles))
+  if (keeping == DracoKeeping::Shape && is_crowded(input.positions_m.size(), input.triangles))
     keeping = DracoKeeping::Order;
   DracoFile file;
   draco::Mesh mesh;

@@ -318,6 +318,22 @@ TEST(DracoFile, WithAnEdgeOfVeryManyTrianglesKeepsEveryOne) {
   EXPECT_EQ(mesh.value()->num_faces(), same.size());
 }
 
+TEST(DracoFile, OfAVertexWithVeryManyTrianglesIsInOrder) {
+  for (const std::uint32_t count : {2000U, 60'000U}) {
+    std::vector<std::array<float, 3>> positions{{0, 0, 0}};
+    std::vector<TileTriangle> triangles;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const float angle = 6.2831853F * static_cast<float>(i) / static_cast<float>(count);
+      positions.push_back({std::cos(angle), std::sin(angle), 0});
+      triangles.push_back({0, 1 + i, 1 + (i + 1) % count});
+    }
+    const auto file = draco_file(numbered(positions, triangles).input(1e-5F), DracoKeeping::Shape, 7);
+    ASSERT_TRUE(file) << file.error().message;
+    constexpr std::size_t kMethodAt = 8;  // After the name, the version and what it is of.
+    EXPECT_EQ(static_cast<int>(file.value().bytes[kMethodAt]), count < 10'000 ? 1 : 0) << "1: edgebreaker";
+  }
+}
+
 TEST(DracoFile, RefusesASceneThatIsTooLargeForItsStep) {
   for (const float far : {3e38F, -3.4e38F, 1e30F}) {
     const Scene scene = numbered({{0, 0, far}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});

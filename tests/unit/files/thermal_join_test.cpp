@@ -597,6 +597,11 @@ TEST(NearestSurface, FindsAllWhereMostIsShort) {
     from.push_back({4 * coordinate(random), 4 * coordinate(random), 5 + 10 * coordinate(random)});
   }
   for (const double most : {0.02, 3.0}) expect_all_as_one_by_one(points, triangles, from, most);
+  // As far away as floats go.
+  const std::vector<base::Vec3f> far(300, base::Vec3f{3e38F, -3e38F, 3e38F});
+  for (const double most : {1.0, 1e39, std::numeric_limits<double>::infinity()}) {
+    expect_all_as_one_by_one(points, triangles, far, most);
+  }
   const std::vector<base::Vec3f> one(500, base::Vec3f{1, 2, 3});
   expect_all_as_one_by_one(one, {}, from, 100);
   expect_all_as_one_by_one(one, {}, {}, 100);
