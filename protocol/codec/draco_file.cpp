@@ -212,6 +212,7 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   if (keeping == DracoKeeping::Shape && is_crowded(input.positions_m.size(), input.triangles))
     keeping = DracoKeeping::Order;
   DracoFile file;
+  file.kept = keeping;
   draco::Mesh mesh;
   mesh.set_num_points(static_cast<std::uint32_t>(input.positions_m.size()));
   draco::EncoderOptions options = draco::EncoderOptions::CreateDefaultOptions();

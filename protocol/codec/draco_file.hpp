@@ -31,6 +31,8 @@ struct DracoFileInput {
 /// One Draco stream and what it has lost.
 struct DracoFile {
   std::vector<std::byte> bytes;
+  DracoKeeping kept = DracoKeeping::
+      Shape;  ///< What was asked for, or Order for a Shape with very many triangles round a vertex or an edge.
   float temperature_step_celsius = 0;         ///< 0: exact, or none.
   std::uint64_t left_out_vertex_count = 0;    ///< Of no triangle.
   std::uint64_t left_out_triangle_count = 0;  ///< That name a vertex twice.

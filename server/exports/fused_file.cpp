@@ -50,7 +50,7 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
   add("no_lattice", options.position_step_m > 0 ? 0 : 1,
       "In the file positions are floats, which makes it larger: the scene reaches too far for one lattice of its own "
       "step");
-  if (options.keeping == protocol::codec::DracoKeeping::Order) return losses;
+  if (file.kept == protocol::codec::DracoKeeping::Order) return losses;
   losses.push_back({"vertex_order", 0,
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
   add("left_out_vertices", file.left_out_vertex_count,

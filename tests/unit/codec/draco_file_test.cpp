@@ -331,6 +331,7 @@ TEST(DracoFile, OfAVertexWithVeryManyTrianglesIsInOrder) {
     ASSERT_TRUE(file) << file.error().message;
     constexpr std::size_t kMethodAt = 8;  // After the name, the version and what it is of.
     EXPECT_EQ(static_cast<int>(file.value().bytes[kMethodAt]), count < 10'000 ? 1 : 0) << "1: edgebreaker";
+    EXPECT_EQ(file.value().kept, count < 10'000 ? DracoKeeping::Shape : DracoKeeping::Order);
   }
 }
 
