@@ -37,6 +37,11 @@ double squared_distance_to_box(const Vector& p, const base::Bounds& box) {
   return sum;
 }
 
+/// Whether all that is in the box is at the position.
+bool is_at(const Vector& p, const base::Bounds& box) {
+  return vector_of(box.min) == p && vector_of(box.max) == p;
+}
+
 void include(base::Bounds& box, const base::Vec3f& p) {
   box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
   box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
@@ -177,10 +182,15 @@ void NearestSurface::offer(std::uint32_t element, Search& search) const {
 
 bool NearestSurface::search(Search& search) const {
   if (nodes_.empty()) return true;
+  const auto squared_distance_to = [&](std::uint32_t node) {
+    const base::Bounds& box = nodes_[node].box;
+    if (search.elsewhere_only && is_at(search.position, box)) return std::numeric_limits<double>::infinity();
+    return squared_distance_to_box(search.position, box);
+  };
   std::uint32_t leaf_count = 0;
   std::array<std::pair<double, std::uint32_t>, kMostWaiting> waiting;
   std::size_t waiting_count = 0;
-  waiting[waiting_count++] = {squared_distance_to_box(search.position, nodes_[0].box), 0};
+  waiting[waiting_count++] = {squared_distance_to(0), 0};
   while (waiting_count > 0) {
     auto [box_squared, index] = waiting[--waiting_count];
     // Strict once there is a hit: many elements at one place must not all be visited.
@@ -188,8 +198,8 @@ bool NearestSurface::search(Search& search) const {
     while (nodes_[index].count == 0) {
       std::uint32_t near = index + 1;
       std::uint32_t far = nodes_[index].first;
-      double near_squared = squared_distance_to_box(search.position, nodes_[near].box);
-      double far_squared = squared_distance_to_box(search.position, nodes_[far].box);
+      double near_squared = squared_distance_to(near);
+      double far_squared = squared_distance_to(far);
       if (far_squared < near_squared) {
         std::swap(near, far);
         std::swap(near_squared, far_squared);
@@ -238,7 +248,7 @@ double NearestSurface::median_spacing() const {
   for (std::size_t v = 0; v < positions_.size(); v += step) {
     Search state;
     state.position = vector_of(positions_[v]);
-    state.best_squared = std::numeric_limits<double>::infinity();
+    state.best_squared = std::numeric_limits<double>::max();  // nearer than what is left out
     state.elsewhere_only = true;
     search(state);
     if (state.has_hit) spacings.push_back(std::sqrt(state.best_squared));

@@ -59,7 +59,7 @@ void for_each_of(std::size_t count, const Work& work) {
 
 }  // namespace
 
-/// Looks from groups of positions at a list of elements, halves the group, and strikes from the list what is nearest to none of the half. What
+/// Looks from groups of positions at a list of elements, parts the group, and strikes from the list what is nearest to none of the part. What
 /// is struck is told by the plane and the box of an element together: long triangles lie in the boxes of all groups, but near few of them.
 class NearestSurface::Groups {
  public:
@@ -69,27 +69,17 @@ class NearestSurface::Groups {
     middle_ = all.centre;
     const double diagonal = 2 * std::sqrt(dot(all.half, all.half));
     if (diagonal > 0) unit_ = diagonal;
-    planes_.reserve(surface.elements_.size());
-    for (const std::uint32_t element : surface.elements_) planes_.push_back(plane_of(element));
+    all_.elements.reserve(surface.elements_.size());
+    for (auto& row : all_.rows) row.reserve(surface.elements_.size());
+    for (const std::uint32_t element : surface.elements_) add_plane_of(element);
   }
 
   /// Reorders the indices.
   template <class Found>
   void run(std::span<std::uint32_t> indices, const Found& found) const {
     constexpr std::size_t kLeastOfThread = 256, kMostGroups = 16;
-    std::vector<std::span<std::uint32_t>> groups{indices};
-    while (groups.size() < kMostGroups && groups.front().size() > kLeastOfThread) {
-      std::vector<std::span<std::uint32_t>> halves;
-      for (const std::span<std::uint32_t> group : groups) {
-        const std::size_t middle = halve(group, box_of(group));
-        halves.push_back(group.first(middle));
-        halves.push_back(group.subspan(middle));
-      }
-      groups = std::move(halves);
-    }
-    std::vector<std::uint32_t> all(planes_.size());
-    for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-    for_each_of(groups.size(), [&](std::size_t i) { descend(groups[i], all, 0, found); });
+    const auto groups = parts_of(indices, kMostGroups, kLeastOfThread);
+    for_each_of(groups.size(), [&](std::size_t i) { descend(groups[i], all_, 0, found); });
   }
 
  private:
@@ -101,14 +91,26 @@ class NearestSurface::Groups {
     std::array<float, 3> centre{}, half{};
     float rounding = 0;
   };
-  /// The plane that a triangle lies in and the box that it fills; no normal where there is no plane to rely on.
-  struct Plane {
-    std::array<float, 3> normal{};
-    float offset = 0;
-    std::array<float, 3> centre{}, half{};
-  };
-  struct Least {
-    float of_centre, of_box;
+  /// Of elements, the planes that they lie in and the boxes that they fill; no normal where there is no plane to rely on.
+  struct Planes {
+    enum Row { kNormal = 0, kCentre = 3, kHalf = 6, kOffset = 9, kRowCount = 10 };
+
+    std::vector<std::uint32_t> elements;
+    std::array<std::vector<float>, kRowCount> rows;  ///< For lanes.
+
+    std::size_t size() const { return elements.size(); }
+    /// Those of the places.
+    Planes picked(std::span<const std::uint32_t> places) const {
+      Planes some;
+      some.elements.reserve(places.size());
+      for (const std::uint32_t i : places) some.elements.push_back(elements[i]);
+      for (std::size_t row = 0; row < kRowCount; ++row) {
+        some.rows[row].resize(places.size());
+        std::transform(places.begin(), places.end(), some.rows[row].begin(),
+                       [&](std::uint32_t i) { return rows[row][i]; });
+      }
+      return some;
+    }
   };
 
   static Box box_between(const Vector& low, const Vector& high) {
@@ -132,7 +134,7 @@ class NearestSurface::Groups {
     return place;
   }
 
-  Plane plane_of(std::uint32_t element) const {
+  void add_plane_of(std::uint32_t element) {
     const base::Triangle corners = surface_.corners(element);
     const Vector a = vector_of(surface_.positions_[corners[0]]), b = vector_of(surface_.positions_[corners[1]]),
                  c = vector_of(surface_.positions_[corners[2]]);
@@ -143,30 +145,44 @@ class NearestSurface::Groups {
       from_middle[axis] = (a[axis] - middle_[axis]) / unit_;
     }
     const Place place = place_of(box_between(low, high));
-    Plane plane{{}, 0, place.centre, place.half};
     const Vector u = difference(b, a), v = difference(c, a);
-    const Vector normal = cross(u, v);
+    Vector normal = cross(u, v);
     constexpr double kSliver = 1e-12;
     const double squared = dot(normal, normal);
-    if (!(squared > kSliver * dot(u, u) * dot(v, v))) return plane;
+    const double scale = squared > kSliver * dot(u, u) * dot(v, v) ? 1 / std::sqrt(squared) : 0;
+    for (double& along : normal) along = scale > 0 ? along * scale : 0;
+    all_.elements.push_back(element);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      plane.normal[axis] = float_of(normal[axis] / std::sqrt(squared));
+      all_.rows[Planes::kNormal + axis].push_back(float_of(normal[axis]));
+      all_.rows[Planes::kCentre + axis].push_back(place.centre[axis]);
+      all_.rows[Planes::kHalf + axis].push_back(place.half[axis]);
     }
-    plane.offset = float_of(dot(normal, from_middle) / std::sqrt(squared));
-    return plane;
+    all_.rows[Planes::kOffset].push_back(float_of(dot(normal, from_middle)));
   }
 
-  /// No point of the element is nearer to the centre, or to anything in the box, but for rounding.
-  static Least least(const Plane& plane, const Place& place) {
-    float to_box = 0, to_plane = -plane.offset, of_plane = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      to_box =
-          std::max(to_box, std::abs(place.centre[axis] - plane.centre[axis]) - plane.half[axis] - place.half[axis]);
-      to_plane += plane.normal[axis] * place.centre[axis];
-      of_plane += std::abs(plane.normal[axis]) * place.half[axis];
+  static constexpr std::size_t kLanes = 256;
+  /// For some elements: no point of them is nearer to the centre, or to anything in the box, but for rounding.
+  struct Least {
+    std::array<float, kLanes> of_centre, of_box;
+  };
+
+  static void look(const Planes& planes, std::size_t begin, std::size_t count, const Place& place, Least& least) {
+    const auto larger = [](float a, float b) { return a < b ? b : a; };
+    const auto row = [&](std::size_t i) { return planes.rows[i].data() + begin; };
+    const float *nx = row(0), *ny = row(1), *nz = row(2), *cx = row(3), *cy = row(4), *cz = row(5), *hx = row(6),
+                *hy = row(7), *hz = row(8), *offset = row(Planes::kOffset);
+    const auto [x, y, z] = place.centre;
+    const auto [half_x, half_y, half_z] = place.half;
+    for (std::size_t i = 0; i < count; ++i) {
+      const float to_x = std::abs(x - cx[i]) - hx[i] - half_x;
+      const float to_y = std::abs(y - cy[i]) - hy[i] - half_y;
+      const float to_z = std::abs(z - cz[i]) - hz[i] - half_z;
+      const float to_box = larger(larger(to_x, to_y), larger(to_z, 0));
+      const float to_plane = std::abs(nx[i] * x + ny[i] * y + nz[i] * z - offset[i]);
+      const float of_plane = std::abs(nx[i]) * half_x + std::abs(ny[i]) * half_y + std::abs(nz[i]) * half_z;
+      least.of_centre[i] = larger(to_box, to_plane);
+      least.of_box[i] = larger(to_box, to_plane - of_plane);
     }
-    to_plane = std::abs(to_plane);
-    return {std::max(to_box, to_plane), std::max(to_box, to_plane - of_plane)};
   }
 
   Search search_from(const Vector& position, double max_distance) const {
@@ -176,17 +192,21 @@ class NearestSurface::Groups {
     return search;
   }
 
-  /// Offers those of the candidates that may be nearest; `all_least`, where it is given, is told of every one.
-  void offer_all(std::span<const std::uint32_t> candidates, const Place& place, Search& search,
-                 std::vector<float>* all_least) const {
+  /// Offers those of the candidates that may be nearest; `of_box`, where it is given, is told of every one.
+  void offer_all(const Planes& candidates, const Place& place, Search& search, std::vector<float>* of_box) const {
     const auto limit = [&] { return reach_of(std::sqrt(search.best_squared) / unit_) + place.rounding; };
     float most = limit();
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const Least nearest = least(planes_[candidates[i]], place);
-      if (all_least != nullptr) (*all_least)[i] = nearest.of_box;
-      if (nearest.of_centre > most) continue;
-      surface_.offer(surface_.elements_[candidates[i]], search);
-      most = limit();
+    Least least{};
+    for (std::size_t begin = 0; begin < candidates.size(); begin += kLanes) {
+      const std::size_t count = std::min(kLanes, candidates.size() - begin);
+      look(candidates, begin, count, place, least);
+      if (of_box != nullptr)
+        of_box->insert(of_box->end(), least.of_box.begin(), least.of_box.begin() + static_cast<std::ptrdiff_t>(count));
+      for (std::size_t i = 0; i < count; ++i) {
+        if (least.of_centre[i] > most) continue;
+        surface_.offer(candidates.elements[begin + i], search);
+        most = limit();
+      }
     }
   }
 
@@ -227,15 +247,30 @@ class NearestSurface::Groups {
     return middle;
   }
 
+  /// At most `most`, a power of two; of not much fewer than `fewest` each.
+  std::vector<std::span<std::uint32_t>> parts_of(std::span<std::uint32_t> group, std::size_t most,
+                                                 std::size_t fewest) const {
+    std::vector<std::span<std::uint32_t>> parts{group};
+    while (parts.size() < most && parts.front().size() > fewest) {
+      std::vector<std::span<std::uint32_t>> halves;
+      for (const std::span<std::uint32_t> part : parts) {
+        const std::size_t middle = halve(part, box_of(part));
+        halves.push_back(part.first(middle));
+        halves.push_back(part.subspan(middle));
+      }
+      parts = std::move(halves);
+    }
+    return parts;
+  }
+
   /// `near` is an element that is near to the group, to begin with.
   template <class Found>
-  void descend(std::span<std::uint32_t> group, std::span<const std::uint32_t> candidates, std::uint32_t near,
-               const Found& found) const {
-    constexpr std::size_t kFewPositions = 2, kFewElements = 16;
+  void descend(std::span<std::uint32_t> group, const Planes& candidates, std::uint32_t near, const Found& found) const {
+    constexpr std::size_t kFewPositions = 2, kFewElements = 16, kParts = 8;
     if (group.size() <= kFewPositions || candidates.size() <= kFewElements) {
       for (const std::uint32_t index : group) {
         Search search = search_from(vector_of(from_[index]), max_distance_);
-        if (!candidates.empty()) {
+        if (candidates.size() > 0) {
           surface_.offer(near, search);
           offer_all(candidates, place_of({search.position, {}}), search, nullptr);
         }
@@ -248,19 +283,20 @@ class NearestSurface::Groups {
     const double radius = std::sqrt(dot(box.half, box.half));
     Search centre = search_from(box.centre, std::numeric_limits<double>::infinity());
     surface_.offer(near, centre);
-    std::vector<float> all_least(candidates.size());
+    std::vector<float> all_least;
+    all_least.reserve(candidates.size());
     offer_all(candidates, place, centre, &all_least);
     const double most =
         std::min({std::sqrt(centre.best_squared) + radius, farthest(box, centre.element), max_distance_});
     const float limit = reach_of(most / unit_) + place.rounding;
-    std::vector<std::uint32_t> kept;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      if (!(all_least[i] > limit)) kept.push_back(candidates[i]);
+    std::vector<std::uint32_t> places;
+    for (std::uint32_t i = 0; i < candidates.size(); ++i) {
+      if (!(all_least[i] > limit)) places.push_back(i);
     }
+    const Planes kept = candidates.picked(places);
     all_least = {};
-    const std::size_t middle = halve(group, box);
-    descend(group.first(middle), kept, centre.element, found);
-    descend(group.subspan(middle), kept, centre.element, found);
+    places = {};
+    for (const auto& part : parts_of(group, kParts, 1)) descend(part, kept, centre.element, found);
   }
 
   const NearestSurface& surface_;
@@ -268,7 +304,7 @@ class NearestSurface::Groups {
   double max_distance_;
   Vector middle_{};
   double unit_ = 1;
-  std::vector<Plane> planes_;  ///< Of elements_.
+  Planes all_;
 };
 
 void NearestSurface::find_at_corners(std::span<const base::Vec3f> from, std::vector<std::uint32_t>& indices,
