@@ -102,6 +102,9 @@ class Progress(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.scene = os.path.join(cls.folder.name, "scene.ply")
         subprocess.run([SPECTRA, "demo-scene", cls.scene, "--vertices", "150000"], check=True, stderr=subprocess.PIPE)
+        # Its topology is read off in less than a tenth of a second.
+        cls.large_mesh = os.path.join(cls.folder.name, "mesh.ply")
+        subprocess.run([SPECTRA, "demo-scene", cls.large_mesh, "--vertices", "600000"], check=True, stderr=subprocess.PIPE)
         # For what is done at the speed of memory: a brake that comes late must still find it at work.
         cls.large_cloud = os.path.join(cls.folder.name, "cloud.ply")
         block = b"".join(struct.pack("<ffff", i % 300 * 0.01, i // 300 * 0.01, 0, 20 + i % 700 * 0.01) for i in range(90_000))
@@ -150,10 +153,7 @@ class Progress(unittest.TestCase):
                    words=[b"cutting into tiles", b"writing o.drc"])
 
     def test_info(self):
-        # Its topology is read off in less than a tenth of a second.
-        large_mesh = self.output("mesh.ply")
-        subprocess.run([SPECTRA, "demo-scene", large_mesh, "--vertices", "600000"], check=True, stderr=subprocess.PIPE)
-        out = self.check("info", large_mesh, words=[b"examining the topology"], run_s=0.01)
+        out = self.check("info", self.large_mesh, words=[b"examining the topology"], run_s=0.01)
         self.assertIn(b"vertices", out)
 
     def test_demo_scene(self):
@@ -165,7 +165,7 @@ class Progress(unittest.TestCase):
         self.check("tradeoff", small, "--out", self.output("tradeoff"), words=[b"measuring"], run_s=0.1)
 
     def test_the_line_fits_a_narrow_terminal(self):
-        _, chunks, _ = on_terminal("info", self.scene, columns=24, run_s=0.04)
+        _, chunks, _ = on_terminal("info", self.large_mesh, columns=24, run_s=0.01)
         seen = b"".join(data for _, data in chunks)
         self.assertRegex(seen, PROGRESS)
         for line in re.split(rb"[\r\n]", seen):
@@ -185,8 +185,8 @@ class Progress(unittest.TestCase):
         self.assertEqual(shown(b"".join(data for _, data in chunks)), [""])
 
     def test_quiet(self):
-        for args in (["--quiet", "info", self.scene], ["info", self.scene, "--quiet"]):
-            status, chunks, out = on_terminal(*args, run_s=0.1)
+        for args in (["--quiet", "info", self.large_mesh], ["info", self.large_mesh, "--quiet"]):
+            status, chunks, out = on_terminal(*args, run_s=0.01)
             self.assertEqual(status, 0)
             self.assertEqual(b"".join(data for _, data in chunks), b"")
             self.assertIn(b"vertices", out)
