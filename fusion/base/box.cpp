@@ -1,6 +1,5 @@
 #include "fusion/base/box.hpp"
 
-#include <algorithm>
 #include <limits>
 
 namespace spectra::base {
@@ -8,11 +7,6 @@ namespace spectra::base {
 Bounds empty_bounds() {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
-}
-
-void include(Bounds& bounds, const Vec3f& p) {
-  bounds.min = {std::min(bounds.min.x, p.x), std::min(bounds.min.y, p.y), std::min(bounds.min.z, p.z)};
-  bounds.max = {std::max(bounds.max.x, p.x), std::max(bounds.max.y, p.y), std::max(bounds.max.z, p.z)};
 }
 
 Bounds bounds_of(std::span<const Vec3f> positions) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -10,7 +11,10 @@ namespace spectra::base {
 
 /// Of nothing: min above max.
 Bounds empty_bounds();
-void include(Bounds& bounds, const Vec3f& p);
+inline void include(Bounds& bounds, const Vec3f& p) {
+  bounds.min = {std::min(bounds.min.x, p.x), std::min(bounds.min.y, p.y), std::min(bounds.min.z, p.z)};
+  bounds.max = {std::max(bounds.max.x, p.x), std::max(bounds.max.y, p.y), std::max(bounds.max.z, p.z)};
+}
 
 /// Smallest box of some positions; of none: min above max.
 Bounds bounds_of(std::span<const Vec3f> positions);

@@ -5,26 +5,22 @@
 #include <limits>
 #include <utility>
 
+#include "fusion/base/box.hpp"
+#include "fusion/base/vector.hpp"
+
 namespace spectra::mesh {
 
 namespace {
 
-using Vector = std::array<double, 3>;
+using base::difference;
+using base::dot;
+using base::Vector;
+using base::vector_of;
 
 constexpr std::size_t kLeafSize = 4;
 constexpr std::size_t kSpacingSamples = 1024;
 /// Halving a range of 2^32 elements is at most this deep.
 constexpr std::size_t kMostWaiting = 64;
-
-Vector vector_of(const base::Vec3f& p) {
-  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
-}
-Vector difference(const Vector& a, const Vector& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 double squared_distance_to_box(const Vector& p, const base::Bounds& box) {
   const Vector low = vector_of(box.min);
@@ -40,11 +36,6 @@ double squared_distance_to_box(const Vector& p, const base::Bounds& box) {
 /// Whether all that is in the box is at the position.
 bool is_at(const Vector& p, const base::Bounds& box) {
   return vector_of(box.min) == p && vector_of(box.max) == p;
-}
-
-void include(base::Bounds& box, const base::Vec3f& p) {
-  box.min = {std::min(box.min.x, p.x), std::min(box.min.y, p.y), std::min(box.min.z, p.z)};
-  box.max = {std::max(box.max.x, p.x), std::max(box.max.y, p.y), std::max(box.max.z, p.z)};
 }
 
 float coordinate(const base::Vec3f& p, std::size_t axis) {

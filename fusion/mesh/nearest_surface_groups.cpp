@@ -6,31 +6,23 @@
 #include <tuple>
 #include <vector>
 
+#include "fusion/base/vector.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
 
 namespace spectra::mesh {
 
 namespace {
 
-using Vector = std::array<double, 3>;
+using base::cross;
+using base::difference;
+using base::dot;
+using base::Vector;
+using base::vector_of;
 
 constexpr std::size_t kReportedAt = 4096;
 /// Ordinary searches look at some ten leaves.
 constexpr std::uint32_t kMostLeaves = 64;
 constexpr std::size_t kSamples = 256;
-
-Vector vector_of(const base::Vec3f& p) {
-  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
-}
-Vector difference(const Vector& a, const Vector& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-Vector cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 /// What is far beyond any surface stays so.
 float float_of(double value) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "fusion/base/vector.hpp"
 #include "server/stream/view_selection.hpp"
 
 namespace spectra::stream {
@@ -20,17 +21,11 @@ constexpr double kWidestPoint = 32;
 /// What is nearer to the eye than this share of the distance to what is looked at cannot be told from the eye.
 constexpr double kNearShare = 1e-4;
 
-using Vector = std::array<double, 3>;
+using base::cross;
+using base::dot;
+using base::Vector;
+using base::vector_of;
 
-Vector vector_of(const base::Vec3f& v) {
-  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-Vector cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Vector unit(const Vector& a) {
   const double size = std::sqrt(dot(a, a));
   return {a[0] / size, a[1] / size, a[2] / size};

@@ -107,6 +107,19 @@ class LiveFeedTest : public ::testing::Test {
     const std::lock_guard lock(mutex_);
     return std::exchange(unit_count_, 0);
   }
+  /// A feed that makes the map in parts, with a sender.
+  void begin_in_parts() {
+    mapping::MapperSettings in_parts = settings();
+    in_parts.submaps.emplace();
+    own_ = feed_of(in_parts);
+    EXPECT_EQ(begun(), "begun");
+    EXPECT_EQ(code_of(calibrate()), "taken");
+  }
+  void map_a_picture() {
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
+    EXPECT_EQ(code_of(depth(0.05)), "taken");
+    EXPECT_GT(units_within(5s), 0U);
+  }
   std::unique_ptr<LiveFeed> own_ = feed_of(settings());
 };
 
@@ -233,11 +246,7 @@ TEST_F(LiveFeedTest, TracksOnAfterTheOnlyPose) {
 }
 
 TEST_F(LiveFeedTest, RefusesPosesThatCannotBeMeant) {
-  mapping::MapperSettings in_parts = settings();
-  in_parts.submaps.emplace();
-  own_ = feed_of(in_parts);
-  EXPECT_EQ(begun(), "begun");
-  EXPECT_EQ(code_of(calibrate()), "taken");
+  begin_in_parts();
   EXPECT_EQ(code_of(pose(0, 1e308)), "bad_pose");
   EXPECT_EQ(code_of(pose(0.01, 1e6)), "bad_pose");
   for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
@@ -252,14 +261,8 @@ TEST_F(LiveFeedTest, RefusesPosesThatCannotBeMeant) {
 }
 
 TEST_F(LiveFeedTest, CorrectionsOfBeforeTheLinkBrokeSpeakOfThatTime) {
-  mapping::MapperSettings in_parts = settings();
-  in_parts.submaps.emplace();
-  own_ = feed_of(in_parts);
-  EXPECT_EQ(begun(), "begun");
-  EXPECT_EQ(code_of(calibrate()), "taken");
-  for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
-  EXPECT_EQ(code_of(depth(0.05)), "taken");
-  EXPECT_GT(units_within(5s), 0U);
+  begin_in_parts();
+  map_a_picture();
   own_->end();
   EXPECT_EQ(begun(), "begun");
   FrameHead corrected;
@@ -273,14 +276,8 @@ TEST_F(LiveFeedTest, CorrectionsOfBeforeTheLinkBrokeSpeakOfThatTime) {
 }
 
 TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
-  mapping::MapperSettings in_parts = settings();
-  in_parts.submaps.emplace();
-  own_ = feed_of(in_parts);
-  EXPECT_EQ(begun(), "begun");
-  EXPECT_EQ(code_of(calibrate()), "taken");
-  for (int i = 0; i < 4; ++i) EXPECT_EQ(code_of(pose(0.05 * i)), "taken");
-  EXPECT_EQ(code_of(depth(0.05)), "taken");
-  EXPECT_GT(units_within(5s), 0U);
+  begin_in_parts();
+  map_a_picture();
   FrameHead corrected;
   corrected.kind = FramesKind::CorrectedPoses;
   corrected.poses = {{0.05, 0, 0, 1, 0, 0, 0, 1}, {0.1, 0, 0, 1, 0, 0, 0, 0.5}};
