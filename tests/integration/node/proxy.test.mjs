@@ -67,16 +67,23 @@ async function freePort() {
   return port;
 }
 
+/** A body is sent once it is asked for, as curl does: else Caddy passes a refusal on and closes on who is still sending. */
 function ask(port, target, { method = "GET", headers = {}, body } = {}) {
   return new Promise((resolve, reject) => {
-    const options = { hostname: "127.0.0.1", port, path: target, method, servername: NAME, ca, agent: false, headers: { Host: NAME, ...headers } };
+    const expect = body ? { Expect: "100-continue", "Content-Length": body.length } : {};
+    const options = { hostname: "127.0.0.1", port, path: target, method, servername: NAME, ca, agent: false, headers: { Host: NAME, ...headers, ...expect } };
     const request = https.request(options, (response) => {
       let text = "";
       response.on("data", (chunk) => (text += chunk));
-      response.on("end", () => resolve({ status: response.statusCode, text }));
+      response.on("end", () => {
+        resolve({ status: response.statusCode, text });
+        request.destroy();
+      });
     });
     request.on("error", reject);
-    request.end(body);
+    if (!body) return void request.end();
+    request.once("continue", () => request.end(body));
+    request.flushHeaders();
   });
 }
 
