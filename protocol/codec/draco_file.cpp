@@ -118,7 +118,7 @@ Quantised<float> quantised_temperatures(std::span<const float> temperature_celsi
 void add_metadata(draco::Mesh& mesh, const DracoFileInput& input, const DracoFile& file, int temperature_attribute) {
   auto whole = std::make_unique<draco::GeometryMetadata>();
   whole->AddEntryDoubleArray("origin_m", {input.origin_m.begin(), input.origin_m.end()});
-  if (input.position_step_m > 0) whole->AddEntryDouble("position_step_m", static_cast<double>(input.position_step_m));
+  if (file.position_step_m > 0) whole->AddEntryDouble("position_step_m", static_cast<double>(file.position_step_m));
   mesh.AddMetadata(std::move(whole));
   if (temperature_attribute < 0) return;
   auto temperature = std::make_unique<draco::AttributeMetadata>();
@@ -198,26 +198,41 @@ bool is_crowded(std::size_t vertex_count, std::span<const TileTriangle> triangle
   return false;
 }
 
-int encoding_method(bool is_point_cloud, DracoKeeping keeping, bool has_lattice) {
+int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
   if (is_point_cloud)
-    return keeping == DracoKeeping::Shape && has_lattice ? draco::POINT_CLOUD_KD_TREE_ENCODING
-                                                         : draco::POINT_CLOUD_SEQUENTIAL_ENCODING;
+    return keeping == DracoKeeping::Shape ? draco::POINT_CLOUD_KD_TREE_ENCODING
+                                          : draco::POINT_CLOUD_SEQUENTIAL_ENCODING;
   return keeping == DracoKeeping::Shape ? draco::MESH_EDGEBREAKER_ENCODING : draco::MESH_SEQUENTIAL_ENCODING;
 }
 
 }  // namespace
 
-Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed) {
-  BOOST_OUTCOME_TRYV(check(input, keeping, speed));
+Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping wanted, int speed) {
+  BOOST_OUTCOME_TRYV(check(input, wanted, speed));
+  DracoKeeping keeping = wanted;
   if (keeping == DracoKeeping::Shape && is_crowded(input.positions_m.size(), input.triangles))
     keeping = DracoKeeping::Order;
+  const bool is_point_cloud = input.triangles.empty();
+  const bool is_exact = keeping == DracoKeeping::Everything;
+  const bool is_shape = !is_point_cloud && keeping == DracoKeeping::Shape;
   DracoFile file;
+  std::vector<std::array<float, 3>> of_shape;
+  if (is_shape) of_shape = positions_of_shape(input, file);
+  const std::span<const std::array<float, 3>> positions_m = is_shape ? of_shape : input.positions_m;
+  std::optional<Quantised<std::array<float, 3>>> lattice;
+  if (!is_exact && input.position_step_m > 0) {
+    lattice = quantised_positions(positions_m, input.position_step_m);
+    // The step may have been found for a shape, which has fewer vertices.
+    if (!lattice && keeping == wanted) return internal("the scene is too large for its position step");
+  }
+  file.position_step_m = lattice ? input.position_step_m : 0;
+  // Draco's tree of points takes lattices only.
+  if (is_point_cloud && !lattice && keeping == DracoKeeping::Shape) keeping = DracoKeeping::Order;
   file.kept = keeping;
   draco::Mesh mesh;
   mesh.set_num_points(static_cast<std::uint32_t>(input.positions_m.size()));
   draco::EncoderOptions options = draco::EncoderOptions::CreateDefaultOptions();
   options.SetSpeed(speed, speed);
-  const bool is_exact = keeping == DracoKeeping::Everything;
   const auto add_positions = [&](std::span<const std::array<float, 3>> values) {
     return add_attribute<std::array<float, 3>>(mesh, draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, false,
                                                values);
@@ -225,17 +240,9 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   const auto add_temperatures = [&](std::span<const float> values) {
     return add_attribute<float>(mesh, draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 1, false, values);
   };
-  const bool is_point_cloud = input.triangles.empty();
-  const bool is_shape = !is_point_cloud && keeping == DracoKeeping::Shape;
-  const bool has_lattice = !is_exact && input.position_step_m > 0;
-  std::vector<std::array<float, 3>> of_shape;
-  if (is_shape) of_shape = positions_of_shape(input, file);
-  const std::span<const std::array<float, 3>> positions_m = is_shape ? of_shape : input.positions_m;
-  if (!has_lattice) {
+  if (!lattice) {
     add_positions(positions_m);
   } else {
-    const auto lattice = quantised_positions(positions_m, input.position_step_m);
-    if (!lattice) return internal("the scene is too large for its position step");
     options.SetAttributeOptions(add_positions(lattice->values),
                                 quantisation_options(lattice->origin, lattice->largest, lattice->step));
   }
@@ -244,10 +251,10 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   if (!input.temperature_celsius.empty() && is_exact) {
     temperature_attribute = add_temperatures(input.temperature_celsius);
   } else if (!input.temperature_celsius.empty()) {
-    const auto lattice = quantised_temperatures(input.temperature_celsius, file);
-    temperature_attribute = add_temperatures(lattice.values);
+    const auto steps = quantised_temperatures(input.temperature_celsius, file);
+    temperature_attribute = add_temperatures(steps.values);
     options.SetAttributeOptions(temperature_attribute,
-                                quantisation_options({&lattice.origin, 1}, lattice.largest, lattice.step));
+                                quantisation_options({&steps.origin, 1}, steps.largest, steps.step));
   }
   if (!is_point_cloud && keeping != DracoKeeping::Shape) {
     const std::uint64_t fewest = (input.positions_m.size() + 2) / 3;
@@ -264,7 +271,7 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, 
   draco::ExpertEncoder encoder =
       is_point_cloud ? draco::ExpertEncoder(static_cast<const draco::PointCloud&>(mesh)) : draco::ExpertEncoder(mesh);
   encoder.Reset(options);
-  encoder.SetEncodingMethod(encoding_method(is_point_cloud, keeping, has_lattice));
+  encoder.SetEncodingMethod(encoding_method(is_point_cloud, keeping));
   encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;
   if (const draco::Status status = encoder.EncodeToBuffer(&buffer); !status.ok())

@@ -31,8 +31,10 @@ struct DracoFileInput {
 /// One Draco stream and what it has lost.
 struct DracoFile {
   std::vector<std::byte> bytes;
-  DracoKeeping kept = DracoKeeping::
-      Shape;  ///< What was asked for, or Order for a Shape with very many triangles round a vertex or an edge.
+  /// What was asked for, or Order for a Shape with very many triangles round a vertex or an edge, and for one of points without a lattice.
+  DracoKeeping kept = DracoKeeping::Shape;
+  /// Of the lattice; 0: positions are as they were, also where Order is kept for a Shape and all vertices are too far apart for its step.
+  float position_step_m = 0;
   float temperature_step_celsius = 0;         ///< 0: exact, or none.
   std::uint64_t left_out_vertex_count = 0;    ///< Of no triangle.
   std::uint64_t left_out_triangle_count = 0;  ///< That name a vertex twice.
@@ -55,6 +57,6 @@ inline constexpr float kDracoTemperatureStepCelsius = 1.0F / 64;
 /// position_step_m, if there is one. Decoded values are within half a step of those that went in. `speed` 0 (smallest) .. 10 (fastest).
 /// A decoder takes no more than three vertices for every triangle of a mesh whose order is kept: where there are too few,
 /// triangles that name the first vertex three times follow. InternalError for arrays that do not belong together.
-Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping keeping, int speed);
+Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping wanted, int speed);
 
 }  // namespace spectra::protocol::codec

@@ -36,9 +36,9 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
   if (options.keeping == protocol::codec::DracoKeeping::Everything) return losses;
   const float coarsest_m = std::max(options.position_step_m, options.largest_position_step_m);
   std::string rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m),
-                                    coarsest_m > options.position_step_m ? ", finer where the form is finer," : "");
+                                    coarsest_m > options.position_step_m ? ", finer where the form is finer" : "");
   if (file.temperature_step_celsius > 0) {
-    rounded += fmt::format(" and temperatures to {:g} degC", file.temperature_step_celsius);
+    rounded += fmt::format(", temperatures to {:g} degC", file.temperature_step_celsius);
   }
   losses.push_back({"rounded_values", 0, "In the file " + rounded + "; --lossless keeps every value as it is"});
   add("over_range_written", file.over_range_count,
@@ -47,7 +47,7 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
   add("under_range_written", file.under_range_count,
       fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
                   file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
-  add("no_lattice", options.position_step_m > 0 ? 0 : 1,
+  add("no_lattice", file.position_step_m > 0 ? 0 : 1,
       "In the file positions are floats, which makes it larger: the scene reaches too far for one lattice of its own "
       "step");
   if (file.kept == protocol::codec::DracoKeeping::Order) return losses;
@@ -186,16 +186,16 @@ base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::Multisp
       for (const std::uint32_t v : triangle) round(v);
     }
   }
-  // Of what is written.
-  std::vector<base::Vec3f> written;
+  base::Bounds written = base::empty_bounds();
   if (options.keeping == protocol::codec::DracoKeeping::Shape && !mesh.triangles().empty()) {
     for (const auto& [a, b, c] : mesh.triangles()) {
-      if (a != b && b != c && c != a) written.insert(written.end(), {positions[a], positions[b], positions[c]});
+      if (a == b || b == c || c == a) continue;
+      for (const std::uint32_t v : {a, b, c}) base::include(written, positions[v]);
     }
   } else {
-    written.assign(positions.begin(), positions.end());
+    written = base::bounds_of(positions);
   }
-  const float step_m = stream::one_step_for_all(finest_m, base::bounds_of(written));
+  const float step_m = stream::one_step_for_all(finest_m, written);
   options.position_step_m = step_m <= usual_step_m ? step_m : 0;
   options.largest_position_step_m = std::max(options.largest_position_step_m, options.position_step_m);
   return base::success();

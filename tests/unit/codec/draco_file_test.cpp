@@ -353,6 +353,19 @@ TEST(DracoFile, OfAShapeIsRoundedByWhatIsInIt) {
   EXPECT_EQ(decoded(file.value().bytes).positions.size(), 3U);
 }
 
+TEST(DracoFile, OfACrowdWithAVertexFarAwayHasPositionsAsTheyAre) {
+  // Written in order for its crowd, so that the far vertex of no triangle is in it.
+  const Scene scene =
+      numbered({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-5e5F, -4e6F, 0}}, std::vector<TileTriangle>(400, {0, 1, 2}));
+  const auto file = draco_file(scene.input(0.0009765625F), DracoKeeping::Shape, 5);
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file.value().kept, DracoKeeping::Order);
+  EXPECT_EQ(file.value().position_step_m, 0);
+  const Decoded seen = decoded(file.value().bytes);
+  EXPECT_EQ(std::set(seen.positions.begin(), seen.positions.end()),
+            std::set(scene.positions.begin(), scene.positions.end()));
+}
+
 TEST(DracoFile, WithoutAStepHasPositionsAsTheyAre) {
   const Scene mesh = numbered({{0, 0, 0}, {1e-5F, 0, 0}, {0, 1e-5F, 4e6F}}, {{0, 1, 2}});
   Scene cloud = mesh;
@@ -364,6 +377,7 @@ TEST(DracoFile, WithoutAStepHasPositionsAsTheyAre) {
       const Decoded seen = decoded(file.value().bytes);
       EXPECT_EQ(std::set(seen.positions.begin(), seen.positions.end()),
                 std::set(scene.positions.begin(), scene.positions.end()));
+      EXPECT_EQ(file.value().kept, scene.triangles.empty() ? DracoKeeping::Order : keeping);
     }
   }
 }
