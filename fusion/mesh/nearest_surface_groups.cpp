@@ -2,10 +2,10 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <tuple>
 #include <vector>
 
+#include "fusion/base/parallel_for.hpp"
 #include "fusion/base/vector.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
 
@@ -36,19 +36,6 @@ float reach_of(double value) {
   return value < kAny ? static_cast<float>(value) : std::numeric_limits<float>::infinity();
 }
 
-/// Calls `work(i)` for each of 0..count once, in as many threads as there are processors.
-template <class Work>
-void for_each_of(std::size_t count, const Work& work) {
-  std::atomic<std::size_t> next = 0;
-  const auto run = [&] {
-    for (std::size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::jthread> threads;
-  const std::size_t thread_count = std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), count);
-  for (std::size_t i = 1; i < thread_count; ++i) threads.emplace_back(run);
-  run();
-}
-
 }  // namespace
 
 /// Looks from groups of positions at a list of elements, parts the group, and strikes from the list what is nearest to none of the part. What
@@ -71,7 +58,7 @@ class NearestSurface::Groups {
   void run(std::span<std::uint32_t> indices, const Found& found) const {
     constexpr std::size_t kLeastOfThread = 256, kMostGroups = 16;
     const auto groups = parts_of(indices, kMostGroups, kLeastOfThread);
-    for_each_of(groups.size(), [&](std::size_t i) { descend(groups[i], all_, 0, found); });
+    base::parallel_for(groups.size(), [&](std::size_t i) { descend(groups[i], all_, 0, found); });
   }
 
  private:
@@ -351,7 +338,7 @@ void NearestSurface::find_all(std::span<const base::Vec3f> from, double max_dist
   } else {
     const std::size_t range_count = (from.size() + kReportedAt - 1) / kReportedAt;
     std::vector<std::vector<std::uint32_t>> hard_of_range(range_count);
-    for_each_of(range_count, [&](std::size_t range) {
+    base::parallel_for(range_count, [&](std::size_t range) {
       const std::size_t begin = range * kReportedAt, end = std::min(from.size(), begin + kReportedAt);
       for (std::size_t i = begin; i < end; ++i) {
         Search state;

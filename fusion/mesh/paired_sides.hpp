@@ -30,7 +30,7 @@ struct PairedSides {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> cut_neighbours;
 };
 
-/// Pairs all edges at once: linear time, at most 80 bytes a triangle while it runs.
+/// Pairs all edges at once: linear time; while it runs 60 bytes a triangle of a manifold, 130 where every edge is cut.
 /// Triangles with a vertex twice or an index that is not below `vertex_count` take no part. At most 1.4 billion triangles.
 /// `progress` is told of kTopologyPhase.
 PairedSides paired_sides(std::size_t vertex_count, std::span<const base::Triangle> triangles,

@@ -28,16 +28,9 @@ namespace {
 using Run = std::function<int()>;
 constexpr const char* kQuietHelp = "No progress on the terminal";
 
-constexpr std::array kReadingOptions{"--temperature-property",
-                                     "--temperature-unit",
-                                     "--temperature-scale",
-                                     "--temperature-offset",
-                                     "--no-data",
-                                     "--scale",
-                                     "--up"};
-
-/// The options of every command that reads a scene: what a person knows of the file.
-void add_reading(CLI::App& command, files::ReadOptions& options) {
+/// The options of every command that reads a scene: what a person knows of the file. Returns them.
+std::vector<const CLI::Option*> add_reading(CLI::App& command, files::ReadOptions& options) {
+  const auto before = static_cast<std::ptrdiff_t>(command.get_options().size());
   command.add_option("--temperature-property", options.temperature_property,
                      "The property that holds the temperature, whatever its name");
   const auto set_unit = [&options](const std::string& name) {
@@ -73,6 +66,8 @@ void add_reading(CLI::App& command, files::ReadOptions& options) {
   for (const char* name : {"--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
     command.get_option(name)->check(is_number);
   }
+  const auto all = command.get_options();
+  return {all.begin() + before, all.end()};
 }
 
 void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
@@ -175,16 +170,17 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   };
   command->add_option_function<std::string>(
       "--invite", set_invited, "Print a link and a QR code that let one browser in, as viewer or operator");
-  add_reading(*command, options.read);
+  const auto reading = add_reading(*command, options.read);
   command->add_option("--web", options.web, "Folder of the built web client");
   command->add_option("--threads", options.thread_count, "Threads that fuse and encode; 0 = one a processor")
       ->check(CLI::Range(0, 1024));
   command->fallthrough();  // --config belongs to the whole program
-  command->final_callback([&options, &run, command] {
-    for (const char* name : kReadingOptions) {
-      if (!options.scene && command->count(name) > 0) {
+  command->final_callback([&options, &run, reading] {
+    for (const CLI::Option* option : reading) {
+      if (!options.scene && option->count() > 0) {
         throw CLI::ValidationError(
-            name, "it says something of a scene file, and there is none; a block that is put says it in its query");
+            option->get_name(),
+            "it says something of a scene file, and there is none; a block that is put says it in its query");
       }
     }
     run = [&options] { return run_serve(options); };
