@@ -194,7 +194,8 @@ base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& 
 
 /// Holes are at one place that is far from everything, or at 0 0 0 where no triangle uses it; or have a coordinate that stands for none.
 void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
-  sample_.conclude(interpretation_.metres_per_unit);
+  sample_.conclude(interpretation_.metres_per_unit,
+                   [&faces](std::uint64_t vertex) { return faces.is_referenced(vertex); });
   facts_.bulk = sample_.bulk();
   facts_.origin = interpretation_.origin.value_or(scene_origin(facts_.min, facts_.max, facts_.bulk));
   // Near 0 every number of a text has more digits than a float, and loses nothing that can be seen.

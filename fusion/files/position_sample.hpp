@@ -1,12 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "fusion/base/vertex_types.hpp"
+#include "fusion/files/coordinate_hole.hpp"
 
 namespace spectra::files {
 
@@ -17,27 +17,11 @@ struct Bulk {
   double extent() const;
 };
 
-/// What stands for "no position" in a file: a place, or one coordinate, such as the height of cells that nobody has measured.
-struct Hole {
-  base::Vec3d place;                           ///< Metres.
-  std::array<bool, 3> axes{true, true, true};  ///< Which of its coordinates tell.
-
-  bool has(const base::Vec3d& p) const {
-    return (!axes[0] || p.x == place.x) && (!axes[1] || p.y == place.y) && (!axes[2] || p.z == place.z);
-  }
-};
-
 /// A place that stands for "no position", as files without nan write the holes of an organised cloud.
 struct HolePlace {
   base::Vec3d place;
   std::vector<std::uint64_t> vertices;  ///< Some of those that are there.
   bool is_far = false;                  ///< Farther from the bulk than that is large.
-};
-
-/// A number that many vertices have for one of their coordinates, far from all others.
-struct SharedCoordinate {
-  Hole as_hole;
-  double share = 0;  ///< Of all vertices.
 };
 
 /// Up to 16,384 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a
@@ -50,31 +34,25 @@ class PositionSample {
   void add(std::uint64_t first_vertex, std::span<const base::Vec3d> positions);
 
   /// Looks for holes and bulk, in time and memory of the sample. `metres` in one unit of the file.
-  void conclude(double metres);
+  void conclude(double metres, const IsUsed& is_used);
   /// One place that has a dozen vertices of the sample and eight times as many as any other, when the others are a dozen too.
   const std::optional<HolePlace>& hole() const { return hole_; }
-  /// One coordinate that a dozen vertices of the sample share exactly, farther from all others than those are from each other:
-  /// a customary number for "none" (-9999, -10000, -32768, ...), or any that is twice as far away as the scene is large.
+  /// One coordinate that stands for "not measured" (find_coordinate_holes).
   const std::optional<Hole>& coordinate_hole() const { return coordinate_hole_; }
-  /// One that may be such a number, but is not as far away.
+  /// One that may be such a number, but is not certain.
   const std::optional<SharedCoordinate>& shared_coordinate() const { return shared_coordinate_; }
   /// Around the medians of the coordinates, 32 times as far as half of the vertices are; nullopt when that is one place.
   const std::optional<Bulk>& bulk() const { return bulk_; }
 
  private:
-  struct Entry {
-    std::uint64_t vertex = 0;
-    base::Vec3d position;
-  };
   void choose_next();
-  void find_coordinate_hole(double metres);
   void find_hole();
   void find_bulk();
 
   std::uint64_t bucket_size_;
   std::uint64_t bucket_ = 0;
   std::uint64_t next_vertex_ = 0;
-  std::vector<Entry> entries_;
+  std::vector<SampledVertex> entries_;
   std::optional<HolePlace> hole_;
   std::optional<Hole> coordinate_hole_;
   std::optional<SharedCoordinate> shared_coordinate_;

@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import path from "node:path";
 import { after, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { gzipSync } from "node:zlib";
+import { gunzipSync, gzipSync } from "node:zlib";
 import { readPly } from "./ply.mjs";
 import { binary, run, serve } from "./spectra_server.mjs";
 
@@ -17,6 +17,31 @@ const inField = (name) => path.join(field, name);
 const info = (name, ...options) => JSON.parse(run("info", inField(name), "--json", ...options));
 const note = (facts, id) => facts.notes.find((candidate) => candidate.id === id);
 const isUsual = ({ temperature }) => Math.abs(temperature.min - 18) < 0.2 && Math.abs(temperature.max - 32.517) < 0.01;
+
+/** How many vertices and faces the header of a file promises. */
+function promised(name) {
+  const bytes = readFileSync(inField(name));
+  const header = (name.endsWith(".gz") ? gunzipSync(bytes) : bytes).toString("latin1").split("end_header")[0];
+  return ["vertex", "face"].map((element) => Number(new RegExp(`^\\s*element\\s+${element}\\s+(\\d+)`, "m").exec(header)?.[1] ?? 0));
+}
+
+test("nothing is left out but what has no position or is no triangle", () => {
+  const REFUSED = ["16-comma-decimals.ply", "24b-one-bad-index.ply", "31-cut-short.ply", "32-two-lines-a-vertex.ply"];
+  const OTHERS = {
+    "01-nan-positions.ply": [142, 0],
+    "01b-nan-positions-mesh.ply": [142, 233],
+    "22-triangle-strips.ply": [144, 242],
+    "24a-broken-faces.ply": [144, 242],
+    "42d-thermal-nan-positions.ply": [136, 0],
+  };
+  const names = readdirSync(field).filter((name) => !REFUSED.includes(name));
+  assert.ok(names.length >= 55, `${names.length} files`);
+  for (const name of names) {
+    const facts = info(name);
+    assert.deepEqual([facts.vertex_count, facts.triangle_count], OTHERS[name] ?? promised(name), name);
+    assert.equal(note(facts, "hole_vertices"), undefined, name);
+  }
+});
 
 test("the options of reading are there on the command line", () => {
   assert.ok(isUsual(info("06-kelvin.ply", "--temperature-unit", "kelvin")));

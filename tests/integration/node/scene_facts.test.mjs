@@ -51,10 +51,20 @@ test("strays are counted, and the box of the rest is told", async () => {
       assert.deepEqual(note(scene, "stray_points"), note(facts, "stray_points"));
     });
   }
-  for (const name of ["17a-one-vertex.ply", "17b-two-vertices.ply", "17c-line.ply", "17e-one-place.ply", "39-low-poly-room.ply", "40-long-pipe.ply"]) {
+  const forms = [
+    ["17a-one-vertex.ply", 1, 0],
+    ["17b-two-vertices.ply", 2, 0],
+    ["17c-line.ply", 144, 0],
+    ["17e-one-place.ply", 144, 0],
+    ["39-low-poly-room.ply", 24, 36, [8, 6, 3]],
+    ["40-long-pipe.ply", 24, 24, [60, 0.2, 0.2]],
+  ];
+  for (const [name, vertices, triangles, size] of forms) {
     const facts = info(inField(name));
-    assert.equal(note(facts, "stray_points"), undefined, name);
+    assert.deepEqual(facts.notes, [], name);
+    assert.deepEqual([facts.vertex_count, facts.triangle_count], [vertices, triangles], name);
     assert.deepEqual(facts.core_bounds, facts.bounds, name);
+    if (size) size.forEach((metres, axis) => assert.ok(Math.abs(facts.size_m[axis] - metres) < 1e-5, `${name}: ${facts.size_m}`));
   }
 });
 

@@ -210,6 +210,15 @@ TEST(FieldFiles, DegenerateScenesAreScenes) {
   }
 }
 
+TEST(FieldFiles, FlatPlacesFarFromEachOtherAreForm) {
+  for (const auto& [name, triangle_count] : {std::pair("39-low-poly-room.ply", 36U), {"40-long-pipe.ply", 24U}}) {
+    const LoadedScene scene = field_scene(name);
+    EXPECT_EQ(scene.mesh.vertex_count(), 24U) << name;
+    EXPECT_EQ(scene.mesh.triangle_count(), triangle_count) << name;
+    EXPECT_TRUE(scene.notes.empty()) << name << ": " << scene.notes[0].message;
+  }
+}
+
 TEST(FieldFiles, CoordinatesOfMapsAreExactOrTheirRoundingIsSaid) {
   const LoadedScene exact = field_scene("18a-utm-double.ply");
   EXPECT_EQ(note_count(exact, "rounded_positions"), 0U);
