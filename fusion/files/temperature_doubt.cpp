@@ -124,16 +124,21 @@ class Doubt {
            short_number(static_cast<double>(facts_.highest)) + ", taken as degC, ";
   }
   std::string no_data() const { return facts_.full_count > 0 ? "; if 65535 stands for no data, --no-data 65535" : ""; }
-  /// What they would be, without 65535.
+  /// What they would be, without 65535. Those below absolute zero count where they tell that these are hundredths.
   std::string celsius(double scale, double offset) const {
     const auto one = [&](float value) { return short_number(scale * static_cast<double>(value) + offset); };
-    return one(std::min(facts_.lowest, facts_.cold_low)) + " to " +
+    const bool has_cold = offset == 0 && has_cold_hundredths();
+    return one(has_cold ? std::min(facts_.lowest, facts_.cold_low) : facts_.lowest) + " to " +
            one(facts_.full_count > 0 && facts_.highest_but_full >= facts_.lowest ? facts_.highest_but_full
                                                                                  : facts_.highest) +
            " degC";
   }
   std::string reading(const std::string& name, double scale) const {
-    return name + " (" + celsius(scale, 0) + "): --temperature-scale " + short_number(scale);
+    const std::string none = value_text(static_cast<double>(facts_.coldest_none), PlyScalar::Float32);
+    // As tenths it is below absolute zero.
+    const bool is_none_possible = facts_.coldest_none < 0 && scale < 0.02;
+    return name + " (" + celsius(scale, 0) + "): --temperature-scale " + short_number(scale) +
+           (is_none_possible ? " --no-data " + none + " where that stands for none" : "");
   }
 
   const TemperatureFacts& facts_;

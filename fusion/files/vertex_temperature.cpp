@@ -14,7 +14,8 @@ constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max
 constexpr float kAbsoluteZeroCelsius = -273.15F;
 /// Hundredths of a degree are hardly ever outside of these.
 constexpr float kMostHundredths = 12'000;
-constexpr float kLeastHundredths = -10'000;
+constexpr float kLeastHundredths = -9'990;
+constexpr float kLeastNone = -10'000;
 
 /// A small negative number is 0 as a float, and not -0: what is written of it reads as 0.
 float rounded(double celsius) {
@@ -119,9 +120,12 @@ float TemperatureConversion::converted(double value, TemperatureFacts& facts) co
   }
   if (scaled < -kFloatMax || static_cast<float>(scaled) <= kAbsoluteZeroCelsius) {
     ++facts.impossible_count;
-    if (scaled >= static_cast<double>(kLeastHundredths)) {
-      facts.cold_low = std::min(facts.cold_low, static_cast<float>(scaled));
-      facts.cold_high = std::max(facts.cold_high, static_cast<float>(scaled));
+    const auto cold = static_cast<float>(std::max(scaled, -kFloatMax));
+    if (cold > kLeastHundredths) {
+      facts.cold_low = std::min(facts.cold_low, cold);
+      facts.cold_high = std::max(facts.cold_high, cold);
+    } else if (cold >= kLeastNone) {
+      facts.coldest_none = std::min(facts.coldest_none, cold);
     }
     return kNone;
   }

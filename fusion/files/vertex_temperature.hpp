@@ -39,9 +39,11 @@ struct TemperatureFacts {
   /// Of those above 3000, up to 12000.
   float hot_low = std::numeric_limits<float>::infinity();
   float hot_high = -std::numeric_limits<float>::infinity();
-  /// Of the impossible ones, down to -10000.
+  /// Of the impossible ones, down to -9990.
   float cold_low = std::numeric_limits<float>::infinity();
   float cold_high = -std::numeric_limits<float>::infinity();
+  float coldest_none =
+      0;  ///< The lowest of -10000 to -9990, which are hardly hundredths, but often stand for no data; 0: none.
 };
 
 /// Turns the numbers of a file into temperatures in degC: NaN where nothing was measured, +inf and -inf where the sensor

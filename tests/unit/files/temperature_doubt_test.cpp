@@ -15,14 +15,14 @@ using test::loaded;
 using test::note_text;
 
 /// What is said of `count` values from `low` on in even steps, then of the others.
-std::string said(std::string_view type, double low, double step, int count,
-                 const std::vector<std::string>& others = {}) {
+std::string said(std::string_view type, double low, double step, int count, const std::vector<std::string>& others = {},
+                 const std::string& name = "temperature") {
   std::string body;
   for (int i = 0; i < count; ++i) body += std::to_string(i) + " 0 0 " + std::to_string(low + step * i) + "\n";
   for (const std::string& other : others) body += "0 1 0 " + other + "\n";
   const std::string head = "ply\nformat ascii 1.0\nelement vertex " +
                            std::to_string(static_cast<std::size_t>(count) + others.size()) + "\n" + std::string(kXyz) +
-                           "property " + std::string(type) + " temperature\nend_header\n";
+                           "property " + std::string(type) + " " + name + "\nend_header\n";
   return note_text(loaded(head + body), "implausible_temperatures");
 }
 
@@ -56,6 +56,28 @@ TEST(TemperatureDoubt, SeveralBelowAbsoluteZeroAreHundredths) {
     EXPECT_EQ(text.find("no-data"), std::string::npos) << text;
   }
   EXPECT_EQ(said("float", 15, 1, 40, {"-9999", "-999", "-9999"}), "");
+}
+
+TEST(TemperatureDoubt, NoReadingHasDegreesBelowAbsoluteZero) {
+  for (const char* none : {"-9999", "-10000", "-9999.9"}) {
+    for (const char* type : {"float", "double"}) {
+      const std::string kelvin = said(type, 290, 1, 40, {none, none});
+      expect_in("tenths of a degree (29 to 32.9 degC): --temperature-scale 0.1, or like kelvin (16.85 to 55.85 degC)",
+                kelvin);
+      EXPECT_EQ(kelvin.find("no-data"), std::string::npos) << kelvin;
+      const std::string tenths = said(type, 2800, 10, 40, {none, none});
+      expect_in("hundredths of a degree (28 to 31.9 degC): --temperature-scale 0.01 --no-data " + std::string(none) +
+                    " where that stands for none, or like tenths of kelvin (6.85 to 45.85 degC)",
+                tenths);
+      // Also beside those that are cold themselves.
+      expect_in("hundredths of a degree (-5 to 35.9 degC): --temperature-scale 0.01 --no-data " + std::string(none),
+                said(type, -500, 40, 100, {none, "3590", none}));
+    }
+  }
+  expect_in("(which would make them 226.85 to 324.85 degC)",
+            said("int", 500, 2, 50, {"-300", "-400"}, "temperature_kelvin"));
+  // One number may stand for none.
+  expect_in("tenths of a degree (29 to 32.9 degC)", said("int", 290, 1, 40, {"-999", "-999"}));
 }
 
 TEST(TemperatureDoubt, TenthsAreNamedBesideKelvin) {
