@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 
 #include "fusion/files/name_words.hpp"
 
@@ -31,11 +32,19 @@ struct Triple {
   bool is_plain = false;
 };
 
-/// Those whose names differ in the channel alone.
+std::string joined(const Words& words) {
+  std::string name;
+  for (const std::string& word : words) name += word + ' ';
+  return name;
+}
+
+/// Those whose names differ in the channel alone; in time of the header's length.
 std::vector<Triple> triples_of(const PlyElement& element) {
   std::vector<Words> names;
+  std::unordered_map<std::string, std::size_t> first_of_name;
   for (const PlyProperty& property : element.properties) {
     names.push_back(property.is_list ? Words{} : name_words(property.name));
+    first_of_name.try_emplace(joined(names.back()), names.size() - 1);
   }
   std::vector<Triple> triples;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -48,9 +57,9 @@ std::vector<Triple> triples_of(const PlyElement& element) {
       for (std::size_t channel = 1; channel < 3; ++channel) {
         Words wanted = names[i];
         wanted[at] = channels[channel];
-        const auto found = std::find(names.begin(), names.end(), wanted);
-        is_whole = is_whole && found != names.end();
-        triple.properties[channel] = static_cast<std::size_t>(found - names.begin());
+        const auto found = first_of_name.find(joined(wanted));
+        is_whole = is_whole && found != first_of_name.end();
+        if (is_whole) triple.properties[channel] = found->second;
       }
       for (std::size_t word = 0; word < names[i].size(); ++word) {
         triple.is_plain = triple.is_plain && (word == at || has(kPlain, names[i][word]));

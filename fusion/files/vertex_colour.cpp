@@ -42,7 +42,8 @@ void ColourRange::add(std::span<const double> values) {
     if (!std::isfinite(value)) continue;
     largest = std::max(largest, value);
     lit_count += value > 0 ? 1U : 0U;
-    share_count += value > 0 && value < 1 ? 1U : 0U;
+    share_count += value > 0 && value <= 1 ? 1U : 0U;
+    has_fractions = has_fractions || value != std::floor(value);
   }
 }
 

@@ -15,11 +15,12 @@ namespace spectra::files {
 struct ColourRange {
   double largest = 0;             ///< Of the finite ones.
   std::uint64_t lit_count = 0;    ///< Above 0.
-  std::uint64_t share_count = 0;  ///< Between 0 and 1.
+  std::uint64_t share_count = 0;  ///< Above 0, up to 1.
+  bool has_fractions = false;
 
   void add(std::span<const double> values);
-  /// Most of them are shares of white, so that what is larger is over-exposed.
-  bool has_mostly_shares() const { return 4 * share_count > 3 * lit_count; }
+  /// Most of them are shares of white, so that what is larger is over-exposed. Whole numbers are dark levels.
+  bool has_mostly_shares() const { return has_fractions && 4 * share_count > 3 * lit_count; }
 };
 
 /// Turns the numbers of a file into visible colours: byte = round(factor * value + offset), or a packed one unpacked.

@@ -212,6 +212,17 @@ TEST(PlyReader, AnOverExposedColourDoesNotDarkenTheOthers) {
   }
   const LoadedScene dark = loaded(ascii_head(20, head) + levels);
   EXPECT_EQ(dark.mesh.visible()[19], (base::Rgb8{19, 1, 3}));
+  // White is a share, too; but where all numbers are whole, 1 is nearly black.
+  std::string white, ones;
+  for (int i = 0; i < 20; ++i) {
+    white += std::to_string(i) + " 0 0 1 1 " + (i % 2 == 0 ? "1" : "0.5") + '\n';
+    ones += std::to_string(i) + " 0 0 1 0 1\n";
+  }
+  const LoadedScene bright = loaded(ascii_head(21, head) + white + "0 1 0 7.06 7 7\n");
+  EXPECT_EQ(bright.mesh.visible()[0], (base::Rgb8{255, 255, 255}));
+  EXPECT_EQ(bright.mesh.visible()[1], (base::Rgb8{255, 255, 128}));
+  EXPECT_EQ(note_count(bright, "clamped_colours"), 1U);
+  EXPECT_EQ(loaded(ascii_head(21, head) + ones + "0 1 0 255 0 0\n").mesh.visible()[0], (base::Rgb8{1, 0, 1}));
 }
 
 TEST(PlyReader, BytesDeclaredAsCharAreBytes) {
