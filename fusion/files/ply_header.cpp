@@ -54,6 +54,30 @@ std::vector<std::string_view> words_of(std::string_view line) {
   return words;
 }
 
+struct CodeRange {
+  std::uint32_t first, last;
+};
+
+/// Characters that are not seen themselves, but move a terminal, turn the text beside them round, or make two names look the
+/// same: controls and formats (categories Cc, Cf, Zl and Zp of Unicode).
+constexpr std::array<CodeRange, 17> kUnseen = {{{0, 0x9F},
+                                                {0xAD, 0xAD},
+                                                {0x600, 0x605},
+                                                {0x61C, 0x61C},
+                                                {0x6DD, 0x6DD},
+                                                {0x70F, 0x70F},
+                                                {0x890, 0x891},
+                                                {0x8E2, 0x8E2},
+                                                {0x180E, 0x180E},
+                                                {0x200B, 0x200F},
+                                                {0x2028, 0x202E},
+                                                {0x2060, 0x206F},
+                                                {0xFEFF, 0xFEFF},
+                                                {0xFFF9, 0xFFFB},
+                                                {0x13430, 0x1343F},
+                                                {0x1D173, 0x1D17A},
+                                                {0xE0000, 0xE007F}}};
+
 /// The bytes of the UTF-8 character that the text begins with; 0 when it is none, or one that a terminal obeys or that turns
 /// the text beside it round.
 std::size_t visible_character_bytes(std::string_view text) {
@@ -69,9 +93,9 @@ std::size_t visible_character_bytes(std::string_view text) {
   }
   constexpr std::array<std::uint32_t, 5> kLeast = {0, 0, 0x80, 0x800, 0x10000};
   const bool is_well_formed = code >= kLeast[size] && code <= 0x10FFFFU && (code < 0xD800U || code > 0xDFFFU);
-  const bool is_control = code < 0xA0U || (code >= 0x200BU && code <= 0x200FU) ||
-                          (code >= 0x2028U && code <= 0x202EU) || (code >= 0x2060U && code <= 0x206FU) ||
-                          code == 0xFEFFU;
+  const bool is_control = std::any_of(kUnseen.begin(), kUnseen.end(), [code](const CodeRange& range) {
+    return code >= range.first && code <= range.last;
+  });
   return is_well_formed && !is_control ? size : 0;
 }
 
