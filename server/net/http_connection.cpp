@@ -160,6 +160,18 @@ class SenderPlace {
   const std::int64_t count_;
 };
 
+/// Counts a connection, as long as it is there.
+class OpenConnection {
+ public:
+  explicit OpenConnection(std::atomic<std::int64_t>& count) : count_(count) { ++count_; }
+  ~OpenConnection() { --count_; }
+  OpenConnection(const OpenConnection&) = delete;
+  OpenConnection& operator=(const OpenConnection&) = delete;
+
+ private:
+  std::atomic<std::int64_t>& count_;
+};
+
 /// Where a handler leaves its answer; outlives both the connection and the handler.
 struct PendingReply {
   explicit PendingReply(const asio::any_io_executor& executor)
@@ -209,20 +221,19 @@ asio::awaitable<void> HttpConnection::run() {
   const auto peer = socket.remote_endpoint(error).address();
   peer_address_ = peer.to_string();
   is_from_here_ = is_loopback(peer);
-  context_.metrics.connections_open += 1;
-  if (context_.add(self)) {
-    try {
+  const OpenConnection open(context_.metrics.connections_open);
+  try {
+    const Registration registration(context_, self);
+    if (registration.is_taken()) {
       stream_.next_layer().expires_after(context_.options.limits.header_timeout);
       bool goes_on = co_await begin_encryption();
       for (bool is_first = true; goes_on; is_first = false) goes_on = co_await serve_one(is_first);
       if (is_body_unread_ && !is_handed_over_ && !is_stopping_) co_await see_off();
-    } catch (const std::exception& failure) {
-      spdlog::error("a connection failed: {}", failure.what());
     }
-    context_.remove(this);
+  } catch (const std::exception& failure) {
+    spdlog::error("a connection failed: {}", failure.what());
   }
   if (!is_handed_over_) stream_.next_layer().close();
-  context_.metrics.connections_open -= 1;
 }
 
 asio::awaitable<bool> HttpConnection::begin_encryption() {

@@ -98,6 +98,7 @@ struct HttpServer::State {
         io(static_cast<int>(context.options.io_thread_count)),
         acceptor(asio::make_strand(io)),
         accept_timer(acceptor.get_executor()),
+        reserve_timer(acceptor.get_executor()),
         signals(acceptor.get_executor()),
         hangups(acceptor.get_executor()) {}
 
@@ -105,6 +106,8 @@ struct HttpServer::State {
   asio::awaitable<void> accept_connections();
   /// What is short, in words; empty when nothing is.
   asio::awaitable<std::string> accept_one();
+  /// Those who are there take of the reserve of memory, too, whether anybody comes or not.
+  asio::awaitable<void> fill_memory_reserve();
   asio::awaitable<void> stop_in_stages();
   /// Says why, as far as the peer takes it at once, and closes.
   void refuse(tcp::socket& socket, std::string_view why);
@@ -117,6 +120,7 @@ struct HttpServer::State {
   asio::io_context io;
   tcp::acceptor acceptor;
   asio::steady_timer accept_timer;
+  asio::steady_timer reserve_timer;
   asio::signal_set signals;
   asio::signal_set hangups;
   tcp::endpoint endpoint;
@@ -226,10 +230,23 @@ asio::awaitable<std::string> HttpServer::State::accept_one() {
   co_return "";
 }
 
+asio::awaitable<void> HttpServer::State::fill_memory_reserve() {
+  while (!is_stopping) {
+    try {
+      reserve_timer.expires_after(context.options.limits.tick);
+      co_await reserve_timer.async_wait(kAwait);
+      refill_memory_reserve();
+    } catch (const std::bad_alloc&) {
+      std::this_thread::sleep_for(kMemoryPause);
+    }
+  }
+}
+
 asio::awaitable<void> HttpServer::State::stop_in_stages() {
   error_code ignored;
   acceptor.close(ignored);
   accept_timer.cancel();
+  reserve_timer.cancel();
   signals.cancel(ignored);
   hangups.cancel(ignored);
   for (const auto& connection : context.begin_stop()) connection->begin_stop();
@@ -289,6 +306,7 @@ void HttpServer::run() {
     state.reload_on_hangup();
   }
   asio::co_spawn(state.acceptor.get_executor(), state.accept_connections(), asio::detached);
+  asio::co_spawn(state.acceptor.get_executor(), state.fill_memory_reserve(), asio::detached);
   const auto work = [&state] {
     for (;;) {
       try {

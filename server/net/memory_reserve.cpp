@@ -2,6 +2,7 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -10,7 +11,7 @@
 namespace spectra::net {
 namespace {
 
-/// One for each thing that fails before the next connection is accepted; all values of a parsed message fit into it.
+/// One for each thing that fails before the reserve is filled again; all values of a parsed message fit into it.
 constexpr std::size_t kPartBytes = 512U << 10U;
 constexpr std::size_t kPartCount = 16;
 
@@ -46,6 +47,11 @@ bool refill_memory_reserve() {
     if (!part.compare_exchange_strong(none, memory)) ::munmap(memory, kPartBytes);
   }
   return true;
+}
+
+std::size_t memory_reserve_bytes() {
+  const auto kept = std::count_if(parts.begin(), parts.end(), [](const auto& part) { return part != nullptr; });
+  return static_cast<std::size_t>(kept) * kPartBytes;
 }
 
 }  // namespace spectra::net

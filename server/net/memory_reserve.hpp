@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 namespace spectra::net {
 
 /// From now on, where `new` finds no memory, a part of a reserve goes back to the system before std::bad_alloc is thrown, so that what was
@@ -8,7 +10,10 @@ namespace spectra::net {
 void keep_memory_reserve();
 
 /// Takes again what was given back. False as long as there is no memory for it: then nothing new is to be begun. True where no reserve
-/// is kept. Thread-safe.
+/// is kept. To be called again and again, for who holds memory already takes of the reserve, too. Thread-safe.
 bool refill_memory_reserve();
+
+/// What of it is there to be given back. Thread-safe.
+std::size_t memory_reserve_bytes();
 
 }  // namespace spectra::net

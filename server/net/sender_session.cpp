@@ -31,24 +31,25 @@ SenderSession::SenderSession(Transport stream, ServerContext& context, access::A
 asio::awaitable<void> SenderSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
   const auto self = shared_from_this();
-  beast::get_lowest_layer(ws_).expires_never();
-  set_up_websocket(ws_, context_.options.limits.header_timeout, std::string(kind_.subprotocol), kind_.largest_message);
-  ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
-    control_received(kind, {payload.data(), payload.size()});
-  });
-  const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
-  if (accept_error || !context_.add(self)) {
-    end(false, "the upgrade was not finished");
-    co_return;
-  }
-  spdlog::info("{} has come", kind_.name);
   try {
+    beast::get_lowest_layer(ws_).expires_never();
+    set_up_websocket(ws_, context_.options.limits.header_timeout, std::string(kind_.subprotocol),
+                     kind_.largest_message);
+    ws_.control_callback([this](websocket::frame_type kind, beast::string_view payload) {
+      control_received(kind, {payload.data(), payload.size()});
+    });
+    const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
+    const Registration registration(context_, self);
+    if (accept_error || !registration.is_taken()) {
+      end(false, "the upgrade was not finished");
+      co_return;
+    }
+    spdlog::info("{} has come", kind_.name);
     co_await (read_messages() && write_answers() && mind_deadlines());
   } catch (const std::exception& error) {
     spdlog::error("the session of {} failed: {}", kind_.name, error.what());
   }
   end(false, "");
-  context_.remove(this);
 }
 
 void SenderSession::control_received(websocket::frame_type kind, std::string_view payload) {

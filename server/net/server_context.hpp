@@ -110,4 +110,24 @@ class ServerContext {
   std::map<const Stoppable*, std::weak_ptr<Stoppable>> connections_;
 };
 
+/// A connection as the staged stop knows it, from here to the end of the scope, whatever is thrown there.
+class Registration {
+ public:
+  Registration(ServerContext& context, const std::shared_ptr<Stoppable>& connection)
+      : context_(context), connection_(connection.get()), is_taken_(context.add(connection)) {}
+  ~Registration() {
+    if (is_taken_) context_.remove(connection_);
+  }
+  Registration(const Registration&) = delete;
+  Registration& operator=(const Registration&) = delete;
+
+  /// False: the server is stopping already.
+  bool is_taken() const { return is_taken_; }
+
+ private:
+  ServerContext& context_;
+  const Stoppable* const connection_;
+  const bool is_taken_;
+};
+
 }  // namespace spectra::net

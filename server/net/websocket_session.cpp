@@ -37,6 +37,29 @@ WebSocketSession::WebSocketSession(Transport stream, ServerContext& context, Hel
       hello_form_(hello_form),
       who_(std::move(who)) {}
 
+/// That a session is there: it is put in order when this ends, also where the coroutine is lost because no memory was there to go on.
+class WebSocketSession::Presence {
+ public:
+  explicit Presence(WebSocketSession& session) : session_(session), metrics_(session.context_.metrics) {
+    metrics_.viewers += 1;
+    metrics_.viewers_total += 1;
+    metrics_.of(session_.who_.role).viewers += 1;
+  }
+  ~Presence() {
+    session_.finish();
+    metrics_.viewers -= 1;
+    metrics_.of(session_.who_.role).viewers -= 1;
+    metrics_.of(session_.who_.role).queued_bytes -=
+        static_cast<std::int64_t>(std::exchange(session_.control_bytes_, 0));
+  }
+  Presence(const Presence&) = delete;
+  Presence& operator=(const Presence&) = delete;
+
+ private:
+  WebSocketSession& session_;
+  NetMetrics& metrics_;
+};
+
 asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
   const auto self = shared_from_this();
@@ -52,15 +75,13 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   });
 
   const auto [accept_error] = co_await ws_.async_accept(request, kAwait);
-  if (accept_error || !context_.add(self)) {
+  const Registration registration(context_, self);
+  if (accept_error || !registration.is_taken()) {
     beast::get_lowest_layer(ws_).close();
     co_return;
   }
+  const Presence presence(*this);
   is_open_ = true;
-  context_.metrics.viewers += 1;
-  context_.metrics.viewers_total += 1;
-  NetMetrics::OfRole& of_role = context_.metrics.of(who_.role);
-  of_role.viewers += 1;
   try {
     client_ = context_.viewers(self);
     client_->opened();
@@ -68,16 +89,23 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   } catch (const std::exception& error) {
     spdlog::error("a viewer's session failed: {}", error.what());
   }
-  end(false, "");
-  if (client_) client_->closed();
-  client_.reset();
-  context_.metrics.viewers -= 1;
-  of_role.viewers -= 1;
-  of_role.queued_bytes -= static_cast<std::int64_t>(std::exchange(control_bytes_, 0));
-  context_.remove(this);
+}
+
+void WebSocketSession::finish() noexcept {
+  try {
+    end(false, "");
+  } catch (const std::exception& error) {
+    spdlog::error("a viewer's connection could not be closed: {}", error.what());
+  }
+  try {
+    if (client_) client_->closed();
+  } catch (const std::exception& error) {
+    spdlog::error("a viewer's session could not be put in order: {}", error.what());
+  }
 }
 
 asio::awaitable<void> WebSocketSession::read_messages() {
+  const auto self = shared_from_this();
   beast::flat_buffer buffer;
   while (!is_ended_) {
     const auto [error, size] = co_await ws_.async_read(buffer, kAwait);
@@ -85,6 +113,7 @@ asio::awaitable<void> WebSocketSession::read_messages() {
       end(false, error.message());
       co_return;
     }
+    if (is_ended_) co_return;
     context_.metrics.messages_received += 1;
     if (!closing_) {
       if (ws_.got_binary()) {
@@ -119,6 +148,7 @@ asio::awaitable<bool> WebSocketSession::write(Buffers buffers, bool is_text) {
 }
 
 asio::awaitable<void> WebSocketSession::write_messages() {
+  const auto self = shared_from_this();
   while (!is_ended_ && !is_close_answered_) {
     if (closing_) {
       co_await ws_.async_close(*closing_, kAwait);
@@ -156,6 +186,7 @@ asio::awaitable<void> WebSocketSession::write_messages() {
 }
 
 asio::awaitable<void> WebSocketSession::mind_deadlines() {
+  const auto self = shared_from_this();
   const NetLimits& limits = context_.options.limits;
   const auto& counted = beast::get_lowest_layer(ws_).rate_policy();
   std::uint64_t written_bytes = 0;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <exception>
 #include <functional>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
@@ -125,16 +126,20 @@ void ViewerSession::tell_mapping_trouble(const std::optional<std::string>& messa
 }
 
 void ViewerSession::closed() {
-  if (stream_) {
-    served_.memories.ended(id_, stream_->memory(), net::steady_seconds());
-    stream_->close();
-  }
+  served_.viewer_count -= 1;
   scene_subscription_ = {};
   progress_subscription_.reset();
   store_subscription_.reset();
   mapping_subscription_.reset();
   robot_subscription_.reset();
-  served_.viewer_count -= 1;
+  if (!stream_) return;
+  try {
+    served_.memories.ended(id_, stream_->memory(), net::steady_seconds());
+  } catch (const std::bad_alloc&) {
+    // It costs the viewer what it would be spared if it came back.
+    spdlog::warn("no memory for what a viewer had: if it comes back it gets everything anew");
+  }
+  stream_->close();
 }
 
 void ViewerSession::text_received(std::string_view text) {

@@ -6,10 +6,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "server/net/memory_reserve.hpp"
 #include "tests/integration/raw_client.hpp"
 #include "tests/integration/test_server.hpp"
 
@@ -389,7 +391,7 @@ TEST_F(HttpServerTest, AnswersADroppedReplyWith503) {
 
 TEST_F(HttpServerTest, StopsWhileAnAnswerIsStillBeingMade) {
   std::atomic<bool> is_asked = false;
-  std::function<void(net::HttpReply)> kept;
+  std::function<void(net::HttpReply)> kept;  // before the server, whose handler puts it there
   TestServer server(
       quick_options(),
       [&](const net::HttpRequest&, const std::function<void(net::HttpReply)>& reply) {
@@ -403,6 +405,7 @@ TEST_F(HttpServerTest, StopsWhileAnAnswerIsStillBeingMade) {
   const auto begin = std::chrono::steady_clock::now();
   server.stop();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  kept = nullptr;  // Who drops an answer says so to a server that is there.
 }
 
 TEST_F(HttpServerTest, CutsWhoStopsReadingALongAnswer) {
@@ -418,6 +421,16 @@ TEST_F(HttpServerTest, CutsWhoStopsReadingALongAnswer) {
   ASSERT_TRUE(client.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   ASSERT_TRUE(eventually([&big] { return big.metrics().connections_open == 1; }));
   EXPECT_TRUE(eventually([&big] { return big.metrics().connections_open == 0; }));
+}
+
+TEST_F(HttpServerTest, FillsTheReserveOfMemoryAgainAlsoWhenNobodyComes) {
+  net::keep_memory_reserve();
+  const auto run_out = std::get_new_handler();
+  const std::size_t whole = net::memory_reserve_bytes();
+  EXPECT_GT(whole, 0U);
+  for (int i = 0; i < 20; ++i) EXPECT_THROW(run_out(), std::bad_alloc);
+  EXPECT_TRUE(eventually([whole] { return net::memory_reserve_bytes() == whole; }));
+  std::set_new_handler(nullptr);
 }
 
 TEST_F(HttpServerTest, SurvivesRunningOutOfDescriptors) {

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ using stream::OutgoingFrame;
 struct Record {
   std::atomic<int> opened{0};
   std::atomic<int> closed{0};
+  std::atomic<bool> closes_without_memory{false};
   std::atomic<int> binaries{0};
   std::atomic<int> frames_left{0};
   std::atomic<std::size_t> frame_size_bytes{1000};
@@ -45,7 +47,10 @@ class EchoViewer final : public net::ViewerClient {
     return frame;
   }
   void ticked() override {}
-  void closed() override { record_.closed += 1; }
+  void closed() override {
+    record_.closed += 1;
+    if (record_.closes_without_memory) throw std::bad_alloc();
+  }
 
  private:
   std::weak_ptr<net::ViewerPeer> peer_;
@@ -428,6 +433,25 @@ TEST_F(WebSocketTest, ClosesPolitelyOnStop) {
   viewer.send_frame(8, std::string("\x03\xe9", 2));
   stopper.join();
   EXPECT_EQ(record_.closed, 1);
+}
+
+TEST_F(WebSocketTest, NothingStaysOfAViewerWhoseEndFails) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.stop_timeout = std::chrono::seconds(10);
+  start(std::move(options));
+  record_.closes_without_memory = true;
+  for (int i = 0; i < 3; ++i) {
+    RawWebSocket viewer(port());
+    ASSERT_EQ(viewer.receive_text(), "hello");
+  }
+  ASSERT_TRUE(eventually([this] { return record_.closed == 3; }));
+  const auto& of_role = server_->metrics().of(access::AccessRole::Admin);
+  EXPECT_TRUE(eventually([this] { return server_->metrics().viewers == 0; }, milliseconds(2000)));
+  EXPECT_TRUE(eventually([&of_role] { return of_role.viewers == 0 && of_role.queued_bytes == 0; }, milliseconds(2000)));
+  const auto begin = std::chrono::steady_clock::now();
+  server_->stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5)) << "it waits for nobody";
 }
 
 TEST_F(WebSocketTest, StopsInTimeWithPeersThatDoNotAnswer) {
