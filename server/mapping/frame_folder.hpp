@@ -44,10 +44,11 @@ enum class FaultKind {
   NoCalibration,  ///< A picture of a camera that the calibration does not have.
   UnreadablePose,
   BackwardPose,
-  MapFull,   ///< Something new was not mapped: the map takes all the memory that it may.
-  FarStamp,  ///< A stamp of a stream that cannot be meant.
+  MapFull,         ///< Something new was not mapped: the map takes all the memory that it may.
+  FarStamp,        ///< A stamp of a stream that cannot be meant.
+  ClockBegunAnew,  ///< The clock of a stream was set back.
 };
-inline constexpr std::size_t kFaultKinds = 14;
+inline constexpr std::size_t kFaultKinds = 15;
 
 /// The account of what was wrong.
 class FaultLog {

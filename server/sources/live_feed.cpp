@@ -113,6 +113,7 @@ std::optional<net::BlockRefusal> LiveFeed::begin() {
   has_sender_ = true;
   is_flushing_ = false;
   clock_.begin_sender();
+  leave_lone_pose_out();
   pose_end_s_.reset();
   last_s_ = {};
   return std::nullopt;
@@ -123,6 +124,7 @@ void LiveFeed::end() {
     const std::lock_guard lock(mutex_);
     has_sender_ = false;
     is_flushing_ = true;
+    leave_lone_pose_out();
     for (const mapping::FrameFault& fault : faults_.all()) {
       if (fault.count > 1) spdlog::warn("{} ({} times so far)", fault.what, fault.count);
     }
@@ -151,8 +153,8 @@ net::BlockRefusal LiveFeed::refused(FaultKind kind, std::string code, std::strin
   return {400, std::move(code), std::move(field), reason, ""};
 }
 
-std::optional<net::BlockRefusal> LiveFeed::refusal_of_stamp(double stamp_s, const std::string& whose, bool may_jump) {
-  switch (clock_.look(stamp_s, steady_s(), may_jump)) {
+std::optional<net::BlockRefusal> LiveFeed::refusal_of_stamp(SenderClock::Verdict verdict, const std::string& whose) {
+  switch (verdict) {
     case SenderClock::Verdict::NotInSeconds:
       return refused(FaultKind::FarStamp, "far_stamp", "time",
                      "the stamp of " + whose + " is no number of seconds less than 1e11");
@@ -161,7 +163,8 @@ std::optional<net::BlockRefusal> LiveFeed::refusal_of_stamp(double stamp_s, cons
           FaultKind::FarStamp, "far_stamp", "time",
           "the stamp of " + whose + " is more than 10 s ahead of all before it; the third such in a row is taken");
     case SenderClock::Verdict::BegunAnew:
-      spdlog::warn("stamps are far behind those before them: the clock of whoever sends frames is taken to begin anew");
+      note(FaultKind::ClockBegunAnew,
+           "stamps are far behind those before them: the clock of whoever sends frames is taken to begin anew");
       pose_end_s_.reset();
       last_s_ = {};
       break;
@@ -185,6 +188,53 @@ net::FrameOutcome LiveFeed::take_calibration(const net::IncomingFrame& frame) {
   return net::FrameTaken{};
 }
 
+void LiveFeed::add_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into) {
+  pose_end_s_ = clock_.on_own_clock(stamp_s);
+  clock_.accept(stamp_s, steady_s());
+  into.emplace_back(*pose_end_s_, pose);
+}
+
+void LiveFeed::believe_lone_pose(mapping::StampedPoses& into) {
+  const LonePose lone = *std::exchange(lone_pose_, std::nullopt);
+  if (!pose_end_s_ && !clock_.has_said_near(lone.stamp_s)) {
+    // Poses tell the time, not pictures that came before the first of them.
+    clock_.forget_sender();
+    last_s_ = {};
+  }
+  add_pose(lone.stamp_s, lone.pose, into);
+}
+
+void LiveFeed::leave_lone_pose_out() {
+  if (!lone_pose_) return;
+  lone_pose_.reset();
+  note(FaultKind::FarStamp, "a pose is left out: nothing else has a stamp within 10 s of it");
+}
+
+std::optional<net::BlockRefusal> LiveFeed::take_pose(double stamp_s, const Eigen::Isometry3d& pose,
+                                                     mapping::StampedPoses& into) {
+  const bool is_first = !pose_end_s_;
+  const SenderClock::Verdict verdict = clock_.look(stamp_s, steady_s());
+  const bool is_ahead = verdict == SenderClock::Verdict::Ahead;
+  if (!is_ahead) {
+    if (auto refusal = refusal_of_stamp(verdict, "a pose")) return refusal;
+  }
+  if (is_ahead || (is_first && !clock_.has_said_near(stamp_s))) {
+    // Stills are minutes apart, and some stamps cannot be meant.
+    if (!is_near_lone_pose(stamp_s)) {
+      leave_lone_pose_out();
+      lone_pose_ = LonePose{stamp_s, pose};
+      return std::nullopt;
+    }
+    believe_lone_pose(into);
+  }
+  if (pose_end_s_ && !(clock_.on_own_clock(stamp_s) > *pose_end_s_)) {
+    return refused(FaultKind::BackwardPose, "backward_pose", "poses", "a pose is not later than the one before");
+  }
+  leave_lone_pose_out();
+  add_pose(stamp_s, pose, into);
+  return std::nullopt;
+}
+
 std::optional<net::FrameOutcome> LiveFeed::take_poses(const net::IncomingFrame& frame, Done& done) {
   if (!calibration_) {
     return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
@@ -199,19 +249,7 @@ std::optional<net::FrameOutcome> LiveFeed::take_poses(const net::IncomingFrame& 
                   "a pose is not eight finite numbers with a rotation in the last four, less than 1,000 km from 0");
       continue;
     }
-    // Stills are taken minutes apart, and their poses say so.
-    if (auto stray = refusal_of_stamp(values[0], "a pose", !settings_.is_tracking)) {
-      refusal = std::move(stray);
-      continue;
-    }
-    const double time_s = clock_.on_own_clock(values[0]);
-    if (pose_end_s_ && !(time_s > *pose_end_s_)) {
-      refusal = refused(FaultKind::BackwardPose, "backward_pose", "poses", "a pose is not later than the one before");
-      continue;
-    }
-    pose_end_s_ = time_s;
-    clock_.accept(values[0], steady_s());
-    news.poses.emplace_back(time_s, depth_pose(*calibration_, *pose));
+    if (auto wrong = take_pose(values[0], depth_pose(*calibration_, *pose), news.poses)) refusal = std::move(wrong);
   }
   if (refusal) news.outcome = *refusal;
   news.done = std::move(done);
@@ -239,7 +277,7 @@ std::optional<net::FrameOutcome> LiveFeed::take_corrections(const net::IncomingF
           "0; none was taken");
     }
     // They speak of what was, and say nothing of the clock of what comes.
-    news.poses.emplace_back(clock_.moment_before(values[0]), depth_pose(*calibration_, *pose));
+    news.poses.emplace_back(clock_.moment_of(values[0]), depth_pose(*calibration_, *pose));
   }
   news.done = std::move(done);
   new_poses_.push_back(std::move(news));
@@ -267,9 +305,15 @@ std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::Fr
 std::optional<net::FrameOutcome> LiveFeed::take_picture(net::IncomingFrame& frame, Done& done, Answers& answers) {
   const protocol::FrameHead& head = frame.head;
   const std::string name = "a " + name_of(*head.sensor) + " picture";
+  if (is_near_lone_pose(*head.time)) {
+    // Both are believed.
+    PoseNews news;
+    believe_lone_pose(news.poses);
+    new_poses_.push_back(std::move(news));
+  }
   // Poses tell the time where there are any.
   if (settings_.is_tracking || !pose_end_s_) {
-    if (auto refusal = refusal_of_stamp(*head.time, name, false)) return std::move(*refusal);
+    if (auto refusal = refusal_of_stamp(clock_.look(*head.time, steady_s()), name)) return std::move(*refusal);
   }
   const double time_s = clock_.on_own_clock(*head.time);
   if (auto refusal = refusal_of_picture(head, time_s)) return std::move(*refusal);
@@ -282,6 +326,11 @@ std::optional<net::FrameOutcome> LiveFeed::take_picture(net::IncomingFrame& fram
   }
   last_s = time_s;
   clock_.accept(*head.time, steady_s());
+  if (settings_.is_tracking && lone_pose_ && !pose_end_s_) {
+    // Where the map begins, whenever that was.
+    new_poses_.push_back(
+        {.poses = {{time_s, std::exchange(lone_pose_, std::nullopt)->pose}}, .done = {}, .outcome = {}});
+  }
   waiting_.emplace(Key{time_s, rank}, Waiting{std::move(frame), std::move(done)});
   if (waiting_.size() <= kMostWaiting) return std::nullopt;
   // The picture itself is not lost among those of another sensor: the one that sends most gives way.
@@ -366,7 +415,9 @@ void LiveFeed::apply_poses() {
   }
   std::vector<PoseNews> applied;
   applied.swap(poses_in_hand_);
-  for (PoseNews& some : applied) some.done(std::move(some.outcome));
+  for (PoseNews& some : applied) {
+    if (some.done) some.done(std::move(some.outcome));
+  }
 }
 
 void LiveFeed::tell_found_pose() {

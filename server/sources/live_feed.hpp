@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <condition_variable>
 #include <cstddef>
 #include <functional>
@@ -78,7 +79,16 @@ class LiveFeed final : public net::FrameReceiver {
   std::optional<net::FrameOutcome> take_poses(const net::IncomingFrame& frame, Done& done);
   std::optional<net::FrameOutcome> take_picture(net::IncomingFrame& frame, Done& done, Answers& answers);
   std::optional<net::BlockRefusal> refusal_of_picture(const protocol::FrameHead& head, double time_s);
-  std::optional<net::BlockRefusal> refusal_of_stamp(double stamp_s, const std::string& whose, bool may_jump);
+  std::optional<net::BlockRefusal> refusal_of_stamp(SenderClock::Verdict verdict, const std::string& whose);
+  /// One pose, which goes into `into` with what was waiting for it, or waits itself.
+  std::optional<net::BlockRefusal> take_pose(double stamp_s, const Eigen::Isometry3d& pose,
+                                             mapping::StampedPoses& into);
+  void add_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into);
+  bool is_near_lone_pose(double stamp_s) const {
+    return lone_pose_ && std::abs(stamp_s - lone_pose_->stamp_s) <= kFarthestStampS;
+  }
+  void believe_lone_pose(mapping::StampedPoses& into);
+  void leave_lone_pose_out();
   net::BlockRefusal not_mapping() const { return {503, "not_mapping", "", *ended_, ""}; }
   net::BlockRefusal refused(mapping::FaultKind kind, std::string code, std::string field, const std::string& reason);
   void note(mapping::FaultKind kind, const std::string& what);
@@ -110,12 +120,18 @@ class LiveFeed final : public net::FrameReceiver {
   struct PoseNews {
     mapping::StampedPoses poses;
     bool is_correction = false;
-    Done done;
+    Done done;                  ///< May be none.
     net::FrameOutcome outcome;  ///< To answer with.
   };
   std::vector<PoseNews> new_poses_;
   SenderClock clock_;
-  std::optional<double> pose_end_s_;             ///< Of this sender.
+  /// The first pose of a sender, or one far ahead of all before it: believed when something else has a stamp near to it. Of the depth camera.
+  struct LonePose {
+    double stamp_s = 0;
+    Eigen::Isometry3d pose;
+  };
+  std::optional<LonePose> lone_pose_;
+  std::optional<double> pose_end_s_;             ///< Of this sender, without that one.
   std::array<std::optional<double>, 3> last_s_;  ///< Of this sender's sensors, by rank.
   mapping::FaultLog faults_;
   std::size_t skipped_count_ = 0;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 namespace spectra::sources {
 
@@ -19,30 +20,41 @@ class SenderClock {
 
   /// Another sender, whose clock may count from anything.
   void begin_sender();
+  /// What this sender has said so far was not meant: as if it had just begun.
+  void forget_sender();
 
   enum class Verdict {
     Taken,         ///< Or behind: whoever asks compares it with those before.
     NotInSeconds,  ///< Or no number: never taken.
-    Ahead,         ///< A stray.
+    Ahead,         ///< A stray, if nothing else comes near it.
     BegunAnew,  ///< The sender's clock was set back. It goes on later than all before, which the stamp is not to be compared with.
   };
-  /// What to make of a stamp. `now_s`: of a steady clock. `may_jump`: a stamp ahead is no stray. Of a stamp that then is taken, accept() is to be told.
-  Verdict look(double stamp_s, double now_s, bool may_jump);
+  /// What to make of a stamp. `now_s`: of a steady clock. Of a stamp that then is taken, accept() is to be told.
+  Verdict look(double stamp_s, double now_s);
   void accept(double stamp_s, double now_s);
 
+  /// This sender's newest stamp is at most kFarS from one.
+  bool has_said_near(double stamp_s) const;
   /// A stamp of this sender on the clock of the map.
   double on_own_clock(double stamp_s) const;
-  /// The same of one that says nothing of the clock: that of the sender before, until this one has been heard.
-  double moment_before(double stamp_s) const { return stamp_s + shift_s_.value_or(last_shift_s_); }
+  /// The same of one that speaks of what was: by the clock of the last sender that has said stamps before and after it, else by the newest that is
+  /// known.
+  double moment_of(double stamp_s) const;
   /// Of all stamps, on the clock of the map.
   std::optional<double> newest_s() const { return newest_s_; }
 
  private:
+  /// What one clock has said.
+  struct Span {
+    double first_s, last_s;  ///< Stamps.
+    double shift_s;          ///< Added to them.
+  };
   bool is_believed(double stamp_s);
 
   std::optional<double> newest_s_;
-  std::optional<double> shift_s_;  ///< Added to the stamps of this sender, once it has said one.
-  double last_shift_s_ = 0;
+  std::optional<double> newest_before_s_;  ///< When this sender began.
+  std::optional<Span> span_;               ///< Of this sender, once it has said a stamp.
+  std::vector<Span> spans_before_;         ///< Of those before, the newest last.
   double accepted_at_s_ = 0;
   std::optional<double> stray_s_;  ///< The last one.
   std::size_t strays_in_row_ = 0;

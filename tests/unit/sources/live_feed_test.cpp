@@ -107,6 +107,18 @@ class LiveFeedTest : public ::testing::Test {
     const std::lock_guard lock(mutex_);
     return std::exchange(unit_count_, 0);
   }
+  void expect_robot_is_here_now() {
+    bool is_here = false;
+    for (int i = 0; i < 250 && !is_here; ++i) {
+      if (i > 0) std::this_thread::sleep_for(20ms);
+      const std::lock_guard lock(mutex_);
+      is_here = !poses_.empty() && !poses_.back().is_lost && std::abs(poses_.back().at - unix_now_s()) < 60;
+    }
+    const std::lock_guard lock(mutex_);
+    ASSERT_FALSE(poses_.empty());
+    EXPECT_TRUE(is_here) << std::fixed << poses_.back().at << (poses_.back().is_lost ? " lost" : "");
+    EXPECT_NEAR(poses_.back().position.x, 0, 0.1);
+  }
   /// A feed that makes the map in parts, with a sender.
   void begin_in_parts() {
     mapping::MapperSettings in_parts = settings();
@@ -271,8 +283,14 @@ TEST_F(LiveFeedTest, CorrectionsOfBeforeTheLinkBrokeSpeakOfThatTime) {
   EXPECT_EQ(code_of(send(corrected)), "taken");
   EXPECT_GT(units_within(5s), 1U) << "the submap of that moment moves";
   // The clock of what comes is told by what comes.
-  for (int i = 4; i < 7; ++i) EXPECT_EQ(code_of(pose(0.05 * i, 1)), "taken");
+  // Some of it was sent before, and is later than that on the clock of the map.
+  for (int i = 2; i < 7; ++i) EXPECT_EQ(code_of(pose(0.05 * i, 1)), "taken");
   EXPECT_EQ(code_of(depth(0.25)), "taken");
+  while (units_within(400ms) > 0) {
+  }
+  corrected.poses[0][1] = 2;
+  EXPECT_EQ(code_of(send(corrected)), "taken");
+  EXPECT_GT(units_within(5s), 1U) << "and again, although another clock is known now";
 }
 
 TEST_F(LiveFeedTest, CorrectedPosesMoveTheMap) {
@@ -328,18 +346,93 @@ TEST_F(LiveFeedTest, StampsThatCannotBeMeantDoNotEndMapping) {
   EXPECT_EQ(own_->faults().of(mapping::FaultKind::FarStamp).count, 3U);
 }
 
-TEST_F(LiveFeedTest, PosesFarAheadDoNotEndMapping) {
+TEST_F(LiveFeedTest, OneStrayPoseDoesNotSetTheClock) {
   ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
   EXPECT_EQ(code_of(pose(1e12)), "far_stamp");
   EXPECT_EQ(code_of(pose(0)), "taken");
   EXPECT_EQ(code_of(depth(0)), "taken");
   EXPECT_EQ(code_of(pose(1e9)), "taken") << "stills may be far apart";
-  EXPECT_EQ(code_of(pose(0.1)), "backward_pose");
-  EXPECT_EQ(code_of(pose(0.15)), "backward_pose");
-  EXPECT_EQ(code_of(pose(0.2)), "taken") << "the third in a row: the clock was set back";
-  EXPECT_EQ(code_of(pose(0.25)), "taken");
-  EXPECT_EQ(code_of(depth(0.22)), "taken");
+  Answer between = depth(0.04);
+  EXPECT_EQ(code_of(pose(0.05)), "taken") << "the clock was not set";
+  EXPECT_EQ(code_of(std::move(between)), "taken");
+  EXPECT_EQ(code_of(pose(0.1)), "taken");
+  EXPECT_EQ(code_of(depth(0.08)), "taken");
+  const mapping::FaultLog faults = own_->faults();
+  EXPECT_EQ(faults.of(mapping::FaultKind::FarStamp).count, 2U);
+  EXPECT_EQ(faults.of(mapping::FaultKind::BackwardPose).count, 0U);
+  expect_robot_is_here_now();
+}
+
+TEST_F(LiveFeedTest, TheFirstPoseMayBeTheStrayOne) {
+  for (const bool is_tracking : {false, true}) {
+    mapping::MapperSettings either = settings();
+    either.is_tracking = is_tracking;
+    own_ = feed_of(either);
+    ASSERT_EQ(begun(), "begun");
+    code_of(calibrate());
+    EXPECT_EQ(code_of(pose(1e9, 7)), "taken");
+    EXPECT_EQ(code_of(pose(0)), "taken");
+    EXPECT_EQ(code_of(pose(0.05)), "taken");
+    EXPECT_EQ(code_of(depth(0.05)), "taken");
+    EXPECT_EQ(code_of(pose(0.1)), "taken");
+    EXPECT_EQ(own_->faults().of(mapping::FaultKind::FarStamp).count, 1U);
+    expect_robot_is_here_now();
+  }
+}
+
+TEST_F(LiveFeedTest, PicturesBeforeTheFirstPoseDoNotSetTheClock) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  Answer stray = depth(1e9);
+  EXPECT_EQ(code_of(pose(0)), "taken");
+  EXPECT_EQ(code_of(pose(0.05)), "taken");
+  EXPECT_EQ(code_of(depth(0.05)), "taken");
+  EXPECT_EQ(code_of(std::move(stray)), "no_pose");
+  expect_robot_is_here_now();
+}
+
+TEST_F(LiveFeedTest, StillsMayBeMinutesApart) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  Answer first = depth(0);
+  EXPECT_EQ(code_of(pose(0)), "taken") << "the picture may come before its pose";
+  EXPECT_EQ(code_of(std::move(first)), "taken");
+  for (int i = 1; i < 4; ++i) {
+    EXPECT_EQ(code_of(pose(60 * i)), "taken");
+    EXPECT_EQ(code_of(depth(60 * i)), "taken");
+  }
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::FarStamp).count, 0U);
+}
+
+TEST_F(LiveFeedTest, WhereTrackingBeginsMayBeToldLongBefore) {
+  mapping::MapperSettings tracking = settings();
+  tracking.is_tracking = true;
+  own_ = feed_of(tracking);
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  EXPECT_EQ(code_of(pose(0, 2)), "taken");
+  EXPECT_EQ(code_of(depth(1000)), "taken");
+  EXPECT_EQ(code_of(depth(1000.1)), "lost_track") << "a bare wall";
+  const std::lock_guard lock(mutex_);
+  ASSERT_FALSE(poses_.empty());
+  EXPECT_NEAR(poses_.back().position.x, 2, 0.01);
+}
+
+TEST_F(LiveFeedTest, AClockThatIsSetBackIsSaidAndCounted) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  for (int i = 0; i < 3; ++i) {
+    const double begin_s = 1e6 - 1e5 * i;
+    if (i > 0) {
+      EXPECT_EQ(code_of(pose(begin_s - 0.1)), "backward_pose");
+      EXPECT_EQ(code_of(pose(begin_s - 0.05)), "backward_pose");
+    }
+    EXPECT_EQ(code_of(pose(begin_s)), "taken") << "the third in a row: the clock was set back";
+    EXPECT_EQ(code_of(pose(begin_s + 0.05)), "taken");
+    EXPECT_EQ(code_of(depth(begin_s + 0.02)), "taken");
+  }
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::ClockBegunAnew).count, 2U);
 }
 
 TEST_F(LiveFeedTest, WhenMappingEndsEverybodyIsTold) {
@@ -370,6 +463,7 @@ TEST_F(LiveFeedTest, WhatWaitsIsAnsweredWhenMappingEnds) {
   own_ = std::make_unique<LiveFeed>(settings(), failing, [] { return true; });
   ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
+  code_of(pose(-0.1));
   std::vector<Answer> answers;
   {
     const std::lock_guard lock(mutex_);
