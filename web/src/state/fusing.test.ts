@@ -34,7 +34,7 @@ function setUp({
 }: { capabilities?: string[]; load?: () => Promise<WebAssembly.Module> } = {}) {
   const store = new Store();
   store.link = { phase: 'open' };
-  store.scene = { temperature: { min: 10 }, live: false } as never;
+  store.scene = { name: 'a', temperature: { min: 10, max: 700 }, live: false } as never;
   store.complete = {} as never;
   store.methods = [
     { id: 'thermal_visible_blend', label: 'Blend' },
@@ -148,7 +148,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(fusing.leftToRobot).toContain('steps of 1 °C');
     expect(fusing.channels).toEqual(['fused']);
     // When what stood out is gone, it is tried again.
-    store.scene = { temperature: { min: 10, max: 30 }, live: false } as never;
+    store.scene = { name: 'a', temperature: { min: 10, max: 30 }, live: false } as never;
     expect(fusing.channels).toEqual(['fused']);
     counts.step_celsius = 0.01;
     fusing.consider();
@@ -164,6 +164,28 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(store.fusingPlace).toBe('here');
     expect(fusing.apply({ ...FUSION, range: { mode: 'manual', min: 12, max: 15 } })).toBeNull();
     expect(fusing.channels).toContain('fused');
+  });
+
+  it('does not try again on a map whose temperatures move while what stands out stays, and does in another scene', async () => {
+    const { store, fusing, counts, diary } = setUp();
+    fusing.setWish('here');
+    const mapped = (name: string, min: number, max: number) => {
+      store.scene = { name, temperature: { min, max }, live: true } as never;
+      fusing.consider();
+      fusing.consider();
+    };
+    mapped('a', 10, 65535);
+    await vi.waitFor(() => expect(diary).toContain('facts'));
+    Object.assign(counts, { raw: 2, step_celsius: 1 });
+    mapped('a', 10, 65535);
+    expect(fusing.channels).toEqual(['fused']);
+    const before = diary.length;
+    for (let i = 0; i < 10; i += 1) mapped('a', 10 + (i % 3) / 10, 65535 - (i % 4));
+    mapped('a', 10, 70000);
+    mapped('a', 10, 65535);
+    expect(diary.slice(before)).toEqual([]);
+    mapped('b', 10, 65535);
+    expect(diary[before]).toBe('subscribe fused+temperature+visible');
   });
 
   it('makes colours here when the link is lost and all layers are there, whoever made them before', async () => {

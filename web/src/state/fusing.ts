@@ -18,6 +18,8 @@ export const CHANGE_BYTES_PER_VERTEX = 1.6;
 const STEPS_OF_A_RANGE = 256;
 /** The step that the robot chooses unless a tile spans too much for it; fine enough for every range that means anything. */
 const USUAL_STEP_CELSIUS = 0.0101;
+/** Of the span of a scene's temperatures: what stood far out is gone; the ends of a map that grows move by less all the time. */
+const NARROWED_SPAN = 7 / 8;
 /** Histograms that are got before they are needed, so that a lost link does not keep them away: of percentiles, and of bins by default. */
 const EARLY_BINS = [4096, 64];
 
@@ -61,9 +63,9 @@ export class Fusing {
   /** Colours come from the robot again, and are still on their way. */
   #isLeaving = false;
   #isOfferedRaw = false;
-  /** The coarsest in which temperatures of the picture have come, and of which scene and span that was. */
+  /** The coarsest in which temperatures of the picture have come, and of which scene, and which span of it, that was. */
   #step_celsius = 0;
-  #stepOf = '';
+  #stepOf = { scene: '', span_celsius: Infinity };
 
   constructor(
     private readonly store: Store,
@@ -130,11 +132,16 @@ export class Fusing {
     const { store } = this;
     if (!store.connected || store.scene == null || !this.#isOfferedRaw) return;
     const { name, temperature } = store.scene;
-    const scene = `${name} ${temperature?.min} ${temperature?.max}`;
-    if (scene !== this.#stepOf) this.#step_celsius = 0;
-    this.#stepOf = scene;
+    const { min = null, max = null } = temperature ?? {};
+    const span_celsius = min === null || max === null ? Infinity : max - min;
+    const isNarrow = span_celsius < NARROWED_SPAN * this.#stepOf.span_celsius;
+    if (name !== this.#stepOf.scene || (this.#step_celsius > 0 && isNarrow)) this.#step_celsius = 0;
+    this.#stepOf.scene = name;
     const counts = this.tiles.rawCounts();
-    if (this.#wantsRaw && counts.raw > 0) this.#step_celsius = counts.step_celsius;
+    if (this.#wantsRaw && counts.raw > 0) {
+      this.#step_celsius = counts.step_celsius;
+      this.#stepOf.span_celsius = span_celsius;
+    }
     if (!this.#isWanted()) {
       if (this.isHere) this.#leave();
       else if (this.#wantsRaw) this.#leaveAtOnce();
