@@ -25,6 +25,7 @@ import { flightTo } from '../view/flight';
 import { highlightContrast } from '../view/highlight_contrast';
 import { FLATTEST, MARK_REACH_PX, Markers, type Window } from '../view/markers';
 import { UpChoices } from '../view/up_choices';
+import { Expectation } from './expectation';
 import { HighlightedShare } from './highlighted_share';
 import { Fusing, type FusingWish } from './fusing';
 import { Progress } from './progress';
@@ -136,6 +137,7 @@ export class Session {
       },
       onProblem: say,
     });
+    const expectation = new Expectation(store, this.tiles);
     this.#connection = new Connection(
       url,
       {
@@ -151,8 +153,7 @@ export class Session {
           // A refused upgrade looks like a broken link to a page.
           if (state.phase === 'waiting') void mustLogIn().then((must) => must && location.replace('./login'));
         },
-        expectsMuch: () =>
-          !store.settled || store.fusingPlace === 'coming' || store.hatchAbove_kelvin !== null || store.methods.length === 0,
+        expectsMuch: () => expectation.isMuch,
         onProtocolError: (error) => console.warn('left out:', error.message),
         onRoundTrip: (round_trip_ms) => {
           const before = store.round_trip_ms;

@@ -35,7 +35,7 @@ function setUp() {
   let settle: () => void = () => undefined;
   const sent = { wait: false };
   const concerned = {
-    tiles: { clear: note('tiles cleared', undefined), layersOf, claims: () => claims, resume: vi.fn() },
+    tiles: { clear: note('tiles cleared', undefined), layersOf, claims: vi.fn(() => claims), resume: vi.fn() },
     intake: { beginConnection: note('intake begins', undefined) },
     settings: {
       greeted: () => before.fusion as never,
@@ -156,11 +156,12 @@ describe('a subscription', () => {
     await later();
     expect(asked[1]!.params['resume']).toMatchObject({ raw: [], temperature_sigma: [0], colours: [[0, 17]] });
     await asked[1]!.answer({ resumed_tiles: 1 });
-    while (claims.length < 1500) claims.push('0/0/0' as never);
+    while (claims.length < 900) claims.push('0/0/0' as never);
     subscription.greeted({ ...able, capabilities: ['resume', 'raw_layers'] });
     await later();
     expect(asked[2]!.params['resume']).toMatchObject({ raw: [0] });
-    expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 180);
+    expect(concerned.tiles.claims).toHaveBeenLastCalledWith(1500, 9900);
+    expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 9900 - 6 * 900);
   });
 
   it("asks for nothing before the user's settings are in force again, and not at all when that connection is gone", async () => {

@@ -1,5 +1,5 @@
 import type { FrameIntake } from '../tiles/frame_intake';
-import type { TileSet } from '../tiles/tile_set';
+import { CLAIM_VALUES, type TileSet } from '../tiles/tile_set';
 import type { CatalogueLoader } from '../transport/catalogue_loader';
 import { type FusionChange, type Hello, type Quality, type Scene, subscribed } from '../protocol/messages';
 import type { Fusing } from './fusing';
@@ -13,7 +13,7 @@ import type { Store } from './store.svelte';
 
 /** Most tiles that scene.subscribe may claim; what is held beyond them comes again. */
 const MOST_CLAIMED = 1500;
-/** What a message may hold, less what else is in it; a claimed tile is six of them, and what is said of its layers up to five more. */
+/** What a message may hold, less what else is in it. */
 const MOST_VALUES = 9900;
 
 /** What a connection's beginning concerns. */
@@ -126,8 +126,8 @@ export class Subscription {
     if (connectionNumber !== this.#connectionNumber) return;
     if (!settings.busy) this.store.wanted = null;
     const session_id = this.#claimableSession;
-    const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED) : [];
-    const layers = tiles.layersOf(claims, Math.max(0, Math.floor((MOST_VALUES - 6 * claims.length) / 5)));
+    const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED, MOST_VALUES) : [];
+    const layers = tiles.layersOf(claims, MOST_VALUES - CLAIM_VALUES * claims.length);
     if (!greeting.capabilities.includes('raw_layers')) layers.raw = [];
     try {
       this.#isSubscribed = true;

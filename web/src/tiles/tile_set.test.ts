@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, it } from 'vitest';
 import type { DecodedSigma } from '../decode/messages';
 import { childTile, type TileFrame, type TileId, tileKey } from '../protocol/frame';
 import { decodedGeometry, ROOT as root, tileFrame as frame } from './test_tiles';
-import { type Drawable, TileSet, RawMismatch, type RawLayers, type TileClaim } from './tile_set';
+import { CLAIM_VALUES, type Drawable, TileSet, RawMismatch, type RawLayers, type TileClaim } from './tile_set';
 
 const geometry = (vertices = 3) => decodedGeometry(vertices);
 const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fill(shade);
@@ -56,7 +56,7 @@ function recolour(tile: TileId, generation: number, revision = 1): void {
 }
 /** The server's answer to claims; `places` of those whose colours it says are those of `generation`. */
 function resume(claims: TileClaim[], isGranted: boolean, places: number[] = [], generation = 1): void {
-  tiles.resume(claims, isGranted, tiles.layersOf(claims, claims.length), { places, generation });
+  tiles.resume(claims, isGranted, tiles.layersOf(claims), { places, generation });
 }
 const drawn = () => made.filter(({ visible, disposed }) => visible && !disposed).length;
 
@@ -150,6 +150,19 @@ describe('TileSet', () => {
     tiles.addSigma(frame(root, { revision: 1 }), sigma(7, 8, 9));
     tiles.addSigma(frame(root, { revision: 2 }), sigma(7));
     expect(next.sigma).toEqual([4, 5, 6]);
+  });
+
+  it('counts what is drawn and lacks how sure its temperatures are', () => {
+    const sigma: DecodedSigma = { kind: 'sigma', codes: Uint16Array.of(1, 2, 3), scale: 1, offset: 0 };
+    expect(tiles.lackingSigma()).toBe(0);
+    add(root, { child_mask: 0b1 });
+    expect(tiles.lackingSigma()).toBe(1);
+    add(childTile(root, 0));
+    tiles.addSigma(frame(childTile(root, 0)), sigma);
+    // The top is not drawn.
+    expect(tiles.lackingSigma()).toBe(0);
+    add(childTile(root, 0), { revision: 2, generation: 2 });
+    expect(tiles.lackingSigma()).toBe(1);
   });
 
   it('leaves out the finest levels while the camera moves, where nothing newer is lost by it', () => {
@@ -323,6 +336,31 @@ describe('TileSet, after a cut connection', () => {
     expect(tiles.claims(2)).toEqual([claim(right, 3), claim(left, 4)]);
   });
 
+  it('claims no more than a message holds with the layers of all that is drawn, and tells others as far as there is room', () => {
+    add(root, { revision: 2, child_mask: 0b11, sequence: 1 });
+    add(left, { revision: 3, sequence: 2 });
+    add(right, { revision: 4, sequence: 3 });
+    tiles.addSigma(frame(left, { revision: 3 }), { kind: 'sigma', codes: Uint16Array.of(1, 2, 3), scale: 1, offset: 0 });
+    tiles.updateSelection();
+    const told = (values: number) => {
+      const claims = tiles.claims(10, values);
+      return [claims.map(([, , , , revision]) => revision), tiles.layersOf(claims, values - CLAIM_VALUES * claims.length)];
+    };
+    const both = {
+      raw: [],
+      temperature_sigma: [0],
+      colours: [
+        [0, 2],
+        [1, 3],
+      ],
+    };
+    expect(told(9)).toEqual([[], { raw: [], temperature_sigma: [], colours: [] }]);
+    expect(told(18)).toEqual([[3], { raw: [], temperature_sigma: [0], colours: [[0, 2]] }]);
+    expect(told(24)).toEqual([[3, 4], both]);
+    expect(told(25)).toEqual([[3, 4, 2], both]);
+    expect(told(28)).toEqual([[3, 4, 2], { ...both, colours: [...both.colours, [2, 1]] }]);
+  });
+
   it('colours held geometry when the claim is granted', () => {
     const parent = add(root, { child_mask: 0b11, generation: 40 });
     const [a, b] = [add(left, { revision: 7, generation: 40 }), add(right, { revision: 8, generation: 40 })];
@@ -403,9 +441,9 @@ describe('TileSet, after a cut connection', () => {
     tiles.addSigma(frame(right, { revision: 7 }), { kind: 'sigma', codes: Uint16Array.of(1, 2, 3), scale: 1, offset: 0 });
     let claims = tiles.claims(10);
     const place = (tile: TileId) => claims.findIndex(([level, x]) => level === tile.level && x === tile.x);
-    const sequenceOf = (tile: TileId) => new Map(tiles.layersOf(claims, 10).colours).get(place(tile));
+    const sequenceOf = (tile: TileId) => new Map(tiles.layersOf(claims).colours).get(place(tile));
     expect([root, left, right].map(sequenceOf)).toEqual([31, 32, 33]);
-    expect(tiles.layersOf(claims, 10).temperature_sigma).toEqual([place(right)]);
+    expect(tiles.layersOf(claims).temperature_sigma).toEqual([place(right)]);
 
     tiles.beginConnection();
     resume(claims, true, [place(left), place(right)], 4);
@@ -425,13 +463,13 @@ describe('TileSet, after a cut connection', () => {
     tiles.beginConnection();
     resume(claims, true, [place(left)], 2);
     expect([root, left, right].map(sequenceOf)).toEqual([0, 0, 0]);
-    expect(tiles.layersOf(claims, 10).temperature_sigma).toEqual([place(right)]);
+    expect(tiles.layersOf(claims).temperature_sigma).toEqual([place(right)]);
     // A newer answer stands in front of what was not confirmed.
     recolour(root, 2, 5);
     expect([parent.visible, a.visible, b.visible]).toEqual([true, false, false]);
     tiles.beginConnection();
     resume(claims, false);
-    expect(tiles.layersOf(claims, 10).colours).toEqual([]);
+    expect(tiles.layersOf(claims).colours).toEqual([]);
   });
 
   it('does not wait for tiles that are kept out of the picture', () => {
@@ -625,7 +663,8 @@ describe('TileSet, raw layers', () => {
     add(child(0));
     addRaw(child(0));
     const claims = tiles.claims(10);
-    expect(tiles.layersOf(claims, 10).raw).toEqual([claims.findIndex(([level]) => level === 1)]);
-    expect(tiles.layersOf(claims, 0)).toEqual({ raw: [], temperature_sigma: [], colours: [] });
+    expect(tiles.layersOf(claims).raw).toEqual([claims.findIndex(([level]) => level === 1)]);
+    // Its colours have come, too.
+    expect(tiles.layersOf(claims, 3)).toEqual({ raw: [], temperature_sigma: [], colours: [] });
   });
 });

@@ -111,6 +111,9 @@ export interface TileCounts {
   triangles: number;
 }
 
+/** What a claim is of the values that a message may hold: five numbers in a list. */
+export const CLAIM_VALUES = 6;
+
 const NOTHING = Number.NEGATIVE_INFINITY;
 /** More than there are generations in one connection. */
 const CONNECTION_RANKS = 2 ** 32;
@@ -163,27 +166,45 @@ export class TileSet {
     }
   }
 
-  /** What the server of the last connection knows to be held here, at most `most` tiles: coarse before fine, what is drawn before what is not. */
-  claims(most: number): TileClaim[] {
+  /**
+   * What the server of the last connection knows to be held here, at most `mostTiles`: coarse before fine, what is drawn before what is
+   * not. Of so many values of a message there is room for what layersOf() tells of all that is drawn, too.
+   */
+  claims(mostTiles: number, mostValues = Infinity): TileClaim[] {
     const known = [...this.#nodes.values()].filter(({ shown }) => shown?.isKnownToServer);
     const order = ({ id, isDrawn }: TileNode) => id.level + (isDrawn ? 0 : 256);
-    return known
-      .sort((a, b) => order(a) - order(b))
-      .slice(0, most)
-      .map(({ id, shown }) => [id.level, id.x, id.y, id.z, shown?.revision ?? 0]);
+    const claims: TileClaim[] = [];
+    let left = mostValues;
+    for (const { id, shown, isDrawn } of known.sort((a, b) => order(a) - order(b))) {
+      if (shown === null) continue;
+      left -= CLAIM_VALUES + (isDrawn ? layerValues(shown) : 0);
+      if (left < 0 || claims.length === mostTiles) break;
+      claims.push([id.level, id.x, id.y, id.z, shown.revision]);
+    }
+    return claims;
   }
 
-  /** What beside their geometry is here of the first `most` of these claims. */
-  layersOf(claims: readonly TileClaim[], most: number): HeldLayers {
+  /** What beside their geometry is here of these claims, of the first ones where it takes more than `mostValues` of a message. */
+  layersOf(claims: readonly TileClaim[], mostValues = Infinity): HeldLayers {
     const held: HeldLayers = { raw: [], temperature_sigma: [], colours: [] };
-    claims.slice(0, most).forEach(([level, x, y, z], place) => {
+    let left = mostValues;
+    for (const [place, [level, x, y, z]] of claims.entries()) {
       const shown = this.#nodes.get(tileKey({ level, x, y, z }))?.shown ?? null;
-      if (shown === null) return;
+      if (shown === null) continue;
+      left -= layerValues(shown);
+      if (left < 0) break;
       if (shown.rawStep_celsius !== null) held.raw.push(place);
       if (shown.hasSigma) held.temperature_sigma.push(place);
       if (shown.colourSequence !== null) held.colours.push([place, shown.colourSequence]);
-    });
+    }
     return held;
+  }
+
+  /** Of how many tiles that are drawn it is not here how sure their temperatures are. */
+  lackingSigma(): number {
+    let lacking = 0;
+    for (const { shown } of this.#drawn) if (shown !== null && !shown.hasSigma) lacking += 1;
+    return lacking;
   }
 
   /** How many tiles are drawn, how many of them can be fused here, and the coarsest step in which the temperatures of one came. */
@@ -663,6 +684,11 @@ export class TileSet {
     // Of tiles that are not held themselves, and not all of whose children are, whatever is there is drawn.
     for (const child of node.children) if (child !== undefined) this.#select(child);
   }
+}
+
+/** What HeldLayers of a tile are of the values that a message may hold. */
+function layerValues({ rawStep_celsius, hasSigma, colourSequence }: Shown): number {
+  return (rawStep_celsius === null ? 0 : 1) + (hasSigma ? 1 : 0) + (colourSequence === null ? 0 : 3);
 }
 
 /** Half of the step to which colours have been rounded: multiples of a power of two, with 255 in the place of 256. */
