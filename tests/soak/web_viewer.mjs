@@ -1,5 +1,5 @@
 // A viewer whose connections are the web client's own: it notices a dead link, opens the next connection and goes on there as the web client
-// does, which has its settings put in force before it asks for the stream, with the tiles that it still has.
+// does, which has its settings put in force before it asks for the stream, with the tiles that it still has and the frames that coloured them.
 import { createRequire } from "node:module";
 import { fileURLToPath } from "node:url";
 import { isColours, KIND, readFrame } from "../integration/node/spectra_client.mjs";
@@ -13,8 +13,9 @@ const { Connection } = await import(`data:text/javascript;base64,${Buffer.from(b
 export class WebViewer {
   greeted_at = 0; // on performance.now()'s clock
   attempts = 0; // sockets that it has opened
+  frames = 0; // that have come
   #connection;
-  #held = new Map(); // tile -> {claim, hasColours}
+  #held = new Map(); // tile -> {claim, colourSequence: null until there are colours, 0 where those of an earlier connection were named}
   #session = null;
   #alpha = null;
   #isComplete = true;
@@ -66,9 +67,18 @@ export class WebViewer {
   async #greeted({ session_id }) {
     this.greeted_at = performance.now();
     await this.#ask();
-    const tiles = [...this.#held.values()].filter(({ hasColours }) => hasColours).map(({ claim }) => claim);
-    const resume = this.#session !== null && tiles.length > 0 ? { resume: { session_id: this.#session, tiles } } : {};
-    await this.#connection.request("scene.subscribe", { channels: ["fused"], ...resume });
+    const claimed = [...this.#held].filter(([, { colourSequence }]) => colourSequence !== null);
+    const resume = {
+      session_id: this.#session,
+      tiles: claimed.map(([, { claim }]) => claim),
+      colours: claimed.map(([, { colourSequence }], place) => [place, colourSequence]),
+    };
+    // Before the answer, as what follows it is newer.
+    this.#held = new Map(claimed.map(([tile, { claim }]) => [tile, { claim, colourSequence: 0 }]));
+    const before = [...this.#held];
+    const isClaiming = this.#session !== null && claimed.length > 0;
+    const { resumed_tiles } = await this.#connection.request("scene.subscribe", { channels: ["fused"], ...(isClaiming ? { resume } : {}) });
+    if (!resumed_tiles) for (const [tile, held] of before) if (this.#held.get(tile) === held) this.#held.delete(tile);
     this.#session = session_id;
   }
 
@@ -80,9 +90,10 @@ export class WebViewer {
 
   #received(frame) {
     const { tile, kind, sequence } = frame;
-    if (kind === KIND.geometry) this.#held.set(tile, { claim: [frame.level, ...frame.position, frame.revision], hasColours: false });
+    this.frames += 1;
+    if (kind === KIND.geometry) this.#held.set(tile, { claim: [frame.level, ...frame.position, frame.revision], colourSequence: null });
     else if (kind === KIND.remove) this.#held.delete(tile);
-    else if (isColours(frame) && this.#held.has(tile)) this.#held.get(tile).hasColours = true;
+    else if (isColours(frame) && this.#held.has(tile)) this.#held.get(tile).colourSequence = sequence;
     this.#connection.notify("stream.ack", { sequence });
   }
 }
