@@ -38,13 +38,24 @@ bool are_shares(PlyScalar type, const ColourRange& range) {
 }  // namespace
 
 void ColourRange::add(std::span<const double> values) {
+  constexpr double kMost = std::numeric_limits<double>::max();
+  double most = largest;
   for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    largest = std::max(largest, value);
-    lit_count += value > 0 ? 1U : 0U;
-    share_count += value > 0 && value <= 1 ? 1U : 0U;
-    has_fractions = has_fractions || value != std::floor(value);
+    const double finite = value <= kMost ? value : 0;
+    most = most < finite ? finite : most;
   }
+  largest = most;
+  // A cheaper floor: added to kWhole a number loses what is behind the point; beyond a quarter of that it has nothing there.
+  constexpr double kWhole = 0x1.8p52;
+  std::uint64_t lit = 0, shares = 0, fractions = 0;
+  for (const double value : values) {
+    lit += value > 0 && value <= kMost ? 1U : 0U;
+    shares += value > 0 && value <= 1 ? 1U : 0U;
+    fractions += value > 0 && value < kWhole / 4 && value + kWhole - kWhole != value ? 1U : 0U;
+  }
+  lit_count += lit;
+  share_count += shares;
+  has_fractions = has_fractions || fractions > 0;
 }
 
 void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,

@@ -222,7 +222,10 @@ TEST(PlyReader, AnOverExposedColourDoesNotDarkenTheOthers) {
   EXPECT_EQ(bright.mesh.visible()[0], (base::Rgb8{255, 255, 255}));
   EXPECT_EQ(bright.mesh.visible()[1], (base::Rgb8{255, 255, 128}));
   EXPECT_EQ(note_count(bright, "clamped_colours"), 1U);
-  EXPECT_EQ(loaded(ascii_head(21, head) + ones + "0 1 0 255 0 0\n").mesh.visible()[0], (base::Rgb8{1, 0, 1}));
+  for (const char* rest : {"255 0 0", "255 nan inf", "255 -inf -3"}) {
+    const LoadedScene whole = loaded(ascii_head(21, head) + ones + "0 1 0 " + rest + "\n");
+    EXPECT_EQ(whole.mesh.visible()[0], (base::Rgb8{1, 0, 1})) << rest;
+  }
 }
 
 TEST(PlyReader, BytesDeclaredAsCharAreBytes) {
