@@ -92,7 +92,7 @@ function watch(port, origin) {
   return new Promise((resolve, reject) => {
     const headers = { Host: NAME, Origin: origin, ...bearer("viewer") };
     const socket = new WebSocket(`wss://127.0.0.1:${port}/ws`, "spectra.v1", { servername: NAME, ca, headers });
-    const seen = { status: 101, role: null, frames: 0 };
+    const seen = { status: 101, frames: 0 };
     socket.on("unexpected-response", (_, response) => {
       response.resume();
       resolve({ status: response.statusCode });
@@ -102,7 +102,7 @@ function watch(port, origin) {
       if (isBinary) seen.frames += 1;
       const { method, params } = isBinary ? {} : JSON.parse(data);
       if (method === "hello") {
-        seen.hello = params;
+        seen.role = params.role;
         socket.send(JSON.stringify({ jsonrpc: "2.0", id: 1, method: "scene.subscribe", params: { channels: ["fused"] } }));
       }
       if (isBinary) socket.send(JSON.stringify({ jsonrpc: "2.0", method: "stream.ack", params: { sequence: data.readUInt32LE(8) } }));
@@ -142,6 +142,7 @@ for (const [name, prepare] of Object.entries(PROXIES)) {
 
       const seen = await watch(port, `https://${NAME}`);
       assert.equal(seen.status, 101);
+      assert.equal(seen.role, "viewer");
       assert.ok(seen.frames > 0);
       assert.equal((await watch(port, "https://evil.example")).status, 403);
     } finally {
