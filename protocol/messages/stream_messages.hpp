@@ -62,9 +62,10 @@ struct SubscribeReply {
   /// There when the request had `resume`: how many of the claimed tiles are current and are not sent again.
   std::optional<int> resumed_tiles;
   /// There when `resume` had `colours`: places in `tiles` of those whose colours are what the settings in force
-  /// give, so that they are not sent again either.
+  /// give, rounded to no fewer bits, so that they are not sent again either. Empty where nothing is known of the
+  /// connection.
   std::optional<std::vector<std::uint32_t>> current_colours;
-  /// There with `current_colours`: the generation that those colours count as.
+  /// There with `current_colours`: the generation that those colours count as. 0: there is no scene yet.
   std::optional<std::uint32_t> generation;
 };
 

@@ -262,6 +262,10 @@ bool ViewerSession::gives_raw_layers() const {
 protocol::SubscribeReply ViewerSession::resume(const protocol::ResumeRequest& request) {
   protocol::SubscribeReply reply;
   reply.resumed_tiles = 0;
+  if (request.colours) {
+    reply.current_colours.emplace();
+    reply.generation = stream_ ? stream_->generation() : 0;
+  }
   if (!stream_ || !served_.session_ids.is_of_this_run(request.session_id)) return reply;
   std::vector<stream::ResumedTile> tiles;
   tiles.reserve(request.tiles.size());
@@ -277,14 +281,11 @@ protocol::SubscribeReply ViewerSession::resume(const protocol::ResumeRequest& re
   if (request.colours) {
     for (const auto& [place, sequence] : *request.colours) tiles[place].colour_sequence = sequence;
   }
-  const auto now_s = net::steady_seconds();
-  auto resumed =
-      stream_->resume(tiles, request.colours ? served_.memories.of(request.session_id, now_s) : stream::ViewerMemory());
+  auto resumed = request.colours
+                     ? stream_->resume(tiles, *served_.memories.of(request.session_id, net::steady_seconds()))
+                     : stream_->resume(tiles);
   reply.resumed_tiles = static_cast<int>(resumed.tile_count);
-  if (request.colours) {
-    reply.current_colours = std::move(resumed.current_colours);
-    reply.generation = stream_->generation();
-  }
+  if (request.colours) reply.current_colours = std::move(resumed.current_colours);
   return reply;
 }
 

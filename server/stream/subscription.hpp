@@ -40,8 +40,9 @@ struct ResumedTile {
 
 /// What of such tiles need not be sent again.
 struct Resumed {
-  std::uint32_t tile_count = 0;                ///< Geometry.
-  std::vector<std::uint32_t> current_colours;  ///< Places, in what was claimed, of those whose colours are as demanded.
+  std::uint32_t tile_count = 0;  ///< Geometry.
+  std::vector<std::uint32_t>
+      current_colours;  ///< Places, in what was claimed, of those whose colours are as demanded, not rounded.
 };
 
 }  // namespace spectra::stream

@@ -110,7 +110,7 @@ Resumed ViewerStream::resume(std::span<const ResumedTile> claims, const ViewerMe
   Resumed resumed;
   change([&] {
     if (subscribed_) return;
-    resumed = tiles_.resume(claims, memory, demand_, *cache_);
+    resumed = tiles_.resume(claims, memory, demand_, quality_.colour_bits, *cache_);
     remove_surplus();
     remove_outdated();
   });

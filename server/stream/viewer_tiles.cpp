@@ -1,6 +1,7 @@
 #include "server/stream/viewer_tiles.hpp"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -153,15 +154,27 @@ bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
 }
 
 ViewerMemory ViewerTiles::memory() const {
-  ViewerMemory memory;
+  std::vector<RememberedTile> tiles;
   for (const auto& slot : slots_) {
-    if (slot->held.wire_revision != 0) memory.emplace(slot->tile->id, slot->held);
+    const TileSlot::Held& held = slot->held;
+    if (held.wire_revision == 0) continue;
+    tiles.push_back({.tile = slot->tile->id,
+                     .revision = held.revision,
+                     .wire_revision = held.wire_revision,
+                     .child_mask = held.child_mask,
+                     .colour_bits = static_cast<std::uint8_t>(held.colour_bits),
+                     .colour_sequence = held.colour_sequence,
+                     .bytes = held.bytes,
+                     .position_step_m = held.position_step_m,
+                     .origin_m = held.origin_m,
+                     .picture = held.picture,
+                     .look = held.look});
   }
-  return memory;
+  return ViewerMemory(std::move(tiles));
 }
 
 Resumed ViewerTiles::resume(std::span<const ResumedTile> claims, const ViewerMemory& memory, const Demand& demand,
-                            const FrameCache::State& cache) {
+                            int whole_bits, const FrameCache::State& cache) {
   std::map<TileId, TileSlot*> slot_of;
   for (const auto& slot : slots_) slot_of.emplace(slot->tile->id, slot.get());
   std::set<TileId> seen;
@@ -175,11 +188,12 @@ Resumed ViewerTiles::resume(std::span<const ResumedTile> claims, const ViewerMem
       continue;
     }
     TileSlot& slot = *known->second;
-    const auto remembered = memory.find(claim.tile);
-    const bool is_remembered = remembered != memory.end() && remembered->second.wire_revision == claim.revision;
-    if (!hold_resumed(slot, claim, is_remembered ? remembered->second : TileSlot::Held(), demand, cache)) continue;
+    const RememberedTile* remembered = memory.find(claim.tile);
+    const bool is_remembered = remembered != nullptr && remembered->wire_revision == claim.revision;
+    if (!hold_resumed(slot, claim, is_remembered ? *remembered : RememberedTile(), demand, cache)) continue;
     ++resumed.tile_count;
-    if (slot.held.colour_epoch == demand.colour_epoch && slot.held.look == slot.look) {
+    if (slot.held.colour_epoch == demand.colour_epoch && slot.held.look == slot.look &&
+        slot.held.colour_bits >= whole_bits) {
       resumed.current_colours.push_back(static_cast<std::uint32_t>(place));
     }
     for (std::size_t layer = 0; layer < RawDemand::kLayers.size(); ++layer) {
@@ -192,7 +206,7 @@ Resumed ViewerTiles::resume(std::span<const ResumedTile> claims, const ViewerMem
 }
 
 // True when that geometry is the one in force. Otherwise it is held under its name alone, so that it is replaced.
-bool ViewerTiles::hold_resumed(TileSlot& slot, const ResumedTile& claim, const TileSlot::Held& before,
+bool ViewerTiles::hold_resumed(TileSlot& slot, const ResumedTile& claim, const RememberedTile& before,
                                const Demand& demand, const FrameCache::State& cache) {
   put_down(slot);
   // A claim does not say these; where this stream has given the geometry out before, it knows them.

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
-#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "server/stream/demand.hpp"
 #include "server/stream/subscription.hpp"
 #include "server/stream/view_selection.hpp"
+#include "server/stream/viewer_memory.hpp"
 
 namespace spectra::stream {
 
@@ -113,9 +113,6 @@ struct TileSlot {
   void forget_raw();
 };
 
-/// What a viewer has been given, tile by tile: outlives its connection, so that who comes back gets only what has changed.
-using ViewerMemory = std::map<protocol::TileId, TileSlot::Held>;
-
 /// The tiles of the scene as one viewer has them: what is given out, what is prepared for it, and what it is to be told to
 /// remove. Knows nothing of when and why. Not thread-safe: the stream's lock is held.
 class ViewerTiles {
@@ -152,8 +149,9 @@ class ViewerTiles {
 
   /// What the viewer has been given and not been told to remove.
   ViewerMemory memory() const;
-  /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume().
-  Resumed resume(std::span<const ResumedTile> claims, const ViewerMemory& memory, const Demand& demand,
+  /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume(). Colours are current with
+  /// `whole_bits` or more.
+  Resumed resume(std::span<const ResumedTile> claims, const ViewerMemory& memory, const Demand& demand, int whole_bits,
                  const FrameCache::State& cache);
   /// Colours that were sent for one epoch are as demanded in another one, too, where they have at least so many bits.
   void keep_colours(std::uint64_t from_epoch, std::uint64_t to_epoch, int least_bits);
@@ -183,7 +181,7 @@ class ViewerTiles {
   bool is_hidden(const TileSlot& slot, const Demand& demand) const;
   /// All of it is drawn by tiles beneath that have the newest colours.
   bool is_covered(const TileSlot& slot, const Demand& demand) const;
-  bool hold_resumed(TileSlot& slot, const ResumedTile& claim, const TileSlot::Held& before, const Demand& demand,
+  bool hold_resumed(TileSlot& slot, const ResumedTile& claim, const RememberedTile& before, const Demand& demand,
                     const FrameCache::State& cache);
   void abandon(TileSlot& slot);
   void push_removal(protocol::TileId tile, std::uint32_t revision);

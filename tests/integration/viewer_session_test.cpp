@@ -420,6 +420,26 @@ TEST_F(ViewerSessionTest, ASceneBringsItsFirstViewToThoseWhoHaveChangedNothing) 
   EXPECT_EQ((*unchanged.wait_for("fusion.changed"))["fusion"]["method"], "visible_only");
 }
 
+TEST_F(ViewerSessionTest, WhoTellsOfItsColoursIsToldOfTheirsAlsoWhereNothingIsKnown) {
+  json request = {{"channels", {"fused"}},
+                  {"resume",
+                   {{"session_id", "0123456789abcdef"},
+                    {"tiles", json::array({{0, 0, 0, 0, 1}})},
+                    {"colours", json::array({{0, 1}})}}}};
+  Viewer early(server_->port());
+  EXPECT_EQ(early.call("scene.subscribe", request)["result"],
+            json({{"resumed_tiles", 0}, {"current_colours", json::array()}, {"generation", 0}}));
+  serve(sheet(40));
+  Viewer late(server_->port());
+  const json reply = late.call("scene.subscribe", request)["result"];
+  EXPECT_EQ(reply["current_colours"], json::array());
+  EXPECT_EQ(reply["generation"], late.call("fusion.get")["result"]["generation"]);
+  EXPECT_GT(reply["generation"], 0);
+  request["resume"].erase("colours");
+  Viewer silent(server_->port());
+  EXPECT_EQ(silent.call("scene.subscribe", request)["result"], json({{"resumed_tiles", 0}}));
+}
+
 TEST_F(ViewerSessionTest, SaysHowMuchIsHighlighted) {
   serve(sheet(60));
   Viewer viewer(server_->port());

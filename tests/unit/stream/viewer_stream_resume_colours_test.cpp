@@ -172,6 +172,7 @@ TEST_F(ViewerStreamResumeColours, RoundedColoursAreReplacedByWholeOnes) {
   TestViewer viewer(scene_, cache_, pool_);
   show(viewer, 0.3);
   EXPECT_EQ(viewer.resume(rounded, rounded.claims_with_colours(), rounded.stream().memory()), 21U);
+  for (const auto& [id, tile] : viewer.tiles) EXPECT_EQ(tile.generation, 0U) << "it is not named as current";
   viewer.stream().subscribe({});
   viewer.complete();
   EXPECT_EQ(viewer.count(FrameKind::Geometry), 0U);

@@ -748,11 +748,11 @@ export interface SubscribeReply {
   /** There when the request had `resume`: how many of the claimed tiles are current and are not sent again. */
   resumed_tiles?: number;
   /**
-   * There when `resume` had `colours`: places in `tiles` of those whose colours are what the settings in force give, so
-   * that they are not sent again either.
+   * There when `resume` had `colours`: places in `tiles` of those whose colours are what the settings in force give,
+   * rounded to no fewer bits, so that they are not sent again either. Empty where nothing is known of the connection.
    */
   current_colours?: number[];
-  /** There with `current_colours`: the generation that those colours count as. */
+  /** There with `current_colours`: the generation that those colours count as. 0: there is no scene yet. */
   generation?: number;
 }
 
