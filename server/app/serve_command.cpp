@@ -250,7 +250,7 @@ int run_serve(const ServeOptions& options) {
     live = std::make_unique<sources::LiveFeed>(
         mapping,
         sources::LiveFeed::Sinks{
-            [&hand_over](auto units, const auto& moment) { return (*hand_over)(std::move(units), moment); },
+            std::ref(*hand_over),
             [&served](const sources::RobotPose& pose, bool is_last) { served->robot.moved(pose, is_last); },
             [&hand_over] { return hand_over->room(); }, mapping_ended},
         [&loader] { return loader.is_done(); });

@@ -45,11 +45,12 @@ std::optional<std::string> UnitSender::send_changes(mapping::Mapper& mapper, con
   blocks.read = [&](std::size_t index, std::uint64_t max_block_bytes) -> std::optional<net::OutgoingBlock> {
     const mapping::PublishedUnit& unit = units[index];
     if (unit.mesh.triangles.empty()) return net::OutgoingBlock{net::target_text(unit.id, {}), ""};
-    net::OutgoingBlock block{net::target_text(unit.id, sources::unit_query("", eye_)),
-                             mapping::block_ply(unit.mesh, begin_unix_s)};
-    if (block.ply.size() <= max_block_bytes) return block;
+    auto ply = mapping::block_ply(unit.mesh, begin_unix_s);
+    if (ply && ply.value().size() <= max_block_bytes) {
+      return net::OutgoingBlock{net::target_text(unit.id, sources::unit_query("", eye_)), std::move(ply).value()};
+    }
     ++refused_count_;
-    warn(unit.id + " is larger than the server takes; map with larger voxels");
+    warn(unit.id + (ply ? " is larger than the server takes; map with larger voxels" : ": " + ply.error().message));
     return std::nullopt;
   };
   blocks.acknowledged = [&](std::size_t index, const auto&) {

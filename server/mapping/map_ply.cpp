@@ -31,7 +31,11 @@ base::Result<void> encode_vertices(const UnitMesh& mesh, double begin_s, files::
   std::vector<double> seen;
   for (std::size_t first = 0; first < vertices; first += kStep) {
     const std::size_t count = std::min(kStep, vertices - first);
-    const auto part = [&](const auto& values) { return std::span(values).subspan(first, count); };
+    // Of too few values it is too short, which the encoder refuses.
+    const auto part = [&](const auto& values) {
+      const std::size_t begin = std::min(first, values.size());
+      return std::span(values).subspan(begin, std::min(count, values.size() - begin));
+    };
     seen.clear();
     for (const float s : part(mesh.seen_s)) seen.push_back(begin_s + static_cast<double>(s));
     BOOST_OUTCOME_TRYV(encoder.vertices(part(mesh.positions), part(mesh.colours), part(mesh.celsius),
@@ -55,7 +59,7 @@ base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMe
   return out.commit();
 }
 
-std::string block_ply(const UnitMesh& mesh, double begin_unix_s) {
+base::Result<std::string> block_ply(const UnitMesh& mesh, double begin_unix_s) {
   std::string text;
   // A little more than it takes, so that it need not grow.
   constexpr std::size_t kHead = 1024, kBytesAVertex = 40, kBytesATriangle = 16;
@@ -64,13 +68,15 @@ std::string block_ply(const UnitMesh& mesh, double begin_unix_s) {
     text.append(std::bit_cast<const char*>(bytes.data()), bytes.size());
     return base::success();
   });
-  const bool is_whole = encode_vertices(mesh, begin_unix_s, encoder, [](double) {}) &&
-                        encoder.triangles(mesh.triangles) && encoder.finish();
-  return is_whole ? text : std::string();
+  BOOST_OUTCOME_TRYV(encode_vertices(mesh, begin_unix_s, encoder, [](double) {}));
+  BOOST_OUTCOME_TRYV(encoder.triangles(mesh.triangles));
+  BOOST_OUTCOME_TRYV(encoder.finish());
+  return text;
 }
 
-std::vector<std::string> block_plys(std::span<const PublishedUnit> units, double begin_unix_s, jobs::WorkerPool& pool) {
-  std::vector<std::string> blocks(units.size());
+std::vector<base::Result<std::string>> block_plys(std::span<const PublishedUnit> units, double begin_unix_s,
+                                                  jobs::WorkerPool& pool) {
+  std::vector<base::Result<std::string>> blocks(units.size(), std::string());
   pool.for_each(units.size(), [&](std::size_t i) {
     if (!units[i].mesh.triangles.empty()) blocks[i] = block_ply(units[i].mesh, begin_unix_s);
   });

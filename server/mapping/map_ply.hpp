@@ -19,11 +19,13 @@ namespace spectra::mapping {
 base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMesh& mesh, double begin_s,
                                  const base::Progress& progress = {});
 
-/// The same in memory: what a server takes as a block. `begin_unix_s`: when the map's first moment was, Unix seconds.
-std::string block_ply(const UnitMesh& mesh, double begin_unix_s);
+/// The same in memory: what a server takes as a block. `begin_unix_s`: when the map's first moment was, Unix seconds. Inconsistent where the mesh
+/// has not one value of each kind for each vertex.
+base::Result<std::string> block_ply(const UnitMesh& mesh, double begin_unix_s);
 
 /// The same of units, by all threads of a pool; empty for one without a surface.
-std::vector<std::string> block_plys(std::span<const PublishedUnit> units, double begin_unix_s, jobs::WorkerPool& pool);
+std::vector<base::Result<std::string>> block_plys(std::span<const PublishedUnit> units, double begin_unix_s,
+                                                  jobs::WorkerPool& pool);
 
 /// When a map's first moment was on the clock of this machine, Unix seconds: `begin_s` where the source counts so, else what makes
 /// `newest_s` of the source now.

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <limits>
 
 #include "server/mapping/map_ply.hpp"
 #include "server/sources/frame_bodies.hpp"
@@ -19,8 +20,7 @@ using protocol::FrameSensor;
 using protocol::FramesKind;
 
 constexpr std::chrono::milliseconds kLookEvery{50};
-constexpr double kPublishEveryS = 0.2;
-/// Without a word of the sender for so long, what is left is handed over without a pause.
+/// Without a word of the sender for so long, what is left is handed over with every look.
 constexpr double kIdleAfterS = 0.1;
 /// After a picture was skipped fewer are asked for as long.
 constexpr double kOverloadS = 2;
@@ -64,8 +64,13 @@ Eigen::Isometry3d depth_pose(const mapping::Calibration& calibration, const Eige
 
 }  // namespace
 
-LiveFeed::LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin)
-    : settings_(settings), sinks_(std::move(sinks)), may_begin_(std::move(may_begin)), thread_([this] {
+LiveFeed::LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin,
+                   std::chrono::duration<double> publish_every)
+    : settings_(settings),
+      sinks_(std::move(sinks)),
+      may_begin_(std::move(may_begin)),
+      publish_every_(publish_every),
+      thread_([this] {
         try {
           work();
         } catch (const std::exception& error) {
@@ -434,7 +439,7 @@ void LiveFeed::tell_found_pose() {
 }
 
 void LiveFeed::work() {
-  double last_published_s = steady_s();
+  double last_published_s = -std::numeric_limits<double>::infinity();
   for (;;) {
     std::optional<double> pose_end_s, newest_s;
     bool is_idle = false;
@@ -484,13 +489,13 @@ void LiveFeed::work() {
     if (!mapper_) continue;
     // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
     const std::size_t room = sinks_.room(), waiting_units = publisher_.waiting_count();
-    const bool is_due = steady_s() - last_published_s >= kPublishEveryS && (has_changed_ || waiting_units > 0);
+    const bool is_due = steady_s() - last_published_s >= publish_every_.count() && (has_changed_ || waiting_units > 0);
     // While frames come, whoever makes tiles of it needs the time between.
     const bool is_left = is_idle && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
     if (room == 0 || !(is_due || is_left)) continue;
     last_published_s = steady_s();
     has_changed_ = false;
-    if (!sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_)) return;
+    sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_, pool_);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <cstddef>
@@ -37,8 +38,7 @@ class LiveFeed final : public net::FrameReceiver {
   static constexpr double kColourAgeS = 0.15;
 
   struct Sinks {
-    /// As FeedRun::hand_over.
-    std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment&)> hand_over;
+    HandOver hand_over;
     std::function<void(const RobotPose& pose, bool is_last)> moved;
     /// Units that can be handed over without waiting.
     std::function<std::size_t()> room = [] { return mapping::UnitPublisher::kAll; };
@@ -46,8 +46,12 @@ class LiveFeed final : public net::FrameReceiver {
     std::function<void(const std::string& why)> ended = [](const std::string&) {};
   };
 
+  /// While frames come, what has changed is handed over so often.
+  static constexpr std::chrono::milliseconds kPublishEvery{200};
+
   /// Takes nobody's frames before `may_begin`.
-  LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin);
+  LiveFeed(const mapping::MapperSettings& settings, Sinks sinks, std::function<bool()> may_begin,
+           std::chrono::duration<double> publish_every = kPublishEvery);
   ~LiveFeed() override;  ///< Ends it after the picture that is being fused; what waits is answered by nobody.
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
@@ -106,6 +110,7 @@ class LiveFeed final : public net::FrameReceiver {
   const mapping::MapperSettings settings_;
   const Sinks sinks_;
   const std::function<bool()> may_begin_;
+  const std::chrono::duration<double> publish_every_;
 
   mutable std::mutex mutex_;
   std::condition_variable has_work_;

@@ -105,7 +105,7 @@ void run_feed(const FrameStream& frames, const FeedRun& run, mapping::Mapper& ma
     run.progress(static_cast<double>(i + 1) / static_cast<double>(frames.frame_count));
     if (Clock::now() - last < kPublishEvery && !is_last) continue;
     last = Clock::now();
-    if (!run.hand_over(mapper.changed_units(publisher, moment.eye, pool), moment)) return;
+    run.hand_over(mapper.changed_units(publisher, moment.eye, pool), moment, pool);
   }
 }
 
@@ -140,9 +140,7 @@ void MapFeed::work(const std::function<bool()>& may_begin) {
   mapping::FaultLog faults;
   FeedRun run;
   run.is_over = [this] { return hand_over_.is_over(); };
-  run.hand_over = [this](std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
-    return hand_over_(std::move(units), moment);
-  };
+  run.hand_over = std::ref(hand_over_);
   run.moved = [this](const RobotPose& pose, bool is_last) { robot_.moved(pose, is_last); };
   run_feed(frames_, run, mapper, pool, faults);
   for (const mapping::FrameFault& fault : faults.all()) {

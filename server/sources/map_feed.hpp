@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -32,11 +33,14 @@ FrameStream stream_of(mapping::FrameFolder folder);
 /// A drive through the demo office at the pace of a robot, with small pictures.
 FrameStream demo_drive_stream();
 
-/// Maps frames and hands over, twice a second of real time and at the end, the units that have changed; what `hand_over` returns false for
-/// ends it. Ends early when `is_over`.
+/// Hands over units, with the pool of whoever maps; what it throws ends mapping, and is told.
+using HandOver =
+    std::function<void(std::span<const mapping::PublishedUnit>, const FeedMoment&, jobs::WorkerPool& pool)>;
+
+/// Maps frames and hands over, twice a second of real time and at the end, the units that have changed. Ends early when `is_over`.
 struct FeedRun {
   std::function<bool()> is_over = [] { return false; };
-  std::function<bool(std::vector<mapping::PublishedUnit>, const FeedMoment& moment)> hand_over;
+  HandOver hand_over;
   std::function<void(double share)> progress = [](double) {};
   /// Where the robot is, with every frame; nothing new where no pose is known.
   std::function<void(const RobotPose& pose, bool is_last)> moved = [](const RobotPose&, bool) {};

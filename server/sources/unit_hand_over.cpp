@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <span>
+#include <stdexcept>
 #include <thread>
 
 #include "server/mapping/map_ply.hpp"
@@ -31,24 +31,24 @@ std::size_t UnitHandOver::room() const {
   return under_way < kUnderWay ? kUnderWay - under_way : 0;
 }
 
-bool UnitHandOver::operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment) {
+void UnitHandOver::operator()(std::span<const mapping::PublishedUnit> units, const FeedMoment& moment,
+                              jobs::WorkerPool& pool) {
   for (std::size_t first = 0; first < units.size(); first += kUnderWay) {
-    const std::span some(units.data() + first, std::min(kUnderWay, units.size() - first));
-    std::vector<std::string> blocks = mapping::block_plys(some, moment.begin_unix_s, pool_);
+    if (is_over()) return;
+    const auto some = units.subspan(first, std::min(kUnderWay, units.size() - first));
+    auto blocks = mapping::block_plys(some, moment.begin_unix_s, pool);
     for (std::size_t i = 0; i < some.size(); ++i) {
-      if (!hand_over(some[i].id, std::move(blocks[i]), moment)) return false;
+      if (!blocks[i]) throw std::runtime_error(some[i].id + ": " + blocks[i].error().message);
+      hand_over(some[i].id, std::move(blocks[i]).value(), moment);
     }
   }
-  return !state_->is_over;
 }
 
-bool UnitHandOver::hand_over(const std::string& id, std::string ply, const FeedMoment& moment) {
+void UnitHandOver::hand_over(const std::string& id, std::string ply, const FeedMoment& moment) {
   constexpr std::chrono::milliseconds kWait{10};
   // A map that is behind is waited for: what is told then is newer.
-  while (state_->under_way >= kUnderWay) {
-    if (state_->is_over) return false;
-    std::this_thread::sleep_for(kWait);
-  }
+  while (state_->under_way >= kUnderWay && !state_->is_over) std::this_thread::sleep_for(kWait);
+  if (state_->is_over) return;
   ++state_->under_way;
   const auto done = [state = state_, id](const auto& outcome) {
     --state->under_way;
@@ -62,17 +62,15 @@ bool UnitHandOver::hand_over(const std::string& id, std::string ply, const FeedM
   };
   if (ply.empty()) {
     map_.remove(id, done, MapKeeper::WhenFull::Take);
-    return true;
+    return;
   }
   auto block = incoming_block(id, unit_query(up_, moment.eye));
   if (!block) {
     --state_->under_way;
-    spdlog::error("{}: {}", id, block.error().message);
-    return false;
+    throw std::runtime_error(id + ": " + block.error().message);
   }
   block.value().ply = std::make_shared<const std::string>(std::move(ply));
   map_.put(std::move(block).value(), done, MapKeeper::WhenFull::Take);
-  return true;
 }
 
 }  // namespace spectra::sources

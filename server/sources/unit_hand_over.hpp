@@ -4,7 +4,9 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -33,8 +35,8 @@ class UnitHandOver {
 
   UnitHandOver(MapKeeper& map, std::string_view up) : map_(map), up_(up) {}
 
-  /// False: it is over, or cannot be done.
-  bool operator()(std::vector<mapping::PublishedUnit> units, const FeedMoment& moment);
+  /// After end() nothing is put any more. Throws std::runtime_error when a unit cannot be made a block. `pool`: makes blocks beside this thread.
+  void operator()(std::span<const mapping::PublishedUnit> units, const FeedMoment& moment, jobs::WorkerPool& pool);
 
   /// Units that it would take now without waiting.
   std::size_t room() const;
@@ -47,7 +49,7 @@ class UnitHandOver {
 
  private:
   /// A unit without a surface has no bytes.
-  bool hand_over(const std::string& id, std::string ply, const FeedMoment& moment);
+  void hand_over(const std::string& id, std::string ply, const FeedMoment& moment);
 
   MapKeeper& map_;
   const std::string up_;
@@ -57,7 +59,6 @@ class UnitHandOver {
     std::atomic<std::size_t> under_way{0}, refused{0};
   };
   const std::shared_ptr<State> state_ = std::make_shared<State>();
-  jobs::WorkerPool pool_{1};
 };
 
 }  // namespace spectra::sources

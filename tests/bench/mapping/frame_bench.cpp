@@ -89,13 +89,13 @@ int main(int argc, char** argv) {
   std::size_t frame_count = 0, unit_count = 0, byte_count = 0, checksum = 0;
   const auto publish = [&](double time_s) {
     std::vector<PublishedUnit> changed;
-    std::vector<std::string> blocks;
+    std::vector<base::Result<std::string>> blocks;
     const Eigen::Vector3d eye = folder.value().trajectory().at(time_s).pose.translation();
     units.add_to_last([&] { changed = mapper.changed_units(publisher, eye, pool, most); });
     hand_over.add_to_last([&] { blocks = block_plys(changed, 0, pool); });
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (blocks[i].empty()) blocks[i] = block_ply(changed[i].mesh, 0);
-      const std::string& block = blocks[i];
+      if (blocks[i].value().empty()) blocks[i] = block_ply(changed[i].mesh, 0);
+      const std::string& block = blocks[i].value();
       byte_count += block.size();
       checksum = checksum * 31 + std::hash<std::string>()(block);
     }

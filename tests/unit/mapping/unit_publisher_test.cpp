@@ -72,7 +72,7 @@ TEST(BlockPly, NamesTheUnitOfItsPositions) {
   mesh.celsius = {20};
   mesh.sigma_kelvin = {1};
   mesh.seen_s = {0};
-  EXPECT_NE(block_ply(mesh, 0).find("comment positions in metres\n"), std::string::npos);
+  EXPECT_NE(block_ply(mesh, 0).value().find("comment positions in metres\n"), std::string::npos);
 }
 
 TEST_F(UnitPublisherTest, TellsEverythingOnceAndThenNothing) {
