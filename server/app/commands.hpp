@@ -118,8 +118,9 @@ struct MapOptions {
   std::optional<std::filesystem::path> token_file;
   std::optional<std::filesystem::path> poses;  ///< Absent: the folder's.
   std::optional<std::filesystem::path>
-      corrected_poses;       ///< Of the same drive, known later: submaps move to them in the end.
-  bool is_tracking = false;  ///< Poses are found from the frames; only the first is taken as given.
+      corrected_poses;  ///< Of the same drive, known later: submaps move to them in the end.
+  bool is_tracking =
+      false;  ///< Poses are found from the frames; only that nearest to the first depth picture is taken as given.
   std::optional<std::filesystem::path> found_poses;  ///< Where to write the poses that were found.
   std::optional<std::filesystem::path> vignetting;
   double voxel_m = 0.01;

@@ -95,7 +95,8 @@ void add_serve(CLI::App& app, ServeOptions& options, bool& is_demo, Run& run) {
   auto* track =
       command
           ->add_flag("--track", options.is_tracking,
-                     "With --map: find the poses from the frames; of those that are given only the first counts")
+                     "With --map: find the poses from the frames; of those that are given only the one nearest to "
+                     "the first depth picture counts")
           ->needs(frames);
   command
       ->add_flag("--submaps", options.has_submaps,
@@ -322,7 +323,8 @@ void add_map(CLI::App& app, MapOptions& options, Run& run) {
       "--corrected-poses", options.corrected_poses,
       "Poses of the same drive as they are known now (TUM): the map is made with the others, in submaps, which move");
   auto* track = command->add_flag("--track", options.is_tracking,
-                                  "Find the poses from the frames; of those that are given only the first counts");
+                                  "Find the poses from the frames; of those that are given only the one nearest to "
+                                  "the first depth picture counts");
   track->excludes(corrected);
   command
       ->add_option("--save-poses", options.found_poses, "With --track: a file for the poses of the depth camera (TUM)")

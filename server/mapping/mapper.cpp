@@ -59,10 +59,11 @@ base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
   return base::success();
 }
 
-void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults, FaultLog* faults_of_earlier) {
   if (!begin_s_) begin_s_ = frame.time_s;
   newest_s_ = frame.time_s;
-  if (tracker_) return fuse_tracked(frame, trajectory, faults);
+  if (tracker_)
+    return fuse_tracked(frame, trajectory, faults, faults_of_earlier != nullptr ? *faults_of_earlier : faults);
   if (!frame.depth.empty() && !fuse_surface(frame, trajectory, faults)) return;
   if (!frame.thermal.empty() && heat_) fuse_heat(frame, trajectory, faults);
 }
@@ -181,7 +182,8 @@ std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFr
   return pose;
 }
 
-void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
+void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults,
+                          FaultLog& faults_of_earlier) {
   if (!frame.thermal.empty() && heat_) {
     Frame held;
     held.time_s = frame.time_s;
@@ -207,12 +209,13 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
     return held.time_s + calibration_.thermal->delay_s > known_s && frame.time_s - held.time_s < kLongestWaitSeconds;
   };
   for (const Frame& held : held_) {
-    if (!waits(held)) fuse_heat(held, tracked_, faults);
+    if (!waits(held)) fuse_heat(held, tracked_, held.time_s < frame.time_s ? faults_of_earlier : faults);
   }
   std::erase_if(held_, [&](const Frame& held) { return !waits(held); });
   if (held_.size() <= kMostHeld) return;
-  faults.add(FaultKind::NoPose, "at " + seconds_text(held_.front().time_s) + " more than " + std::to_string(kMostHeld) +
-                                    " thermal pictures wait for the pose of a depth picture: the oldest are left out");
+  faults_of_earlier.add(FaultKind::NoPose,
+                        "at " + seconds_text(held_.front().time_s) + " more than " + std::to_string(kMostHeld) +
+                            " thermal pictures wait for the pose of a depth picture: the oldest are left out");
   held_.erase(held_.begin());
 }
 

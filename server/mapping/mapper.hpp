@@ -26,7 +26,8 @@ struct MapperSettings {
   double voxel_m = 0.01;
   bool use_colour = true;
   bool use_thermal = true;
-  bool is_tracking = false;  ///< Poses are found from what is seen; of those that are given only the first counts.
+  bool is_tracking =
+      false;  ///< Poses are found from what is seen; of those that are given only that nearest to the first depth picture counts.
   std::optional<SubmapRules> submaps;  ///< Of given poses: the map is made in parts, which correct() moves.
   /// Of the blocks of voxels, of all submaps and the map that is made of them together. A map that has taken them maps nothing new, begins no submap, says so (MapFull), and
   /// goes on with what it has. Submaps that are turned may reach some more blocks than before.
@@ -57,8 +58,9 @@ class Mapper {
   base::Result<void> set_vignetting(PictureFloat picture);
 
   /// Fuses what of a frame has a pose (tracking: the trajectory may be empty, then the first pose is none at all; thermal pictures wait for the
-  /// depth picture after them); frames in order of their time. What cannot be fused is left out and stands in `faults`.
-  void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+  /// depth picture after them); frames in order of their time. What cannot be fused is left out and stands in `faults`; of a frame before that had waited, in `faults_of_earlier`
+  /// where there is one.
+  void fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults, FaultLog* faults_of_earlier = nullptr);
 
   /// Poses of the depth camera turn out to be others: submaps move, and what is fused from now on has poses of the corrected world. Of a mapper with
   /// submaps.
@@ -107,7 +109,7 @@ class Mapper {
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
   void fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory, FaultLog& faults);
-  void fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
+  void fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults, FaultLog& faults_of_earlier);
   /// The pose of the depth camera at a moment, by tracking.
   std::optional<Eigen::Isometry3d> track(const Frame& frame, const DepthFrame& depth, const Trajectory& trajectory,
                                          FaultLog& faults);

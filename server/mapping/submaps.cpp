@@ -187,14 +187,15 @@ void Submaps::bake(VoxelMap& world, bool all, jobs::WorkerPool& pool) {
     part.had_moved = part.has_moved;
     part.baked_bytes = map.block_bytes();
   }
+  if (wanted.empty()) return;
   // What is left empty makes room first.
   std::stable_partition(wanted.begin(), wanted.end(), [&](GridPlace at) { return world.find(at) >= 0; });
 
   std::vector<Eigen::Isometry3d> grids_from_world;
-  std::vector<VoxelBox> boxes;
+  std::vector<VoxelBox> boxes;  // Only of those that have moved.
   for (const Part& part : parts_) {
     grids_from_world.push_back(part.world_from_grid.inverse());
-    boxes.push_back(box_of(*part.map));
+    boxes.push_back(part.has_moved ? box_of(*part.map) : VoxelBox());
   }
   std::vector<BakedBlock> baked(std::min(kBakedAtOnce, wanted.size()));
   for (std::size_t first = 0; first < wanted.size(); first += kBakedAtOnce) {

@@ -14,19 +14,30 @@ namespace {
 
 constexpr double kSameMoment = 1e-6;
 
-/// Eight numbers; false when there are not as many, or one is none.
+/// Eight numbers; false when there are not as many.
 bool parse_line(const std::string& line, std::array<double, 8>& values) {
   const char* at = line.c_str();
   for (double& value : values) {
     char* end = nullptr;
     value = std::strtod(at, &end);
-    if (end == at || !std::isfinite(value)) return false;
+    if (end == at) return false;
     at = end;
   }
   return true;
 }
 
 }  // namespace
+
+std::optional<Eigen::Isometry3d> pose_of(std::span<const double> v) {
+  if (v.size() != 8) return std::nullopt;
+  const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
+  const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
+  if (!is_finite || !is_in_range(pose) || !(std::abs(rotation.norm() - 1) <= 0.05)) return std::nullopt;
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  return pose;
+}
 
 Eigen::Isometry3d pose_between(const Eigen::Isometry3d& first, const Eigen::Isometry3d& second, double share) {
   const Eigen::Quaterniond a(first.linear()), b(second.linear());
@@ -57,16 +68,12 @@ Trajectory Trajectory::from_text(const std::string& text) {
     const auto first = line.find_first_not_of(" \t\r");
     if (first == std::string::npos || line[first] == '#') continue;
     std::array<double, 8> v{};
-    const bool is_read = parse_line(line, v);
-    const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
-    if (!is_read || !is_in_range(pose) || std::abs(rotation.norm() - 1) > 0.05) {
+    const auto pose = parse_line(line, v) ? pose_of(v) : std::nullopt;
+    if (!pose) {
       ++trajectory.notes_.unreadable;
       continue;
     }
-    pose.linear() = rotation.normalized().toRotationMatrix();
-    trajectory.add(v[0], pose);
+    trajectory.add(v[0], *pose);
   }
   return trajectory;
 }

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +37,10 @@ inline constexpr double kFarthestPoseM = 1e6;
 inline bool is_in_range(const Eigen::Isometry3d& pose) {
   return pose.translation().norm() < kFarthestPoseM;
 }
+
+/// The pose of eight numbers: a stamp, tx ty tz, qx qy qz qw. Nothing where they are not as many, or not finite, where the last four are no rotation
+/// (to 5 %), or where it is too far away (is_in_range).
+std::optional<Eigen::Isometry3d> pose_of(std::span<const double> values);
 
 /// The rotation by slerp, the translation linearly; share 0 is the first.
 Eigen::Isometry3d pose_between(const Eigen::Isometry3d& first, const Eigen::Isometry3d& second, double share);

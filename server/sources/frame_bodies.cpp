@@ -1,13 +1,9 @@
 #include "server/sources/frame_bodies.hpp"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
-
-#include "server/mapping/trajectory.hpp"
 
 namespace spectra::sources {
 namespace {
@@ -20,17 +16,6 @@ std::span<const unsigned char> body_of(const net::IncomingFrame& frame) {
 }
 
 }  // namespace
-
-std::optional<Eigen::Isometry3d> pose_of(const std::vector<double>& v) {
-  if (v.size() != 8) return std::nullopt;
-  const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
-  const bool is_finite = std::all_of(v.begin(), v.end(), [](double value) { return std::isfinite(value); });
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = Eigen::Vector3d(v[1], v[2], v[3]);
-  if (!is_finite || !mapping::is_in_range(pose) || !(std::abs(rotation.norm() - 1) <= 0.05)) return std::nullopt;
-  pose.linear() = rotation.normalized().toRotationMatrix();
-  return pose;
-}
 
 base::Result<mapping::Picture16> picture16_of(const net::IncomingFrame& frame, const std::string& name) {
   const auto body = body_of(frame);

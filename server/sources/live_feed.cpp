@@ -37,6 +37,10 @@ std::string name_of(FrameSensor sensor) {
   return sensor == FrameSensor::Depth ? "depth" : sensor == FrameSensor::Color ? "color" : "thermal";
 }
 
+std::string picture_name(FrameSensor sensor) {
+  return "a " + name_of(sensor) + " picture";
+}
+
 std::string code_of(FaultKind kind) {
   switch (kind) {
     case FaultKind::NoPose:
@@ -148,9 +152,9 @@ std::size_t LiveFeed::skipped_count() const {
   return skipped_count_;
 }
 
-void LiveFeed::note(FaultKind kind, const std::string& what) {
+void LiveFeed::note(FaultKind kind, const std::string& what, std::size_t count) {
   if (faults_.of(kind).count == 0) spdlog::warn("{}; said once", what);
-  faults_.add(kind, what);
+  faults_.add(kind, what, count);
 }
 
 net::BlockRefusal LiveFeed::refused(FaultKind kind, std::string code, std::string field, const std::string& reason) {
@@ -247,7 +251,7 @@ std::optional<net::FrameOutcome> LiveFeed::take_poses(const net::IncomingFrame& 
   std::optional<net::BlockRefusal> refusal;
   PoseNews news;
   for (const auto& values : frame.head.poses) {
-    const auto pose = pose_of(values);
+    const auto pose = mapping::pose_of(values);
     if (!pose) {
       refusal =
           refused(FaultKind::UnreadablePose, "bad_pose", "poses",
@@ -273,7 +277,7 @@ std::optional<net::FrameOutcome> LiveFeed::take_corrections(const net::IncomingF
   PoseNews news;
   news.is_correction = true;
   for (const auto& values : frame.head.poses) {
-    const auto pose = pose_of(values);
+    const auto pose = mapping::pose_of(values);
     // Half a correction would tear the map.
     if (!pose) {
       return refused(
@@ -290,9 +294,9 @@ std::optional<net::FrameOutcome> LiveFeed::take_corrections(const net::IncomingF
 }
 
 std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::FrameHead& head, double time_s) {
-  const std::string name = "a " + name_of(*head.sensor) + " picture ";
+  const std::string name = picture_name(*head.sensor);
   if (!calibration_) {
-    return refused(FaultKind::NoCalibration, "no_calibration", "", name + "has come before the calibration");
+    return refused(FaultKind::NoCalibration, "no_calibration", "", name + " has come before the calibration");
   }
   const bool has_camera =
       *head.sensor == FrameSensor::Depth ||
@@ -302,14 +306,14 @@ std::optional<net::BlockRefusal> LiveFeed::refusal_of_picture(const protocol::Fr
                    "the calibration has no " + name_of(*head.sensor) + " camera");
   }
   if (!settings_.is_tracking && pose_end_s_ && std::abs(time_s - *pose_end_s_) > kFarthestStampS) {
-    return refused(FaultKind::NoPose, "no_pose", "time", name + "has a stamp more than 10 s from the newest pose");
+    return refused(FaultKind::NoPose, "no_pose", "time", name + " has a stamp more than 10 s from the newest pose");
   }
   return std::nullopt;
 }
 
 std::optional<net::FrameOutcome> LiveFeed::take_picture(net::IncomingFrame& frame, Done& done, Answers& answers) {
   const protocol::FrameHead& head = frame.head;
-  const std::string name = "a " + name_of(*head.sensor) + " picture";
+  const std::string name = picture_name(*head.sensor);
   if (is_near_lone_pose(*head.time)) {
     // Both are believed.
     PoseNews news;
@@ -501,7 +505,7 @@ void LiveFeed::work() {
 
 mapping::Frame LiveFeed::decoded(const Key& key, const net::IncomingFrame& frame, mapping::FaultLog& faults) {
   const auto& [time_s, rank] = key;
-  const std::string name = "a " + name_of(*frame.head.sensor) + " picture";
+  const std::string name = picture_name(*frame.head.sensor);
   mapping::Frame result;
   result.time_s = time_s;
   const auto take = [&](auto read, const mapping::CameraModel& camera, auto& into) {
@@ -522,7 +526,7 @@ mapping::Frame LiveFeed::decoded(const Key& key, const net::IncomingFrame& frame
 }
 
 net::FrameOutcome LiveFeed::map_picture(const Key& key, const net::IncomingFrame& incoming) {
-  mapping::FaultLog faults;
+  mapping::FaultLog faults, faults_of_earlier;
   mapping::Frame frame = decoded(key, incoming, faults);
   if (key.second == Rank::Colour) {
     colour_ = std::move(frame.colour);
@@ -533,14 +537,19 @@ net::FrameOutcome LiveFeed::map_picture(const Key& key, const net::IncomingFrame
       frame.colour_time_s = colour_s_;
       colour_ = {};
     }
-    mapper_->fuse(frame, trajectory_, faults);
+    mapper_->fuse(frame, trajectory_, faults, &faults_of_earlier);
     has_changed_ = true;
   }
   const auto wrong = std::find_if(faults.all().begin(), faults.all().end(),
                                   [](const mapping::FrameFault& fault) { return fault.count > 0; });
+  const std::lock_guard lock(mutex_);
+  // They were answered when they were held.
+  for (std::size_t i = 0; i < mapping::kFaultKinds; ++i) {
+    const mapping::FrameFault& fault = faults_of_earlier.all()[i];
+    if (fault.count > 0) note(static_cast<FaultKind>(i), fault.what, fault.count);
+  }
   if (wrong == faults.all().end()) return net::FrameTaken{};
   const auto kind = static_cast<FaultKind>(wrong - faults.all().begin());
-  const std::lock_guard lock(mutex_);
   return refused(kind, code_of(kind), kind == FaultKind::NoPose ? "time" : "body", wrong->what);
 }
 

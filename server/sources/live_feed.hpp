@@ -95,7 +95,7 @@ class LiveFeed final : public net::FrameReceiver {
   void leave_lone_pose_out();
   net::BlockRefusal not_mapping() const { return {503, "not_mapping", "", *ended_, ""}; }
   net::BlockRefusal refused(mapping::FaultKind kind, std::string code, std::string field, const std::string& reason);
-  void note(mapping::FaultKind kind, const std::string& what);
+  void note(mapping::FaultKind kind, const std::string& what, std::size_t count = 1);
   bool is_ready() const;
   std::optional<double> wanted_rate() const;
 

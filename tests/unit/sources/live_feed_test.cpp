@@ -49,10 +49,12 @@ class LiveFeedTest : public ::testing::Test {
     head.poses = {std::vector<double>{time_s, x, 0, 0, 0, 0, 0, 1}};
     return send(head);
   }
-  Answer depth(double time_s) {
+  Answer depth(double time_s) { return picture(FrameSensor::Depth, time_s); }
+  /// A depth picture, or a thermal one of -258 degC.
+  Answer picture(FrameSensor sensor, double time_s) {
     FrameHead head;
     head.kind = FramesKind::Picture;
-    head.sensor = FrameSensor::Depth;
+    head.sensor = sensor;
     head.encoding = FrameEncoding::Raw16;
     head.width = kWidth;
     head.height = kHeight;
@@ -60,6 +62,11 @@ class LiveFeedTest : public ::testing::Test {
     std::string body;
     for (int i = 0; i < kWidth * kHeight; ++i) body += "\xdc\x05";  // 1500 mm
     return send(head, body);
+  }
+  Answer end_of_frames() {
+    FrameHead head;
+    head.kind = FramesKind::End;
+    return send(head);
   }
   static std::string code_of(Answer answer) {
     if (answer.wait_for(10s) != std::future_status::ready) return "no answer";
@@ -176,9 +183,7 @@ TEST_F(LiveFeedTest, WaitsForNoPoseLongerThanItsPatience) {
   Answer waiting = depth(6);
   Answer later = depth(6.5);
   EXPECT_EQ(code_of(std::move(waiting)), "no_pose");
-  FrameHead end;
-  end.kind = FramesKind::End;
-  EXPECT_EQ(code_of(send(end)), "taken");
+  EXPECT_EQ(code_of(end_of_frames()), "taken");
   EXPECT_EQ(code_of(std::move(later)), "no_pose");
   EXPECT_EQ(own_->faults().of(mapping::FaultKind::NoPose).count, 3U);
 }
@@ -225,9 +230,7 @@ TEST_F(LiveFeedTest, TracksWithoutPosesAndSaysThatItIsLost) {
   EXPECT_EQ(begun(), "begun");
   EXPECT_EQ(code_of(calibrate()), "taken");
   Answer first = depth(0), second = depth(0.1);
-  FrameHead end;
-  end.kind = FramesKind::End;
-  EXPECT_EQ(code_of(send(end)), "taken");
+  EXPECT_EQ(code_of(end_of_frames()), "taken");
   EXPECT_EQ(code_of(std::move(first)), "taken") << "the first picture is where the map begins";
   // A bare wall does not tell where along it one is.
   EXPECT_EQ(code_of(std::move(second)), "lost_track");
@@ -242,6 +245,29 @@ TEST_F(LiveFeedTest, TracksWithoutPosesAndSaysThatItIsLost) {
   const std::lock_guard lock(mutex_);
   ASSERT_FALSE(poses_.empty());
   EXPECT_TRUE(poses_.back().is_lost);
+}
+
+TEST_F(LiveFeedTest, APictureIsNotAnsweredForThoseThatWereHeldBeforeIt) {
+  mapping::MapperSettings tracking = settings();
+  tracking.is_tracking = true;
+  own_ = feed_of(tracking);
+  EXPECT_EQ(begun(), "begun");
+  const std::string beside = R"("from_depth":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]])";
+  EXPECT_EQ(code_of(calibrate(R"(},"thermal":{)" + kCamera + "," + beside)), "taken");
+  const std::size_t left_out = 5;
+  std::vector<Answer> answers;
+  for (std::size_t i = 0; i < mapping::Mapper::kMostHeld + left_out; ++i) {
+    answers.push_back(picture(FrameSensor::Thermal, 0.001 * static_cast<double>(i)));
+    if (answers.size() < LiveFeed::kMostWaiting / 2 && i + 1 < mapping::Mapper::kMostHeld + left_out) continue;
+    EXPECT_EQ(code_of(end_of_frames()), "taken");
+    for (Answer& answer : answers) EXPECT_EQ(code_of(std::move(answer)), "taken");
+    answers.clear();
+  }
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::NoPose).count, left_out) << "but said and counted";
+  Answer first = depth(2);
+  EXPECT_EQ(code_of(end_of_frames()), "taken");
+  EXPECT_EQ(code_of(std::move(first)), "taken") << "none of those has a pose any more";
+  EXPECT_EQ(own_->faults().of(mapping::FaultKind::NoPose).count, left_out + mapping::Mapper::kMostHeld);
 }
 
 TEST_F(LiveFeedTest, TracksOnAfterTheOnlyPose) {
