@@ -18,16 +18,18 @@ constexpr std::size_t kManyRuns = 12;
 /// Different ones, as they are measured; no form is built ring by ring of so many.
 constexpr std::size_t kMeasuredNumbers = 100;
 /// Distances are compared with the size of the scene.
-constexpr double kFar = 2, kVeryFar = 16, kFartherThanAnyForm = 1000;
+constexpr double kFar = 2, kVeryFar = 16, kFartherThanAnyForm = 1000, kBeyondAllForms = 1e9;
 
 constexpr std::array<double base::Vec3d::*, 3> kAxes = {&base::Vec3d::x, &base::Vec3d::y, &base::Vec3d::z};
 
 enum class NumberKind { Any, Round, WrittenForNone };
 
-/// Written for none are nines (also -9999.9) and the ends of whole numbers of 16 bits and more, and sometimes powers of ten.
+/// Written for none are nines (also -9999.9) and the ends of whole numbers of 16 bits (also in millimetres, when the file has
+/// metres, as of depth cameras) and more, and sometimes powers of ten.
 NumberKind kind_of(double number) {
   const double size = std::abs(number);
   const auto is = [size](double other) { return std::abs(size - other) <= 1e-7 * other; };
+  if (is(65.535) || is(32.767) || is(32.768)) return NumberKind::WrittenForNone;
   constexpr double kLeastBelow = 998, kLeastAbove = 9990;
   if (size < (number < 0 ? kLeastBelow : kLeastAbove)) return NumberKind::Any;
   for (const int bits : {15, 16, 31, 32, 63, 64}) {
@@ -165,6 +167,7 @@ class Finder {
 
   static bool is_certain(const Candidate& candidate, NumberKind kind, const Evidence& evidence) {
     const auto is_away = [&](double sizes) { return candidate.gap > sizes * evidence.size; };
+    if (is_away(kBeyondAllForms)) return true;
     if (kind == NumberKind::WrittenForNone) {
       return !evidence.is_used || evidence.numbers_of_others >= kManyNumbers || is_away(kFartherThanAnyForm);
     }

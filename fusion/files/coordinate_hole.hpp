@@ -44,12 +44,13 @@ struct CoordinateHoles {
 /// than those are from each other. A true form has such numbers too (both ends of a pipe, a base far below), so that more
 /// must be there:
 ///
-/// - a number that is written for none alone (-9999, -32768, ...): no triangle uses it, or the others have a dozen different
+/// - a number that is written for none alone (-9999, -32768, 65.535, ...): no triangle uses it, or the others have a dozen different
 ///   numbers, or it is 1000 times as far away as the scene is large;
 /// - a power of ten: the others have a hundred different numbers, or a dozen and each an eighth as many vertices at most; its
 ///   vertices are among the others in the file and in the other two coordinates, and twice as far away as the scene is large,
 ///   16 times where triangles use them;
-/// - any other: the same, but 1000 times where triangles use it.
+/// - any other: the same, but 1000 times where triangles use it;
+/// - or it is 1e9 times as far away as the scene is large.
 ///
 /// `metres` in one unit of the file.
 CoordinateHoles find_coordinate_holes(std::span<const SampledVertex> vertices, double metres, const IsUsed& is_used);

@@ -133,6 +133,26 @@ TEST(CoordinateHole, HeightsThatAreMeasuredMayBeEqual) {
   }
 }
 
+TEST(CoordinateHole, WhatNoFormReachesIsAHoleHoweverFewHeightsThereAre) {
+  std::vector<base::Vec3d> grid;
+  for (int i = 0; i < 400; ++i) grid.push_back({i % 20 * 1.0, i / 20 * 1.0, i % 20 < 3 ? -1e20 : i % 4 * 0.2});
+  EXPECT_TRUE(holes_of(grid, true).certain);
+  for (base::Vec3d& p : grid) p.z = std::max(p.z, -1e7);
+  EXPECT_FALSE(holes_of(grid, true).certain);
+}
+
+TEST(CoordinateHole, TheEndOf16BitsInMillimetresIsAHole) {
+  // A depth camera 2 m before a wall of 4 m.
+  for (const double none : {65.535, static_cast<double>(65.535F), 32.767}) {
+    std::vector<base::Vec3d> wall = terrain(none);
+    for (base::Vec3d& p : wall) p = {p.x / 75, p.y / 75, p.z == none ? none : p.z / 125};
+    EXPECT_TRUE(holes_of(wall, true).certain) << none;
+    for (base::Vec3d& p : wall) p.z = p.z == none ? 61.125 : p.z;
+    EXPECT_FALSE(holes_of(wall, true).certain);
+    EXPECT_TRUE(holes_of(wall, true).possible);
+  }
+}
+
 TEST(CoordinateHole, EveryAxisAndBothEndsAreLookedAt) {
   for (const double none : {-9999.0, 99'999.0}) {
     for (int axis = 0; axis < 3; ++axis) {
