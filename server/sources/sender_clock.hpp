@@ -33,6 +33,8 @@ class SenderClock {
   Verdict look(double stamp_s, double now_s);
   void accept(double stamp_s, double now_s);
 
+  /// accept() was told of a stamp of this sender.
+  bool has_said_any() const { return span_.has_value(); }
   /// This sender's newest stamp is at most kFarS from one.
   bool has_said_near(double stamp_s) const;
   /// A stamp of this sender on the clock of the map.
