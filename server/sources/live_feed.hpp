@@ -74,7 +74,7 @@ class LiveFeed final : public net::FrameReceiver {
   std::condition_variable has_work_;
   bool is_over_ = false;
   std::optional<std::string> ended_;  ///< Why nothing is mapped any more.
-  FrameIntake intake_;
+  FrameIntake intake_;                ///< Under the lock.
 
   // Of the thread.
   std::vector<FrameIntake::PoseNews> poses_in_hand_;
