@@ -31,17 +31,22 @@ ViewerStream::ViewerStream(std::shared_ptr<const map::SceneSnapshot> scene, std:
 }
 
 void ViewerStream::change(const std::function<void()>& action) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (closed_) return;
+  go_on([&] {
     const auto geometry_epoch = demand_.geometry_epoch;
     const auto colour_epoch = demand_.colour_epoch;
     action();
     if (geometry_epoch != demand_.geometry_epoch || colour_epoch != demand_.colour_epoch) {
       drop_superseded();
     }
-    order_.rewind();
-    raw_.rewind();
+    look_again();
+  });
+}
+
+void ViewerStream::go_on(const std::function<void()>& action) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;
+    action();
     if (TileSlot* slot = head(); slot != nullptr && slot->work == TileSlot::Work::Idle) {
       preparation_.look_up(*slot, demand_);
     }
@@ -178,7 +183,7 @@ void ViewerStream::set_camera(const Camera& camera) {
 }
 
 void ViewerStream::acknowledge(std::uint32_t sequence, double now_s) {
-  change([&] { window_.on_acknowledged(sequence, now_s); });
+  go_on([&] { window_.on_acknowledged(sequence, now_s); });
 }
 
 StreamStats ViewerStream::stats() const {
@@ -207,7 +212,7 @@ StreamStats ViewerStream::stats() const {
 }
 
 void ViewerStream::cache_changed() {
-  change([&] {
+  go_on([&] {
     for (const auto& slot : tiles_.slots()) {
       if (slot->work == TileSlot::Work::Waiting) slot->work = TileSlot::Work::Idle;
       for (TileSlot::Raw& raw : slot->raw) {
@@ -326,6 +331,11 @@ void ViewerStream::drop_superseded() {
     ++skipped_frame_count_;
     tiles_.put_down(*slot);
   }
+}
+
+void ViewerStream::look_again() {
+  order_.rewind();
+  raw_.rewind();
 }
 
 TileSlot* ViewerStream::head() {

@@ -94,9 +94,10 @@ class ViewerStream final : public std::enable_shared_from_this<ViewerStream>, pr
 
   // With the lock not held.
   void cache_changed() override;
-  /// Every change of state goes through here: afterwards superseded frames are dropped, jobs are posted for what is
-  /// missing, and the session is woken when there is something for it.
+  /// Every change of what is demanded or held goes through here: superseded frames are dropped, and what was sent is looked at again.
   void change(const std::function<void()>& action);
+  /// With what else has happened: afterwards jobs are posted for what is missing, and the session is woken when there is something for it.
+  void go_on(const std::function<void()>& action);
   /// `is_followed`: raw layers have waited for it.
   std::optional<StreamComplete> completed(bool& is_followed);
   void wake();
@@ -121,6 +122,8 @@ class ViewerStream final : public std::enable_shared_from_this<ViewerStream>, pr
   /// Beneath tiles that have become fine enough when they had their colours already.
   void remove_outdated();
   void drop_superseded();
+  /// Tiles that were as they should be may be so no more.
+  void look_again();
   /// The first tile that is not as it should be; null when there is none, or no settings yet.
   TileSlot* head();
   bool is_complete();

@@ -111,6 +111,7 @@ ViewerStream::Attempt ViewerStream::next_geometry(TileSlot& slot, double now_s) 
   if (name <= slot.held.wire_revision) {
     // Resumed under a revision that never was; what replaces it has to be newer.
     tiles_.remove_from_viewer(slot);
+    look_again();
     return {};
   }
   tiles_.give_geometry(slot, name, demand_.geometry_epoch);
@@ -216,6 +217,8 @@ std::optional<Encoding> ViewerStream::encoding_after(const Encoding& done) {
 
 void ViewerStream::note_failure(const Encoding& encoding) {
   ++failed_tile_count_;
+  // What stood in for it may have to come after all.
+  look_again();
   if (encoding.geometry) {
     encoding.slot->failed.colour_epoch = encoding.demand.colour_epoch;
   } else {
@@ -272,7 +275,7 @@ void ViewerStream::run_job() {
     budget_.spend(end - begin, end);
     encoding = encoding_after(*encoding);
   }
-  change([&] { --running_job_count_; });
+  go_on([&] { --running_job_count_; });
 }
 
 }  // namespace spectra::stream

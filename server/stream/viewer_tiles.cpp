@@ -139,12 +139,28 @@ bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const
   return is_of_before && slot.held.child_mask == slot.tile->child_mask && is_hidden(slot, demand);
 }
 
-bool ViewerTiles::is_answered_beneath(const TileSlot& slot, const Demand& demand) const {
+template <class IsSo>
+bool ViewerTiles::is_made_up_beneath(const TileSlot& slot, const IsSo& is_so) const {
   const auto& children = tree_.nodes()[slot.node].children;
   return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
     const TileSlot& child = *slots_[index];
-    return (child.is_drawable() && child.has_colours(demand)) || is_answered_beneath(child, demand);
+    return is_so(child) || is_made_up_beneath(child, is_so);
   });
+}
+
+bool ViewerTiles::is_answered_beneath(const TileSlot& slot, const Demand& demand) const {
+  return is_made_up_beneath(slot, [&](const TileSlot& tile) { return tile.is_drawable() && tile.has_colours(demand); });
+}
+
+bool ViewerTiles::is_hidden(const TileSlot& slot, const Demand& demand) const {
+  return is_made_up_beneath(slot, [&](const TileSlot& tile) {
+    if (!demand.fused) return tile.has_raw_layers() || tile.held.had_raw_layers;
+    return tile.has_newest_colours(demand) || tile.held.earlier_colour_epoch == demand.colour_epoch;
+  });
+}
+
+bool ViewerTiles::is_covered(const TileSlot& slot, const Demand& demand) const {
+  return is_made_up_beneath(slot, [&](const TileSlot& tile) { return tile.has_newest_colours(demand); });
 }
 
 bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
@@ -303,26 +319,6 @@ void ViewerTiles::remove_outdated_beneath(const TileSlot& slot, const Demand& de
     if (is_outdated && !is_covered(outdated, demand)) remove_from_viewer(outdated);
     remove_outdated_beneath(outdated, demand);
   }
-}
-
-bool ViewerTiles::is_hidden(const TileSlot& slot, const Demand& demand) const {
-  const auto& children = tree_.nodes()[slot.node].children;
-  return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
-    const TileSlot& child = *slots_[index];
-    const bool is_current = child.is_drawable() && child.held.colour_epoch == demand.colour_epoch;
-    const bool is_drawn = demand.fused ? is_current || child.held.earlier_colour_epoch == demand.colour_epoch
-                                       : child.has_raw_layers() || child.held.had_raw_layers;
-    return is_drawn || is_hidden(child, demand);
-  });
-}
-
-bool ViewerTiles::is_covered(const TileSlot& slot, const Demand& demand) const {
-  const auto& children = tree_.nodes()[slot.node].children;
-  return !children.empty() && std::all_of(children.begin(), children.end(), [&](std::size_t index) {
-    const TileSlot& child = *slots_[index];
-    const bool is_current = child.is_drawable() && child.held.colour_epoch == demand.colour_epoch;
-    return is_current || is_covered(child, demand);
-  });
 }
 
 TileFrameHeader ViewerTiles::take_removal() {

@@ -95,6 +95,10 @@ struct TileSlot {
     return held.colour_epoch == demand.colour_epoch && held.colour_bits >= wanted_colour_bits(demand) &&
            held.look == look;
   }
+  /// Drawable, in the newest colours, however exact.
+  bool has_newest_colours(const Demand& demand) const {
+    return is_drawable() && held.colour_epoch == demand.colour_epoch;
+  }
   /// With colours, or with what the viewer makes them of.
   bool is_drawable() const { return held.geometry_epoch != 0 && (held.colour_epoch != 0 || has_raw_layers()); }
   bool has_raw_layers() const {
@@ -175,6 +179,9 @@ class ViewerTiles {
   /// Whenever what is prepared of a slot or held of it has changed.
   void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;
+  /// All of it is drawn by tiles beneath of which this is so.
+  template <class IsSo>
+  bool is_made_up_beneath(const TileSlot& slot, const IsSo& is_so) const;
   /// All of it is drawn by tiles beneath that are as demanded.
   bool is_answered_beneath(const TileSlot& slot, const Demand& demand) const;
   /// All of it is drawn by tiles beneath under the settings of now, or made of raw layers, be it by earlier versions of them.

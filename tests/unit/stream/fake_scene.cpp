@@ -113,6 +113,21 @@ std::vector<std::shared_ptr<const map::Tile>> quadtree_tiles(int level_count, in
   return tiles;
 }
 
+void lift_a_vertex(map::Tile& tile) {
+  tile.positions[0].z += 0.01F;
+}
+
+protocol::TileId change_leaf_and_above(std::vector<std::shared_ptr<const map::Tile>>& tiles,
+                                       const std::function<void(map::Tile&)>& change) {
+  const std::size_t leaf = 1 + 4;
+  for (const std::size_t place : {std::size_t{0}, std::size_t{1}, leaf}) {
+    auto tile = std::make_shared<map::Tile>(*tiles[place]);
+    change(*tile);
+    tiles[place] = tile;
+  }
+  return tiles[leaf]->id;
+}
+
 std::shared_ptr<const map::SceneSnapshot> scene_of(std::vector<std::shared_ptr<const map::Tile>> tiles,
                                                    std::uint32_t revision) {
   return std::make_shared<FakeScene>(std::move(tiles), revision);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -64,6 +65,13 @@ std::vector<std::shared_ptr<const map::Tile>> tiles_of_tree(int leaf_count, int 
 /// A quadtree of `level_count` levels over the square (0,0)-(4,4): tiles of `side` x `side` vertices in their place, with a
 /// geometric error of 0.4 m at the root that halves with each level and is 0 at the leaves.
 std::vector<std::shared_ptr<const map::Tile>> quadtree_tiles(int level_count, int side);
+
+/// One vertex lies a centimetre higher.
+void lift_a_vertex(map::Tile& tile);
+
+/// Of quadtree_tiles(3, side): the first leaf and the two tiles above it are others, as where a map has changed. Returns the leaf.
+protocol::TileId change_leaf_and_above(std::vector<std::shared_ptr<const map::Tile>>& tiles,
+                                       const std::function<void(map::Tile&)>& change = lift_a_vertex);
 
 std::shared_ptr<const map::SceneSnapshot> scene_of(std::vector<std::shared_ptr<const map::Tile>> tiles,
                                                    std::uint32_t revision = 1);

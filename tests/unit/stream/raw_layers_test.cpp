@@ -25,16 +25,6 @@ constexpr Subscription kRawAlone{.fused = false, .temperature = true, .visible =
 
 class RawLayers : public testing::StreamWithViewers {
  protected:
-  /// Takes until nothing more comes.
-  void settle(TestViewer& viewer) {
-    std::size_t quiet = 0;
-    while (quiet < 2) {
-      wait_until_idle(pool_);
-      const bool has_completed = viewer.stream().take_complete().has_value();
-      quiet = viewer.take() == 0 && !has_completed ? quiet + 1 : 0;
-    }
-  }
-
   std::vector<base::Rgb8> fused_by_viewer(const HeldTile& held, const fusion::FusionPlan& plan) {
     const fusion::TemperatureCodes codes{held.temperature.table.scale, held.temperature.table.offset};
     std::vector<float> celsius(held.temperature.codes.size());
@@ -278,30 +268,19 @@ TEST_F(RawLayers, SigmaIsNoPartOfWhatIsFused) {
 class RawLayersInView : public testing::StreamOfATree {};
 
 TEST_F(RawLayersInView, OfAChangedTileAndAllAboveItOnlyWhatIsDrawnIsSent) {
-  const Subscription raw_alone{.fused = false, .temperature = true, .visible = true};
-  const auto settle = [this](TestViewer& viewer) {
-    for (int i = 0; i < 5; ++i) {
-      wait_until_idle(pool_);
-      viewer.take();
-    }
-  };
   TestViewer viewer(scene_, cache_, pool_);
-  viewer.stream().subscribe(raw_alone);
+  viewer.stream().subscribe(kRawAlone);
   show(viewer, 0.3);
   viewer.complete();
   settle(viewer);
   const std::size_t before = viewer.frames.size();
   std::vector<std::shared_ptr<const map::Tile>> tiles(scene_->tiles().begin(), scene_->tiles().end());
-  for (const std::size_t changed : {0U, 1U, 5U}) {
-    auto tile = std::make_shared<map::Tile>(*tiles[changed]);
-    tile->positions[0].z += 0.01F;
-    tiles[changed] = tile;
-  }
+  const protocol::TileId leaf = testing::change_leaf_and_above(tiles);
   viewer.stream().set_scene(scene_of(tiles, 2));
   viewer.complete();
   settle(viewer);
   ASSERT_EQ(viewer.frames.size(), before + 3) << "geometry, temperatures and visible colours";
-  for (std::size_t i = before; i < viewer.frames.size(); ++i) EXPECT_EQ(viewer.frames[i].tile, tiles[5]->id);
+  for (std::size_t i = before; i < viewer.frames.size(); ++i) EXPECT_EQ(viewer.frames[i].tile, leaf);
 
   // From far away it is the top that is drawn.
   viewer.stream().set_camera(camera_over(2, 2, 5000));
@@ -317,10 +296,7 @@ TEST_F(RawLayersInView, ComeOfWhatIsDrawnAndOfTheTopHotAndNearFirst) {
   viewer.stream().subscribe(kEverything);
   show(viewer, 0.3);
   viewer.complete();
-  for (int i = 0; i < 3; ++i) {
-    wait_until_idle(pool_);
-    viewer.take();
-  }
+  settle(viewer);
   std::vector<protocol::TileFrameHeader> raw;
   for (const auto& frame : viewer.frames) {
     if (frame.kind == FrameKind::Temperature) raw.push_back(frame);

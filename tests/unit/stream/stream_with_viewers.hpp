@@ -22,6 +22,16 @@ class StreamWithViewers : public ::testing::Test {
  protected:
   void show(TestViewer& viewer, double alpha) { viewer.stream().set_plan(plan_with_alpha(*scene_, alpha)); }
 
+  /// Takes until nothing more comes.
+  void settle(TestViewer& viewer) {
+    std::size_t quiet = 0;
+    while (quiet < 2) {
+      wait_until_idle(pool_);
+      const bool has_completed = viewer.stream().take_complete().has_value();
+      quiet = viewer.take() == 0 && !has_completed ? quiet + 1 : 0;
+    }
+  }
+
   /// Expects that the viewer holds exactly the scene's tiles, in the colours of `alpha` at `colour_bits`.
   void expect_picture(const TestViewer& viewer, const map::SceneSnapshot& scene, double alpha, int colour_bits = 8) {
     const auto plan = plan_with_alpha(scene, alpha);
@@ -118,6 +128,18 @@ class StreamOfATree : public StreamWithViewers {
     }
     EXPECT_GT(visible_count, 0U);
   }
+};
+
+/// The same, and a viewer who had everything.
+class StreamAfterAViewer : public StreamOfATree {
+ protected:
+  StreamAfterAViewer() {
+    before_.stream().subscribe({});
+    show(before_, 0.3);
+    before_.complete();
+  }
+
+  TestViewer before_{scene_, cache_, pool_};
 };
 
 }  // namespace spectra::stream::testing

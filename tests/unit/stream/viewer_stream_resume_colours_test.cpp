@@ -16,20 +16,20 @@ using protocol::FrameKind;
 using testing::FakeScene;
 using testing::TestViewer;
 
-/// A viewer who had everything, and comes back with what it knows of the colours it has.
-class ViewerStreamResumeColours : public testing::StreamOfATree {
+/// It comes back with what it knows of the colours it has.
+class ViewerStreamResumeColours : public testing::StreamAfterAViewer {
  protected:
-  ViewerStreamResumeColours() {
-    before_.stream().subscribe({});
-    show(before_, 0.3);
-    before_.complete();
-  }
-
   /// In the scene and under the settings of now.
   std::unique_ptr<TestViewer> came_back(double alpha, const Subscription& subscription = {}) {
+    return came_back(before_, before_.claims_with_colours(), alpha, subscription);
+  }
+
+  /// The same of any viewer, with these claims of what it holds.
+  std::unique_ptr<TestViewer> came_back(TestViewer& earlier, const std::vector<ResumedTile>& claims, double alpha,
+                                        const Subscription& subscription = {}) {
     auto viewer = std::make_unique<TestViewer>(scene_, cache_, pool_);
     show(*viewer, alpha);
-    viewer->resume(before_, before_.claims_with_colours(), before_.stream().memory());
+    resumed_count_ = viewer->resume(earlier, claims, earlier.stream().memory());
     viewer->stream().subscribe(subscription);
     viewer->complete();
     return viewer;
@@ -44,10 +44,8 @@ class ViewerStreamResumeColours : public testing::StreamOfATree {
     scene_ = std::make_shared<FakeScene>(std::move(tiles), scene_->revision() + 1, *scene_);
   }
 
-  static std::shared_ptr<const map::Tile> repainted(const map::Tile& tile) {
-    auto changed = std::make_shared<map::Tile>(tile);
-    for (auto& colour : changed->visible) colour.g = static_cast<std::uint8_t>(255 - colour.g);
-    return changed;
+  static void repaint(map::Tile& tile) {
+    for (auto& colour : tile.visible) colour.g = static_cast<std::uint8_t>(255 - colour.g);
   }
 
   /// Everything that is drawn shows the scene of now under `alpha`, whichever connection it came over.
@@ -63,7 +61,7 @@ class ViewerStreamResumeColours : public testing::StreamOfATree {
     EXPECT_EQ(count, 16U);
   }
 
-  TestViewer before_{scene_, cache_, pool_};
+  std::uint32_t resumed_count_ = 0;  ///< Of who came back last.
 };
 
 TEST_F(ViewerStreamResumeColours, NothingIsSentWhereNothingHasChanged) {
@@ -75,14 +73,12 @@ TEST_F(ViewerStreamResumeColours, NothingIsSentWhereNothingHasChanged) {
 
 TEST_F(ViewerStreamResumeColours, AChangedTileAloneIsSentWhereItIsDrawn) {
   auto tiles = this->tiles();
-  // With everything above it.
-  for (const std::size_t changed : {0U, 1U, 5U}) tiles[changed] = repainted(*tiles[changed]);
-  ASSERT_EQ(tiles[1]->id.level, 1);
-  ASSERT_EQ(tiles[5]->id, (protocol::TileId{2, 0, 0, 0}));
+  const protocol::TileId leaf = testing::change_leaf_and_above(tiles, repaint);
+  ASSERT_EQ(leaf, (protocol::TileId{2, 0, 0, 0}));
   change_to(tiles);
   const auto viewer = came_back(0.3);
   ASSERT_EQ(viewer->frames.size(), 2U) << "what its children replace does not come";
-  for (const auto& frame : viewer->frames) EXPECT_EQ(frame.tile, tiles[5]->id);
+  for (const auto& frame : viewer->frames) EXPECT_EQ(frame.tile, leaf);
   expect_right(*viewer, 0.3);
 }
 
@@ -111,42 +107,32 @@ TEST_F(ViewerStreamResumeColours, WhatWasGivenOutAndNeverCameIsSentAgain) {
   before_.complete();
   auto claims = before_.claims_with_colours();
   for (std::size_t i = 0; i < claims.size(); i += 2) claims[i] = came[i];
-  TestViewer viewer(scene_, cache_, pool_);
-  show(viewer, 0.6);
-  viewer.resume(before_, claims, before_.stream().memory());
-  viewer.stream().subscribe({});
-  viewer.complete();
+  const auto viewer = came_back(before_, claims, 0.6);
   std::set<protocol::TileId> sent;
-  for (const auto& frame : viewer.frames) sent.insert(frame.tile);
+  for (const auto& frame : viewer->frames) sent.insert(frame.tile);
   std::set<protocol::TileId> unknown;
   for (std::size_t i = 0; i < claims.size(); i += 2) unknown.insert(claims[i].tile);
   for (const auto& tile : scene_->tiles()) {
     if (tile->child_mask != 0) continue;
     EXPECT_EQ(sent.contains(tile->id), unknown.contains(tile->id));
   }
-  expect_right(viewer, 0.6);
+  expect_right(*viewer, 0.6);
 }
 
 TEST_F(ViewerStreamResumeColours, ColoursThatTheViewerDoesNotSpeakOfComeAnew) {
-  TestViewer viewer(scene_, cache_, pool_);
-  show(viewer, 0.3);
-  EXPECT_EQ(viewer.resume(before_, before_.claims(), before_.stream().memory()), 21U);
-  viewer.stream().subscribe({});
-  viewer.complete();
-  EXPECT_EQ(viewer.count(FrameKind::Colours), 17U);
-  EXPECT_EQ(viewer.frames.size(), 17U);
+  const auto viewer = came_back(before_, before_.claims(), 0.3);
+  EXPECT_EQ(resumed_count_, 21U);
+  EXPECT_EQ(viewer->count(FrameKind::Colours), 17U);
+  EXPECT_EQ(viewer->frames.size(), 17U);
 }
 
 TEST_F(ViewerStreamResumeColours, IsRememberedOverSeveralCuts) {
   auto first = came_back(0.3);
   const auto claims = first->claims_with_colours();
   for (const ResumedTile& claim : claims) EXPECT_EQ(claim.colour_sequence, 0U);
-  TestViewer second(scene_, cache_, pool_);
-  show(second, 0.3);
-  EXPECT_EQ(second.resume(*first, claims, first->stream().memory()), 21U);
-  second.stream().subscribe({});
-  second.complete();
-  EXPECT_TRUE(second.frames.empty());
+  const auto second = came_back(*first, claims, 0.3);
+  EXPECT_EQ(resumed_count_, 21U);
+  EXPECT_TRUE(second->frames.empty());
   // What an earlier connection never confirmed is not known to the next one either.
   TestViewer unknown(scene_, cache_, pool_);
   show(unknown, 0.3);
@@ -211,23 +197,13 @@ TEST_F(ViewerStreamResumeColours, WhatHasFadedMeanwhileComesAlone) {
 
 TEST_F(ViewerStreamResumeColours, HowSureTemperaturesAreIsNotSentAgain) {
   const Subscription everything{.temperature = true, .visible = true, .temperature_sigma = true};
-  const auto settle = [this](TestViewer& viewer) {
-    for (int i = 0; i < 5; ++i) {
-      testing::wait_until_idle(pool_);
-      viewer.take();
-    }
-  };
   before_.stream().subscribe(everything);
   settle(before_);
   ASSERT_EQ(before_.count(FrameKind::TemperatureSigma), 17U) << "of the top and the leaves";
-  auto claims = before_.claims_with_colours();
-  TestViewer viewer(scene_, cache_, pool_);
-  show(viewer, 0.3);
-  EXPECT_EQ(viewer.resume(before_, claims, before_.stream().memory()), 21U);
-  viewer.stream().subscribe(everything);
-  viewer.complete();
-  settle(viewer);
-  EXPECT_TRUE(viewer.frames.empty());
+  const auto viewer = came_back(0.3, everything);
+  EXPECT_EQ(resumed_count_, 21U);
+  settle(*viewer);
+  EXPECT_TRUE(viewer->frames.empty());
 }
 
 }  // namespace

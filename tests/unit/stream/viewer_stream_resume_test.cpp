@@ -18,22 +18,15 @@ using testing::plan_with_alpha;
 using testing::scene_of;
 using testing::TestViewer;
 
-/// A viewer who had everything, and one who comes after it on the same server.
-class ViewerStreamResume : public testing::StreamOfATree {
+/// One comes after it on the same server.
+class ViewerStreamResume : public testing::StreamAfterAViewer {
  protected:
-  ViewerStreamResume() {
-    before_.stream().subscribe({});
-    show(before_, 0.3);
-    before_.complete();
-  }
-
   void subscribe_and_complete() {
     after_.stream().subscribe({});
     show(after_, 0.6);
     after_.complete();
   }
 
-  TestViewer before_{scene_, cache_, pool_};
   TestViewer after_{scene_, cache_, pool_};
 };
 

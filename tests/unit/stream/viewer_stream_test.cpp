@@ -231,16 +231,12 @@ TEST_F(ViewerStreamTest, OfAChangedTileAndAllAboveItOnlyWhatIsDrawnIsSent) {
   show(viewer, 0.3);
   viewer.complete();
   const std::size_t before = viewer.frames.size();
-  for (const std::size_t changed : {0U, 1U, 5U}) {
-    auto tile = std::make_shared<map::Tile>(*tiles[changed]);
-    tile->positions[0].z += 1;
-    tiles[changed] = tile;
-  }
+  const protocol::TileId leaf = testing::change_leaf_and_above(tiles);
   const auto changed = scene_of(tiles, 2);
   viewer.stream().set_scene(changed);
   viewer.complete();
   ASSERT_EQ(viewer.frames.size(), before + 2);
-  EXPECT_EQ(viewer.frames.back().tile, tiles[5]->id);
+  EXPECT_EQ(viewer.frames.back().tile, leaf);
 
   // Another setting is answered by the top first, as it is now.
   show(viewer, 0.6);
@@ -260,18 +256,15 @@ TEST_F(ViewerStreamTest, WhatIsAboveATileThatChangesTwiceStaysHidden) {
   // Changed twice, the second time before anything of the first has come: what stands there is still of before.
   const std::size_t before = viewer.frames.size();
   testing::HeldWorkers held(pool_);
+  protocol::TileId leaf;
   for (int round = 0; round < 2; ++round) {
-    for (const std::size_t changed : {0U, 1U, 5U}) {
-      auto tile = std::make_shared<map::Tile>(*tiles[changed]);
-      tile->positions[0].z += 1;
-      tiles[changed] = tile;
-    }
+    leaf = testing::change_leaf_and_above(tiles);
     viewer.stream().set_scene(scene_of(tiles, static_cast<std::uint32_t>(2 + round)));
   }
   held.release();
   viewer.complete();
   ASSERT_EQ(viewer.frames.size(), before + 2);
-  EXPECT_EQ(viewer.frames.back().tile, tiles[5]->id);
+  EXPECT_EQ(viewer.frames.back().tile, leaf);
 }
 
 TEST_F(ViewerStreamTest, ATileThatGoesWhileItsColoursAreReadyLeavesNothingQueued) {

@@ -49,6 +49,20 @@ TEST_F(ViewerStreamView, AMovingCameraRefinesWhatItLooksAt) {
   EXPECT_EQ(viewer.frames.size(), frames);
 }
 
+TEST_F(ViewerStreamView, WhatItsFinerTilesReplaceIsNotSentBecauseOneOfThemIsOnItsWay) {
+  TestViewer viewer(scene_, cache_, pool_);
+  viewer.stream().subscribe({});
+  show(viewer, 0.3);
+  viewer.complete();
+  StreamQuality quality = viewer.stream().quality();
+  quality.position_step_m = lattice_step(0.01);
+  viewer.stream().set_quality(quality);
+  // Geometry is acknowledged before its colours follow.
+  viewer.complete();
+  EXPECT_EQ(viewer.count(FrameKind::Geometry), 21U + 16U) << "the leaves";
+  expect_view(viewer, camera_over(2, 2, 12), 0.3);
+}
+
 TEST_F(ViewerStreamView, ACameraThatMakesNoSenseIsIgnored) {
   TestViewer viewer(scene_, cache_, pool_);
   Camera nowhere = camera_over(0.5F, 0.5F, 0.5F);
