@@ -16,6 +16,7 @@ namespace {
 
 std::vector<SampledVertex> numbered(const std::vector<base::Vec3d>& positions) {
   std::vector<SampledVertex> vertices;
+  vertices.reserve(positions.size());
   for (const base::Vec3d& position : positions) vertices.push_back({vertices.size(), position});
   return vertices;
 }
@@ -41,7 +42,8 @@ std::vector<base::Vec3d> terrain(double none) {
   std::vector<base::Vec3d> positions;
   for (int i = 0; i < 4800; ++i) {
     const double height = 250 + 12 * std::sin(0.013 * i);
-    positions.push_back({i % 80 * 3.75, i / 80 * 3.75, (i * 7 + i / 80) % 16 < 4 ? none : height});
+    const int row = i / 80;
+    positions.push_back({i % 80 * 3.75, row * 3.75, (i * 7 + row) % 16 < 4 ? none : height});
   }
   return positions;
 }
@@ -78,7 +80,8 @@ std::vector<base::Vec3d> lamp(double base_width, double base_height, bool is_shu
     const bool is_base = is_shuffled ? i % 2 == 0 : i < 400;
     const int own = is_shuffled ? i / 2 : i % 400;
     const double width = is_base ? base_width : 100;
-    positions.push_back({own % 20 * width / 19, own / 20 * width / 19, is_base ? base_height : 5 * std::sin(1.7 * i)});
+    const int row = own / 20;
+    positions.push_back({own % 20 * width / 19, row * width / 19, is_base ? base_height : 5 * std::sin(1.7 * i)});
   }
   return positions;
 }
@@ -135,7 +138,11 @@ TEST(CoordinateHole, HeightsThatAreMeasuredMayBeEqual) {
 
 TEST(CoordinateHole, WhatNoFormReachesIsAHoleHoweverFewHeightsThereAre) {
   std::vector<base::Vec3d> grid;
-  for (int i = 0; i < 400; ++i) grid.push_back({i % 20 * 1.0, i / 20 * 1.0, i % 20 < 3 ? -1e20 : i % 4 * 0.2});
+  grid.reserve(400);
+  for (int i = 0; i < 400; ++i) {
+    const int row = i / 20;
+    grid.push_back({i % 20 * 1.0, row * 1.0, i % 20 < 3 ? -1e20 : i % 4 * 0.2});
+  }
   EXPECT_TRUE(holes_of(grid, true).certain);
   for (base::Vec3d& p : grid) p.z = std::max(p.z, -1e7);
   EXPECT_FALSE(holes_of(grid, true).certain);
@@ -170,20 +177,25 @@ TEST(CoordinateHole, EveryAxisAndBothEndsAreLookedAt) {
   EXPECT_FALSE(find_coordinate_holes({}, 1, [](std::uint64_t) { return false; }).certain);
 }
 
+/// Two rings of 24 vertices, which take turns in the file.
+std::string tank(const std::string& end) {
+  std::string vertices;
+  std::string faces;
+  for (int i = 0; i < 48; ++i) {
+    const int facet = i / 2;
+    const double angle = facet * 2 * std::numbers::pi / 24;
+    vertices += std::to_string(std::cos(angle)) + ' ' + std::to_string(std::sin(angle)) + ' ';
+    vertices += (i % 2 == 0 ? "0" : end) + " 20\n";
+    faces += "3 " + std::to_string(i) + ' ' + std::to_string((i + 1) % 48) + ' ' + std::to_string((i + 2) % 48) + '\n';
+  }
+  return "ply\nformat ascii 1.0\nelement vertex 48\n" + std::string(test::kXyz) +
+         "property float temperature\nelement face 48\n" + std::string(test::kFaces) + "end_header\n" + vertices +
+         faces;
+}
+
 TEST(CoordinateHole, ATankKeepsBothEndsAndAllFaces) {
   for (const std::string end : {"-1000", "-1001", "10000", "60"}) {
-    std::string vertices;
-    std::string faces;
-    for (int i = 0; i < 48; ++i) {
-      const double angle = i / 2 * 2 * std::numbers::pi / 24;
-      vertices += std::to_string(std::cos(angle)) + ' ' + std::to_string(std::sin(angle)) + ' ' +
-                  (i % 2 == 0 ? "0" : end) + " 20\n";
-      faces +=
-          "3 " + std::to_string(i) + ' ' + std::to_string((i + 1) % 48) + ' ' + std::to_string((i + 2) % 48) + '\n';
-    }
-    const LoadedScene scene = test::loaded("ply\nformat ascii 1.0\nelement vertex 48\n" + std::string(test::kXyz) +
-                                           "property float temperature\nelement face 48\n" + std::string(test::kFaces) +
-                                           "end_header\n" + vertices + faces);
+    const LoadedScene scene = test::loaded(tank(end));
     EXPECT_EQ(scene.mesh.vertex_count(), 48U) << end;
     EXPECT_EQ(scene.mesh.triangle_count(), 48U) << end;
     EXPECT_EQ(test::note_text(scene, "hole_vertices"), "") << end;

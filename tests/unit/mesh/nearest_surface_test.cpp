@@ -120,7 +120,8 @@ TEST(NearestSurface, FindsAllWhereMostIsShort) {
   std::uniform_real_distribution<float> coordinate(0, 1);
   std::vector<base::Vec3f> points, from;
   for (int i = 0; i < 2500; ++i) {
-    points.push_back({static_cast<float>(i % 50), static_cast<float>(i / 50), coordinate(random)});
+    const int row = i / 50;
+    points.push_back({static_cast<float>(i % 50), static_cast<float>(row), coordinate(random)});
   }
   for (int i = 0; i < 2000; ++i)
     from.push_back({50 * coordinate(random), 50 * coordinate(random), 20 * coordinate(random)});
