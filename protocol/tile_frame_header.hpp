@@ -51,7 +51,8 @@ struct TileFrameHeader {
   std::uint32_t payload_size_bytes = 0;
   /// Largest difference of a channel between the tile's visible colours and the full mesh under it, 95th percentile
   /// of the tile, or of that eighth or 64th of its box (with at least a 32nd of its surface) where it is the
-  /// largest, levels; 0 at leaves. NaN where the sender did not say.
+  /// largest, levels; 0 at leaves; 255 where a map has grown and the tile that shows what was there before is not
+  /// made anew yet. NaN where the sender did not say.
   float colour_error_levels = 0;
   /// The same in degC; 0 at leaves; NaN = no temperature. NaN where the sender did not say.
   float temperature_error_celsius = 0;

@@ -251,6 +251,29 @@ TEST_F(LivingMapTest, CoarseTilesFollowAfterTheLeaves) {
   EXPECT_NE(complete->tiles()[0], before->tiles()[0]);
 }
 
+TEST_F(LivingMapTest, ALeafThatHasGrownSaysThatAnythingMayBeBesideIt) {
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 1; i < 12; ++i) {
+    blocks.push_back(put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i))));
+  }
+  blocks.push_back(put("small", testing::terrain({.columns = 20, .rows = 20, .seed = 50})));
+  apply(std::move(blocks));
+  const auto before = completed();
+  const auto at_once = apply(put("small", terrain(50, 0)));
+  std::size_t grown = 0;
+  for (const auto& tile : at_once->tiles()) {
+    const auto old = std::ranges::find(before->tiles(), tile->id, [](const auto& t) { return t->id; });
+    if (old == before->tiles().end() || (*old)->child_mask != 0 || tile->child_mask == 0) continue;
+    ++grown;
+    EXPECT_EQ(tile->colour_error_levels, 255) << "nothing is exact about it";
+    EXPECT_GE(tile->temperature_error_celsius, (*old)->highest_celsius - (*old)->lowest_celsius);
+    EXPECT_GT(tile->geometric_error_m, 0);
+  }
+  EXPECT_GT(grown, 0U);
+  const auto complete = completed();
+  for (const auto& tile : complete->tiles()) EXPECT_LT(tile->colour_error_levels, 255);
+}
+
 TEST_F(LivingMapTest, GivesABlockBackAsItWasPut) {
   const mesh::MultispectralMesh one = terrain(1, 0), other = terrain(2, 39);
   std::vector<BlockPut> blocks;

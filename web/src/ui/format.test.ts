@@ -88,6 +88,7 @@ describe('Numbers', () => {
     expect(words(0.002, 0, 0, true)).toBe('within 2 mm, colours exact');
     expect(words(0.002, 3, null, true)).toBe('within 2 mm, 3 levels');
     expect(words(0.002, Number.NaN, null, true)).toBe('within 2 mm, colours coarse');
+    expect(words(3.4, 255, 30.1, false)).toBe('coarse: within 3.4 m, colours coarse, 30.1 °C');
     const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2 };
     expect(plain(accuracyWords(rounded, true, true))).toBe('within 2 mm, 2 levels, 0 °C');
     expect(plain(accuracyWords(rounded, true, false))).toBe('within 0.002 units, 2 levels, 0 °C');

@@ -123,6 +123,8 @@ export function liveWords(age_s: number | null, isEmpty: boolean, isNarrow: bool
   return isNarrow ? `live, ${age}` : `live, newest ${age}`;
 }
 
+/** Of a tile that does not know how far it is off. */
+const ANY_LEVEL = 255;
 /** Nobody wants to know less. */
 const LEAST_SAID_M = 1e-6;
 
@@ -134,7 +136,7 @@ export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMe
   const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
   const parts = [`within ${length(Math.max(position_m, LEAST_SAID_M), isMetric)}`];
   if (!isOff) parts.push('colours exact');
-  else if (Number.isNaN(colour_levels)) parts.push('colours coarse');
+  else if (Number.isNaN(colour_levels) || colour_levels >= ANY_LEVEL) parts.push('colours coarse');
   else parts.push(withUnit(figures(roundedUp(colour_levels, 0), 3), colour_levels > 1 ? 'levels' : 'level'));
   if (isOff && temperature_celsius !== null) parts.push(withUnit(figures(roundedUp(temperature_celsius, 2), 3), 'degC'));
   return `${isSettled ? '' : 'coarse: '}${parts.join(', ')}`;
