@@ -134,7 +134,7 @@ std::string metrics_text(const session::ServedScene& served, const sources::MapK
                 as_double(net.of(role).frame_bytes_sent), true);
   }
   for (const access::AccessRole role : access::kRoles) {
-    out.of_role("spectra_role_queued_bytes", "Messages that wait for viewers, by role.", role,
+    out.of_role("spectra_role_queued_bytes", "Messages that wait for viewers, without what they share, by role.", role,
                 static_cast<double>(net.of(role).queued_bytes), false);
   }
   for (const access::AccessRole role : access::kRoles) {

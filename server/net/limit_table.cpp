@@ -45,7 +45,9 @@ constexpr std::array kEntries{
     Entry{"queue-bytes", Unit::Bytes, &NetLimits::control_queue_bytes, 64 * 1024, kGiga,
           "messages that wait for one viewer: 1008"},
     Entry{"queue-bytes-at-once", Unit::Bytes, &NetLimits::queue_bytes_at_once, kMega, 64 * kGiga,
-          "messages that wait for all viewers together; beyond it requests for large answers are refused as busy"},
+          "messages that wait for all viewers together, and answers that are being made; beyond it whoever leaves most "
+          "of "
+          "them unread is cut (1008), or refused as busy if he asks for more himself"},
     Entry{"messages-per-second", Unit::PerSecond, &NetLimits::messages_per_s, 1, 1e6,
           "messages of one viewer; then they are read more slowly"},
     Entry{"message-bytes-per-second", Unit::BytesPerSecond, &NetLimits::message_bytes_per_s, 1024, kGiga,

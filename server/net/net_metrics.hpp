@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -38,17 +37,10 @@ struct NetMetrics {
     std::atomic<std::uint64_t> viewers_cut{0};
     std::atomic<std::uint64_t> frames_sent{0};
     std::atomic<std::uint64_t> frame_bytes_sent{0};
-    std::atomic<std::int64_t> queued_bytes{0};  ///< Messages that wait now.
+    std::atomic<std::int64_t> queued_bytes{0};  ///< Messages that wait now, without what is shared of them.
   };
   OfRole& of(access::AccessRole role) { return of_role_[static_cast<std::size_t>(role)]; }
   const OfRole& of(access::AccessRole role) const { return of_role_[static_cast<std::size_t>(role)]; }
-
-  /// Messages that wait now, of all viewers.
-  std::size_t queued_bytes() const {
-    std::int64_t all = 0;
-    for (const OfRole& of_role : of_role_) all += of_role.queued_bytes;
-    return static_cast<std::size_t>(std::max<std::int64_t>(all, 0));
-  }
 
  private:
   std::array<OfRole, access::kRoles.size()> of_role_;

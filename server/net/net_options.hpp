@@ -25,8 +25,7 @@ struct NetLimits {
   std::uint64_t ingest_credit_bytes = std::uint64_t{32} * 1024 * 1024;  ///< Their bytes; the last may go beyond.
   std::size_t message_size_bytes = 64 * 1024;                           ///< One WebSocket message of a client.
   std::size_t control_queue_bytes = 1024 * 1024;  ///< Unsent JSON of one viewer; beyond it the viewer is cut.
-  std::size_t queue_bytes_at_once =
-      std::size_t{64} * 1024 * 1024;           ///< Of all viewers; beyond it requests are refused with Busy.
+  std::size_t queue_bytes_at_once = std::size_t{64} * 1024 * 1024;  ///< Of all viewers; see MessageRoom.
   std::size_t max_connections = 4096;          ///< Further ones are closed as soon as they are accepted.
   std::size_t connections_per_address = 1024;  ///< Likewise.
   double messages_per_s = 10'000;              ///< Beyond it a session's reading pauses (back-pressure).

@@ -15,6 +15,7 @@
 #include "server/net/frame_receiver.hpp"
 #include "server/net/host_list.hpp"
 #include "server/net/http_types.hpp"
+#include "server/net/message_room.hpp"
 #include "server/net/net_metrics.hpp"
 #include "server/net/net_options.hpp"
 #include "server/net/static_files.hpp"
@@ -60,6 +61,9 @@ class ServerContext {
     const std::lock_guard lock(request_rates_mutex_);
     return request_rates_.of(address).reserve_s(now_s);
   }
+
+  /// For the messages to viewers.
+  const std::shared_ptr<MessageRoom> messages = std::make_shared<MessageRoom>(options.limits.queue_bytes_at_once);
 
   std::atomic<std::size_t> block_bytes{0};  ///< Of blocks that are being received or answered.
 

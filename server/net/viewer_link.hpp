@@ -23,6 +23,8 @@ struct OutgoingText {
       : begin(std::move(begin_in)), owner(std::move(middle)), shared(shared_in), end(std::move(end_in)) {}
 
   std::size_t size_bytes() const { return begin.size() + shared.size() + end.size(); }
+  /// Of memory that it takes: what is shared is there anyway.
+  std::size_t held_bytes() const { return begin.size() + end.size(); }
 
   std::string begin;
   std::shared_ptr<const std::string> owner;  ///< Holds what `shared` is a part of.
@@ -55,11 +57,12 @@ class ViewerPeer {
   /// Round trip of the last answered ping, milliseconds; 0 before the first.
   virtual double round_trip_ms() const = 0;
 
-  /// Bytes on the control lane that are not written yet.
+  /// Bytes on the control lane that are not written yet, without those that are shared.
   virtual std::size_t queued_bytes() const = 0;
 
-  /// The same of all viewers together.
-  virtual std::size_t queued_bytes_of_all() const = 0;
+  /// Room for an answer of at most so many bytes that is about to be made, as long as what is returned is held; see MessageRoom. Null: there
+  /// is none for this viewer. From any thread.
+  virtual std::shared_ptr<const void> room_for(std::size_t size_bytes) = 0;
 };
 
 /// The application's side of one viewer; all calls are made on the session's strand.

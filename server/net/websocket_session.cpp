@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -49,8 +50,7 @@ class WebSocketSession::Presence {
     session_.finish();
     metrics_.viewers -= 1;
     metrics_.of(session_.who_.role).viewers -= 1;
-    metrics_.of(session_.who_.role).queued_bytes -=
-        static_cast<std::int64_t>(std::exchange(session_.control_bytes_, 0));
+    session_.uncount(session_.control_bytes_);
   }
   Presence(const Presence&) = delete;
   Presence& operator=(const Presence&) = delete;
@@ -83,6 +83,11 @@ asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   const Presence presence(*this);
   is_open_ = true;
   try {
+    share_.emplace(context_.messages, [weak_self = weak_from_this()] {
+      if (const auto session = weak_self.lock()) {
+        asio::post(session->ws_.get_executor(), [session] { session->cut_off(); });
+      }
+    });
     client_ = context_.viewers(self);
     client_->opened();
     co_await (read_messages() && write_messages() && mind_deadlines());
@@ -161,8 +166,7 @@ asio::awaitable<void> WebSocketSession::write_messages() {
       const std::array<asio::const_buffer, 3> buffers{asio::buffer(text.begin), asio::buffer(text.shared),
                                                       asio::buffer(text.end)};
       if (!co_await write(buffers, true)) co_return;
-      control_bytes_ -= text.size_bytes();
-      context_.metrics.of(who_.role).queued_bytes -= static_cast<std::int64_t>(text.size_bytes());
+      uncount(text.held_bytes());
       context_.metrics.messages_sent += 1;
       continue;
     }
@@ -220,6 +224,8 @@ asio::awaitable<void> WebSocketSession::mind_deadlines() {
       end(false, "the close was not finished in time");
     } else if (!closing_ && !context_.options.access->is_good(who_)) {
       close({static_cast<websocket::close_code>(kAccessWithdrawn), "access was withdrawn"});
+    } else if (!closing_ && share_->has_given_way()) {
+      cut_off();
     } else if (!closing_) {
       client_->ticked();
       if (auto payload = pings_.next(now, limits.ping_interval)) {
@@ -264,23 +270,35 @@ void WebSocketSession::wake() {
 
 void WebSocketSession::send(OutgoingText text) {
   if (is_ended_ || closing_) return;
-  control_bytes_ += text.size_bytes();
-  context_.metrics.of(who_.role).queued_bytes += static_cast<std::int64_t>(text.size_bytes());
+  const std::size_t bytes = text.held_bytes();
   control_.push_back(std::move(text));
-  if (control_bytes_ > context_.options.limits.control_queue_bytes) {
-    context_.metrics.viewers_cut += 1;
-    context_.metrics.of(who_.role).viewers_cut += 1;
-    close({websocket::close_code::policy_error, "messages to you pile up unread"});
-    return;
-  }
+  control_bytes_ += bytes;
+  context_.metrics.of(who_.role).queued_bytes += static_cast<std::int64_t>(bytes);
+  share_->add(bytes);
+  if (control_bytes_ > context_.options.limits.control_queue_bytes) return cut_off();
   notify_writer();
+}
+
+void WebSocketSession::uncount(std::size_t bytes) {
+  bytes = std::min(bytes, control_bytes_);
+  if (bytes == 0) return;
+  control_bytes_ -= bytes;
+  context_.metrics.of(who_.role).queued_bytes -= static_cast<std::int64_t>(bytes);
+  share_->remove(bytes);
+}
+
+void WebSocketSession::cut_off() {
+  if (closing_ || is_ended_) return;
+  context_.metrics.viewers_cut += 1;
+  context_.metrics.of(who_.role).viewers_cut += 1;
+  close({websocket::close_code::policy_error, "messages to you pile up unread"});
 }
 
 void WebSocketSession::close(websocket::close_reason reason) {
   if (closing_ || is_ended_) return;
   closing_ = std::move(reason);
   close_deadline_ = Clock::now() + context_.options.limits.close_timeout;
-  control_.clear();
+  for (; !control_.empty(); control_.pop_front()) uncount(control_.front().held_bytes());
   notify_writer();
 }
 

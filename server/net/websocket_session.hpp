@@ -9,6 +9,7 @@
 #include <boost/beast/websocket/stream.hpp>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/access/token_bucket.hpp"
@@ -39,7 +40,7 @@ class WebSocketSession final : public ViewerPeer,
   access::AccessRole role() const override { return who_.role; }
   double round_trip_ms() const override { return round_trip_ms_; }
   std::size_t queued_bytes() const override { return control_bytes_; }
-  std::size_t queued_bytes_of_all() const override { return context_.metrics.queued_bytes(); }
+  std::shared_ptr<const void> room_for(std::size_t size_bytes) override { return share_->take(size_bytes); }
 
   void begin_stop() override;
   void cut() override;
@@ -60,6 +61,10 @@ class WebSocketSession final : public ViewerPeer,
   template <class Buffers>
   boost::asio::awaitable<bool> write(Buffers buffers, bool is_text);
   void close(boost::beast::websocket::close_reason reason);
+  /// Closes because the peer leaves messages unread.
+  void cut_off();
+  /// So many bytes wait no longer.
+  void uncount(std::size_t bytes);
   void end(bool is_cut, std::string_view why);
   void notify_writer();
   /// Of a code that RFC 6455 does not know: answers with 1002.
@@ -76,7 +81,8 @@ class WebSocketSession final : public ViewerPeer,
   const HelloForm hello_form_;
   const access::AccessControl::Identity who_;
   std::deque<OutgoingText> control_;
-  std::size_t control_bytes_ = 0;
+  std::size_t control_bytes_ = 0;            ///< Held by it, with what is being written.
+  std::optional<MessageRoom::Share> share_;  ///< From when the client is made.
   bool is_open_ = false;
   bool is_ended_ = false;
   bool is_writing_ = false;

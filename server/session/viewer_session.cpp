@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <functional>
@@ -49,6 +50,30 @@ std::optional<double> if_positive(double value) {
 
 }  // namespace
 
+struct ViewerSession::Computing {
+  std::atomic<std::size_t> count{0};
+  std::atomic<std::size_t> bytes{0};  ///< Of the answers, at most.
+};
+
+/// Counts one of them, as long as it is there; it may be lost where no memory is left to go on.
+class ViewerSession::ComputingPlace {
+ public:
+  ComputingPlace(std::shared_ptr<Computing> all, std::size_t bytes) : all_(std::move(all)), bytes_(bytes) {
+    all_->count += 1;
+    all_->bytes += bytes_;
+  }
+  ~ComputingPlace() {
+    all_->count -= 1;
+    all_->bytes -= bytes_;
+  }
+  ComputingPlace(const ComputingPlace&) = delete;
+  ComputingPlace& operator=(const ComputingPlace&) = delete;
+
+ private:
+  const std::shared_ptr<Computing> all_;
+  const std::size_t bytes_;
+};
+
 ViewerSession::ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, ServedScene& served,
                              const net::NetLimits& limits)
     : peer_(*peer),
@@ -57,6 +82,7 @@ ViewerSession::ViewerSession(const std::shared_ptr<net::ViewerPeer>& peer, Serve
       limits_(limits),
       id_(served.session_ids.next()),
       requests_(limits.requests_per_s, limits.requests_per_s * limits.message_burst_s),
+      computing_(std::make_shared<Computing>()),
       statuses_([this](const protocol::Status& status) { notify("status", protocol::to_json(status)); }) {}
 
 void ViewerSession::opened() {
@@ -350,38 +376,37 @@ void ViewerSession::asked(const Id& id, const json& params) {
 void ViewerSession::ask(const Id& id, protocol::Result<SceneQuestion> made) {
   if (!made) return answer(id, refused(made.error()));
   auto& [size_bytes, compute] = made.value();
-  if (computing_count_ >= kMaxComputing) {
+  if (computing_->count >= kMaxComputing) {
     return answer(id, refusal(RpcErrorCode::Busy, "too many answers are being computed", "",
                               std::to_string(kMaxComputing) + " at once"));
   }
   // Half of the lane stays free for what nobody asked for.
-  if (computing_bytes_ + peer_.queued_bytes() + size_bytes > limits_.control_queue_bytes / 2) {
+  if (computing_->bytes + peer_.queued_bytes() + size_bytes > limits_.control_queue_bytes / 2) {
     return answer(id, refusal(RpcErrorCode::Busy, "too many answers wait to be sent", "",
                               std::to_string(limits_.control_queue_bytes / 2) + " bytes at once"));
   }
-  if (peer_.queued_bytes_of_all() + size_bytes > limits_.queue_bytes_at_once) {
-    return answer(id, refusal(RpcErrorCode::Busy, "too many answers to others wait to be sent", "",
-                              std::to_string(limits_.queue_bytes_at_once) + " bytes of all viewers"));
-  }
-  computing_count_ += 1;
-  computing_bytes_ += size_bytes;
   served_.pool.post(
       [weak_peer = weak_peer_, weak_self = weak_from_this(), id, size_bytes = size_bytes,
-       compute = std::move(compute)] {
+       most_bytes = limits_.queue_bytes_at_once, compute = std::move(compute),
+       place = std::make_shared<const ComputingPlace>(computing_, size_bytes)]() mutable {
         Answer computed = refusal(RpcErrorCode::InternalError, "the answer could not be computed");
+        std::shared_ptr<const void> room;
         try {
-          computed = compute();
+          if (const auto peer = weak_peer.lock()) room = peer->room_for(size_bytes);
+          computed =
+              room ? compute()
+                   : refusal(RpcErrorCode::Busy, "too many answers wait to be sent, and to nobody more than to you", "",
+                             std::to_string(most_bytes) + " bytes of all viewers");
         } catch (const std::exception& error) {
           spdlog::error("an answer failed: {}", error.what());
         }
         const auto peer = weak_peer.lock();
         if (!peer) return;
-        peer->post([weak_self, id, size_bytes, computed = std::move(computed)] {
-          const auto self = weak_self.lock();
-          if (!self) return;
-          self->computing_count_ -= 1;
-          self->computing_bytes_ -= size_bytes;
-          self->answer(id, computed);
+        peer->post([weak_self, id, computed = std::move(computed), place = std::move(place),
+                    room = std::move(room)]() mutable {
+          place.reset();
+          room.reset();
+          if (const auto self = weak_self.lock()) self->answer(id, computed);
         });
       },
       jobs::kAnswerPriority);

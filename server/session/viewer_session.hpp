@@ -75,6 +75,10 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   void fusion_set(const Id& id, const nlohmann::json& params);
   void baseline(const Id& id, const nlohmann::json& params);
 
+  /// Of answers that are being made.
+  struct Computing;
+  class ComputingPlace;
+
   /// The handler that has what a question asks for computed.
   template <AskedQuestion question>
   void asked(const Id& id, const nlohmann::json& params);
@@ -119,8 +123,7 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   std::vector<FusionRequest> waiting_;
   bool is_preparing_ = false;
   bool is_first_view_ = true;  ///< The viewer has changed nothing yet: a new scene brings its own first view.
-  std::size_t computing_count_ = 0;
-  std::size_t computing_bytes_ = 0;  ///< Of those answers, at most.
+  const std::shared_ptr<Computing> computing_;
 
   bool is_subscribed_ = false;
   stream::Subscription subscription_;
