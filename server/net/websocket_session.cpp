@@ -60,6 +60,26 @@ class WebSocketSession::Presence {
   NetMetrics& metrics_;
 };
 
+/// Held by each of a session's coroutines: where one of them ends or is lost, the others do not wait for ever.
+class WebSocketSession::Part {
+ public:
+  explicit Part(WebSocketSession& session) : session_(session.shared_from_this()) {}
+  ~Part() {
+    // After a close that is answered the reader sees the end.
+    if (session_->is_close_answered_) return;
+    try {
+      session_->end(false, "");
+    } catch (const std::exception& error) {
+      spdlog::error("a viewer's connection could not be closed: {}", error.what());
+    }
+  }
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
+
+ private:
+  const std::shared_ptr<WebSocketSession> session_;
+};
+
 asio::awaitable<void> WebSocketSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
   const auto self = shared_from_this();
@@ -110,7 +130,7 @@ void WebSocketSession::finish() noexcept {
 }
 
 asio::awaitable<void> WebSocketSession::read_messages() {
-  const auto self = shared_from_this();
+  const Part part(*this);
   beast::flat_buffer buffer;
   while (!is_ended_) {
     const auto [error, size] = co_await ws_.async_read(buffer, kAwait);
@@ -153,7 +173,7 @@ asio::awaitable<bool> WebSocketSession::write(Buffers buffers, bool is_text) {
 }
 
 asio::awaitable<void> WebSocketSession::write_messages() {
-  const auto self = shared_from_this();
+  const Part part(*this);
   while (!is_ended_ && !is_close_answered_) {
     if (closing_) {
       co_await ws_.async_close(*closing_, kAwait);
@@ -190,7 +210,7 @@ asio::awaitable<void> WebSocketSession::write_messages() {
 }
 
 asio::awaitable<void> WebSocketSession::mind_deadlines() {
-  const auto self = shared_from_this();
+  const Part part(*this);
   const NetLimits& limits = context_.options.limits;
   const auto& counted = beast::get_lowest_layer(ws_).rate_policy();
   std::uint64_t written_bytes = 0;

@@ -48,10 +48,10 @@ class WebSocketSession final : public ViewerPeer,
  private:
   using Clock = std::chrono::steady_clock;
   class Presence;
+  class Part;
 
   /// The last of a session that was registered.
   void finish() noexcept;
-  // Each holds the session: where one is lost, the others end by themselves.
   boost::asio::awaitable<void> read_messages();
   /// Until so much may be read.
   boost::asio::awaitable<void> pause(access::TokenBucket& bucket, double count);

@@ -49,7 +49,7 @@ test("without memory connections are refused or lost, and with it again everythi
   /** Waits until the gauges, of all roles together, are these. */
   const count = async (expected) => {
     let seen;
-    for (let i = 0; i < 100; i += 1) {
+    for (let i = 0; i < 400; i += 1) {
       const { text } = await ask("/metrics");
       const sum = (name) => [...text.matchAll(new RegExp(`^${name}(?:{.*})? (-?\\d+)$`, "gm"))].reduce((all, [, value]) => all + Number(value), 0);
       seen = Object.fromEntries(Object.keys(expected).map((name) => [name, sum(name)]));
