@@ -11,20 +11,10 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The shortest text that reads back as the same number.
-std::string shown(double value) {
-  char buffer[40];
-  for (int digits = 1; digits <= 17; ++digits) {
-    std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
-    if (std::strtod(buffer, nullptr) == value) break;
-  }
-  return buffer;
-}
-
 std::string shown(const ParameterValue& value) {
   struct Visitor {
     std::string operator()(Automatic) const { return "null"; }
-    std::string operator()(double number) const { return shown(number); }
+    std::string operator()(double number) const { return number_text(number); }
     std::string operator()(std::int64_t integer) const { return std::to_string(integer); }
     std::string operator()(bool toggle) const { return toggle ? "true" : "false"; }
     std::string operator()(const std::string& text) const { return "'" + text + "'"; }
@@ -51,13 +41,13 @@ std::string number_expectation(const Parameter& parameter) {
   std::string text = parameter.kind == ParameterKind::Integer ? "a whole number" : "a finite number";
   const bool exclusive = parameter.exclusive_min >= parameter.min && parameter.exclusive_min > -kInfinity;
   if (exclusive) {
-    text += " above " + shown(parameter.exclusive_min);
+    text += " above " + number_text(parameter.exclusive_min);
   } else if (parameter.min > -kInfinity) {
-    text += " of at least " + shown(parameter.min);
+    text += " of at least " + number_text(parameter.min);
   }
   if (parameter.max < kInfinity) {
     if (exclusive || parameter.min > -kInfinity) text += " and";
-    text += " of at most " + shown(parameter.max);
+    text += " of at most " + number_text(parameter.max);
   }
   return text;
 }
@@ -86,6 +76,21 @@ bool within_bounds(const Parameter& parameter, double number) {
 }
 
 }  // namespace
+
+std::string number_text(double value) {
+  // From here on a power of ten is read more easily than its digits.
+  constexpr double kLargestWrittenOut = 1e15;
+  char buffer[40];
+  int digits = 1;
+  for (; digits < 17; ++digits) {
+    std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
+    if (std::strtod(buffer, nullptr) == value) break;
+  }
+  // Of fewer digits than a whole number has, %g makes a power of ten: 10 would be 1e+01.
+  if (std::abs(value) < kLargestWrittenOut) digits = std::max(digits, 15);
+  std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
+  return buffer;
+}
 
 std::string_view to_string(ParameterKind kind) {
   switch (kind) {

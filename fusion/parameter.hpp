@@ -18,6 +18,9 @@ enum class ParameterKind { Number, Integer, Toggle, Choice, Temperature };
 /// "number", "integer", "toggle", "choice", "temperature".
 std::string_view to_string(ParameterKind kind);
 
+/// The shortest text that reads back as the same number; written out below 1e15 ("10", not "1e+01").
+std::string number_text(double value);
+
 /// Stands for "automatic": a value that follows the scene. JSON null.
 struct Automatic {
   friend bool operator==(Automatic, Automatic) = default;

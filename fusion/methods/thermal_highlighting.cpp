@@ -47,6 +47,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 #include <algorithm>
+#include <cmath>
 
 #include "fusion/methods/threshold.hpp"
 #include "fusion/parameter_schema.hpp"
@@ -91,11 +92,16 @@ ParameterSchema<Highlighting> schema() {
   return entries;
 }
 
+/// An automatic threshold has more digits than anybody reads.
+std::string rounded_text(double celsius) {
+  return number_text(std::abs(celsius) < 1e9 ? std::round(celsius * 1e4) / 1e4 : celsius);
+}
+
 base::Result<void> check(const Highlighting& params) {
   if (params.sides == Sides::Both && params.low && params.high && *params.low > *params.high) {
     return base::failure(base::ErrorCode::Inconsistent,
-                         "low (" + std::to_string(*params.low) + " degC) must not be above high (" +
-                             std::to_string(*params.high) + " degC) when both sides are highlighted",
+                         "low (" + rounded_text(*params.low) + " degC) must not be above high (" +
+                             rounded_text(*params.high) + " degC) when both sides are highlighted",
                          "low");
   }
   return base::success();

@@ -54,6 +54,21 @@ TEST(Parameter, ExclusiveBoundIsRefusedAndNamed) {
   EXPECT_TRUE(validated(exponent, 1e-300).has_value());
 }
 
+TEST(Parameter, NumbersInWordsAreWrittenOut) {
+  EXPECT_EQ(number_text(10), "10");
+  EXPECT_EQ(number_text(-300), "-300");
+  EXPECT_EQ(number_text(1e9), "1000000000");
+  EXPECT_EQ(number_text(123.4), "123.4");
+  EXPECT_EQ(number_text(9.1), "9.1");
+  EXPECT_EQ(number_text(0.0001), "0.0001");
+  EXPECT_EQ(number_text(1.0 / 3), "0.3333333333333333");
+  EXPECT_EQ(number_text(1e300), "1e+300");
+  Parameter number = parameter(ParameterKind::Number);
+  number.max = 10;
+  EXPECT_EQ(validated(number, -300.0).error().message,
+            "strength must be a finite number of at least 0 and of at most 10, not -300");
+}
+
 TEST(Parameter, IntegerAcceptsWholeNumbersOnly) {
   const Parameter integer = parameter(ParameterKind::Integer);
   EXPECT_EQ(validated(integer, 3.0).value(), ParameterValue{std::int64_t{3}});

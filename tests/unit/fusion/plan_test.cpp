@@ -137,6 +137,7 @@ TEST(FusionPlan, LowAboveAutomaticHighIsAnErrorWhenItBecomesKnown) {
   ASSERT_TRUE(plan.has_error());
   EXPECT_EQ(plan.error().code, base::ErrorCode::Inconsistent);
   EXPECT_EQ(plan.error().field, "low");
+  EXPECT_EQ(plan.error().message, "low (48 degC) must not be above high (47.5 degC) when both sides are highlighted");
   EXPECT_TRUE(FusionPlan::prepare(settings, scene_of({10, 90})).has_value());
 }
 
