@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <exception>
 #include <new>
 
 namespace spectra::net {
@@ -23,6 +24,8 @@ void give_part_back() {
   for (auto& part : parts) {
     if (void* const memory = part.exchange(nullptr)) {
       ::munmap(memory, kPartBytes);
+      // A destructor on the way of an exception must not throw: the program would end. It tries again.
+      if (std::uncaught_exceptions() > 0) return;
       break;
     }
   }

@@ -5,7 +5,8 @@
 namespace spectra::net {
 
 /// From now on, where `new` finds no memory, a part of a reserve goes back to the system before std::bad_alloc is thrown, so that what was
-/// begun can be taken apart: destructors may want memory, too (that of nlohmann::json does), and end the program where there is none. The
+/// begun can be taken apart: destructors may want memory, too (that of nlohmann::json does), and end the program where there is none:
+/// on the way of an exception it is not thrown, and `new` tries again. The
 /// reserve is address space without pages. To be called once, before there are threads.
 void keep_memory_reserve();
 
