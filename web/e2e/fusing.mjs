@@ -1,6 +1,7 @@
 // Colours that are made in the browser: by the same library, without a byte for a setting, and without a link.
 import assert from 'node:assert/strict';
-import { existsSync } from 'node:fs';
+import { existsSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 
@@ -42,7 +43,7 @@ function counter(page) {
 const setAlpha = (page, alpha) => page.evaluate((value) => globalThis.spectra.settings.setParameter('alpha', value, true), alpha);
 const setMethod = (page, method) => page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
 
-export function addFusingTests(browser) {
+export function addFusingTests(browser, scratch) {
   if (!existsSync(MODULE)) {
     console.log('skipped: fusing in the browser; deploy/build_module.sh could not make the library');
     return;
@@ -228,6 +229,18 @@ export function addFusingTests(browser) {
     const age = await old();
     await page.waitForTimeout(1200);
     assert.ok((await old()) > age + 0.8, 'its age counts');
+    // What only the robot can do waits, and so does a range after it: it is named as it is in the picture.
+    const range = page.locator('[data-range="follow"]');
+    assert.match(await page.locator('[role="alert"]').first().innerText(), /Turning, settings and readings work/);
+    const named = await range.innerText();
+    await setMethod(page, 'thermal_change');
+    await page.evaluate(() => globalThis.spectra.settings.toggleRangeExtremes());
+    await page.locator('[data-waiting]', { hasText: 'range to the extremes' }).waitFor();
+    assert.equal(await range.innerText(), named);
+    assert.match(await page.locator('[role="alert"]').first().innerText(), /Turning and readings work/);
+    await page.evaluate(() => globalThis.spectra.settings.toggleRangeExtremes());
+    await setMethod(page, 'visible_only');
+    await page.locator('[data-waiting]').waitFor({ state: 'detached' });
     // A reading, by what is here.
     const reading = await page.evaluate(async () => {
       await globalThis.spectra.pin({ x: 640, y: 450 });
@@ -245,6 +258,90 @@ export function addFusingTests(browser) {
     assert.equal(await page.evaluate(() => globalThis.spectra.store.fusingPlace), 'here');
     await page.close();
     await link.stop();
+    await server.stop();
+  });
+
+  test('What is made here is said to be behind until it has been drawn', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    await drawn(page);
+    // A machine that does not come to draw.
+    await page.evaluate(() => {
+      const { viewport } = globalThis.spectra;
+      const { pictures } = viewport;
+      Object.defineProperty(viewport, 'pictures', { get: () => pictures, configurable: true });
+    });
+    await page.keyboard.press('2');
+    const sign = page.locator('[data-pending-method]');
+    await sign.waitFor({ timeout: 10_000 });
+    assert.match(await sign.innerText(), /Visible only: not yet in the picture/);
+    const footer = await page.locator('footer').innerText();
+    assert.match(footer, /behind/);
+    assert.doesNotMatch(footer, /up to date/);
+    await page.evaluate(() => delete globalThis.spectra.viewport.pictures);
+    await sign.waitFor({ state: 'detached', timeout: 10_000 });
+    await page.locator('footer', { hasText: 'up to date' }).waitFor({ timeout: 10_000 });
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('After the server was started again: the range in force, keys that work, colours made here, and no reading of before', async () => {
+    const bare = join(scratch, 'bare.ply');
+    const corners = [0, 1].flatMap((x) => [0, 1].map((y) => `${x} ${y} 0 40 90 200`));
+    writeFileSync(
+      bare,
+      `ply\nformat ascii 1.0\nelement vertex 4\n${['x', 'y', 'z'].map((name) => `property float ${name}\n`).join('')}` +
+        `${['red', 'green', 'blue'].map((name) => `property uchar ${name}\n`).join('')}` +
+        `element face 2\nproperty list uchar int vertex_indices\nend_header\n${corners.join('\n')}\n3 0 2 1\n3 1 2 3\n`,
+    );
+    let server = await startServer(['--demo']);
+    const { page } = await openClient(browser, server.url, { width: 1000, height: 700 }, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    const range = () => page.evaluate(() => globalThis.spectra.store.fusion.range);
+    const before = await range();
+    /** Another server on the same port, and the page connected to it at once: the scene is still being made. */
+    const restart = async (args) => {
+      await server.stop();
+      await page.waitForFunction(() => !globalThis.spectra.store.connected);
+      server = await startServer(args, server.port);
+      await page.evaluate(() => {
+        const look = setInterval(() => {
+          const { store } = globalThis.spectra;
+          if (!store.connected) return globalThis.spectra.retryNow();
+          if (store.scene === null) globalThis.sawNoScene ??= { cards: document.querySelectorAll('.card').length };
+          else clearInterval(look);
+        }, 50);
+      });
+      await page.waitForFunction(() => globalThis.spectra.store.connected && globalThis.spectra.store.scene, null, {
+        timeout: 120_000,
+      });
+      await settled(page, 180_000);
+    };
+    await page.evaluate(() => globalThis.spectra.pin({ x: 500, y: 350 }));
+    await page.locator('.card').waitFor();
+    await restart(['--demo']);
+    assert.deepEqual(await page.evaluate(() => globalThis.sawNoScene), { cards: 0 }, 'a connection without a scene, and no card');
+    assert.deepEqual(await range(), before);
+    assert.equal(await page.locator('[data-range="moved"]').count(), 0, 'the range has not moved');
+    await page.keyboard.press('e');
+    await page.waitForFunction(() => globalThis.spectra.store.range.mode === 'auto');
+    await page.keyboard.press('l');
+    await page.waitForFunction(() => globalThis.spectra.store.range.mode === 'manual');
+    await isHere(page);
+    assert.match(await page.locator('p[data-fusing]').textContent(), /^Here/);
+    // A thermal view gives what has no temperature a colour; where nothing has one, all is shown in the visible colours.
+    await page.keyboard.press('1');
+    await page.waitForFunction(() => globalThis.spectra.store.fusion.missing === '#808080');
+    await restart([bare]);
+    await page.waitForFunction(() => globalThis.spectra.store.fusionInForce.missing === 'visible', null, { timeout: 10_000 });
+    await settled(page);
+    const place = await page.evaluate(() => globalThis.spectra.viewport.project([0.5, 0.5, 0]));
+    assert.deepEqual((await screenshot(page, 'restarted-bare')).at(place.x, place.y), [40, 90, 200]);
+    await page.close();
     await server.stop();
   });
 

@@ -561,7 +561,7 @@ test('Nothing broke the content policy', () => {
 
 addAccuracyTests(browser);
 addAxeTests(browser);
-addFusingTests(browser);
+addFusingTests(browser, scratch);
 addKeptTests(browser, scratch);
 addLayoutTests(browser);
 addLetteringTests(browser);

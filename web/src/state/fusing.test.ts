@@ -208,6 +208,25 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(fusing.channels).toEqual(['temperature', 'visible']);
   });
 
+  it('begins anew with the robot after a connection without a scene, and asks nothing of that', async () => {
+    const { store, fusing, diary, asked } = await here();
+    const { scene } = store;
+    asked.length = 0;
+    store.scene = null;
+    fusing.sceneGone();
+    fusing.greeted(['raw_layers']);
+    await later();
+    expect(asked).toEqual([]);
+    expect([store.fusingPlace, store.fusingProblem, fusing.channels]).toEqual(['robot', null, ['fused']]);
+    expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'subscribe fused']);
+    store.scene = scene;
+    fusing.consider();
+    await vi.waitFor(() => expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096 }));
+    await later();
+    fusing.consider();
+    expect(store.fusingPlace).toBe('here');
+  });
+
   it('goes back to the robot when that has brought everything, and not before', async () => {
     const { store, fusing, diary, busy } = await here();
     fusing.setWish('robot');

@@ -94,12 +94,21 @@ export class Fusing {
     this.consider();
   }
 
-  /** A new connection. */
+  /** A new connection, whose scene is known. */
   greeted(capabilities: readonly string[]): void {
     this.#isOfferedRaw = capabilities.includes('raw_layers');
     this.#isLeaving = false;
     if (!this.#isOfferedRaw && this.#wantsRaw) this.#leaveAtOnce();
     if (this.#wantsRaw) this.factsChanged();
+  }
+
+  /** There is no scene: the picture of the next one comes from the robot first. */
+  sceneGone(): void {
+    this.#facts = null;
+    this.#factsNumber += 1;
+    this.#isAskingFacts = false;
+    this.#isLeaving = false;
+    this.#leaveAtOnce();
   }
 
   /** The temperatures of the scene have moved: plans are made of other facts. */

@@ -90,6 +90,34 @@ describe('the progress of a picture', () => {
     expect(store.behindSince).toBeNull();
   });
 
+  it('is behind settings that are shown here until a picture with them has been drawn', () => {
+    const { store, clock, progress } = setUp();
+    store.complete = complete(1);
+    store.link = { phase: 'open' };
+    store.pictureMethod = 'blend';
+    store.shownMethods = ['blend'];
+    store.fusionInForce = { method: 'threshold' } as Fusion;
+    progress.beginHere('other', 7);
+    progress.beginHere('threshold', 7);
+    progress.drawnHere(6);
+    progress.tick();
+    expect([store.hereSince, store.lateSince, store.progress, store.pictureMethod]).toEqual([1000, 1000, 0, 'blend']);
+    store.now = 1100;
+    expect([store.behind, store.settled, store.methodIsPending]).toEqual([false, true, false]);
+    store.now = 1600;
+    expect([store.behind, store.settled, store.methodIsPending]).toEqual([true, false, true]);
+    // That the robot has sent all says nothing of what is drawn here.
+    progress.completed(complete(1));
+    expect(store.pictureMethod).toBe('blend');
+    clock.now = 1600;
+    progress.beginHere('threshold', 9);
+    progress.drawnHere(8);
+    expect([store.pictureMethod, store.hereSince]).toEqual(['threshold', 1600]);
+    progress.drawnHere(9);
+    progress.tick();
+    expect([store.hereSince, store.progress, store.settled]).toEqual([null, 1, true]);
+  });
+
   it('is nothing while the server has not said what the named method is', () => {
     const { store, tiles, progress } = setUp();
     store.complete = complete(1);

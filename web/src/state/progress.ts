@@ -15,6 +15,8 @@ interface Tiles {
 export class Progress {
   #bytesBefore = 0;
   #window: { at: number; bytes: number }[] = [];
+  /** Settings that are shown here and are in no picture yet, by the number of the picture that they will be in. */
+  #here: { picture: number; method: string; at: number }[] = [];
 
   /** `isBusy`: settings are still on their way to the server. */
   constructor(
@@ -46,7 +48,25 @@ export class Progress {
     }
     store.behindSince = null;
     store.progress = 1;
-    store.pictureMethod = store.fusionInForce?.method ?? null;
+    if (store.hereSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
+  }
+
+  /** A method is shown by what is here, in the picture of this number. */
+  beginHere(method: string, picture: number): void {
+    const last = this.#here.at(-1);
+    if (last?.picture === picture) last.method = method;
+    else this.#here.push({ picture, method, at: this.now() });
+    this.store.hereSince = this.#here[0]!.at;
+  }
+
+  /** The pictures up to this number have been drawn. */
+  drawnHere(picture: number): void {
+    const drawn = this.#here.filter((one) => one.picture <= picture).at(-1);
+    if (drawn === undefined) return;
+    this.#here = this.#here.filter((one) => one.picture > picture);
+    this.store.pictureMethod = drawn.method;
+    this.store.hereSince = this.#here[0]?.at ?? null;
+    if (this.store.hereSince === null && this.store.behindSince === null) this.store.progress = 1;
   }
 
   /** Nothing comes any more: there is nothing to be behind of. */
@@ -60,7 +80,9 @@ export class Progress {
     const now = this.now();
     this.#window = this.#window.filter(({ at }) => now - at < RATE_MS);
     store.rate_bytes_per_s = (this.#window.reduce((sum, { bytes }) => sum + bytes, 0) / RATE_MS) * 1000;
-    if (store.behindSince !== null) store.progress = this.#share();
+    // What is made here comes into the picture all at once.
+    if (store.hereSince !== null) store.progress = 0;
+    else if (store.behindSince !== null) store.progress = this.#share();
   }
 
   #share(): number {

@@ -66,6 +66,18 @@ beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
 
 describe('Readings', () => {
+  it('keeps no reading of a scene that is gone', async () => {
+    const { store, readings, asked } = setUp();
+    const pinning = readings.pin({ x: 1, y: 2 });
+    await later();
+    await asked.at(-1)?.answer(PROBE);
+    await pinning;
+    expect(store.pinned).not.toBeNull();
+    store.hover = store.pinned!.reading;
+    readings.clear();
+    expect([store.pinned, store.hover]).toEqual([null, null]);
+  });
+
   it('ask for histogram and extremes once there is a picture, and not before', async () => {
     const { store, readings, asked, seen } = setUp();
     store.pictureStands = false;

@@ -73,6 +73,8 @@ export class Readings {
   clear(): void {
     this.store.histogram = null;
     this.store.extremes = null;
+    this.store.hover = null;
+    this.store.pinned = null;
     this.session.onExtremes(null);
   }
 

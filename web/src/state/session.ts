@@ -169,6 +169,7 @@ export class Session {
       onInForce: () => this.readings.askHistogram(),
       onProblem: say,
       fuseHere: (wanted) => this.fusing.apply(wanted),
+      onShownHere: (method) => this.#progress.beginHere(method, this.viewport.nextPicture),
     });
     this.quality = new QualityWish(store, {
       request,
@@ -181,7 +182,7 @@ export class Session {
       onLoaded: ({ methods, palettes }) => {
         store.methods = methods;
         store.palettes = palettes;
-        this.settings.catalogueCame();
+        this.settings.reconsiderMissing();
       },
       onFailure: (failure) => {
         store.catalogueFailure = failure;
@@ -449,6 +450,7 @@ export class Session {
   #tick(): void {
     this.store.now = performance.now();
     this.store.heardAt = this.store.connected ? this.#connection.lastMessageAt : null;
+    this.#progress.drawnHere(this.viewport.pictures);
     this.#progress.tick();
     this.#sayError();
     this.fusing.consider();
@@ -475,6 +477,7 @@ export class Session {
       const method = generation === null ? store.pictureMethod : (this.settings.methodOf(generation) ?? store.pictureMethod);
       if (method !== null) methods.add(method);
     }
+    if (this.fusing.isHere && store.pictureMethod !== null) methods.add(store.pictureMethod);
     const isSame = methods.size === store.shownMethods.length && store.shownMethods.every((method) => methods.has(method));
     if (!isSame) store.shownMethods = [...methods];
   }

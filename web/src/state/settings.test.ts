@@ -32,7 +32,7 @@ function setUp() {
   store.link = { phase: 'open' };
   const asked: Asked[] = [];
   const problems: unknown[] = [];
-  const events = { changes: 0, inForce: 0 };
+  const events = { changes: 0, inForce: 0, shownHere: [] as string[] };
   let here: (wanted: Fusion) => Fusion | null = () => null;
   const later = () => vi.advanceTimersByTimeAsync(0);
   const settings = new Settings(store, {
@@ -55,6 +55,7 @@ function setUp() {
     onInForce: () => (events.inForce += 1),
     onProblem: (error) => problems.push(error),
     fuseHere: (wanted) => here(wanted),
+    onShownHere: (method) => events.shownHere.push(method),
   });
   expect(settings.greeted(fusionWith(0.5), false)).toBeNull();
   const fuseHere = (how: typeof here) => {
@@ -244,15 +245,54 @@ describe('Settings', () => {
     const { store, settings, asked } = setUp();
     store.scene = { temperature: { min: 1, max: 2 } } as unknown as NonNullable<Store['scene']>;
     store.palettes = [];
-    settings.catalogueCame();
+    settings.reconsiderMissing();
     expect(asked).toEqual([]);
     settings.setViewMode('thermal');
     expect(asked.at(-1)?.change).toEqual({ method: 'thermal_only' });
     await asked.at(-1)?.answer(1, { ...fusionWith(1, 'thermal_only'), missing: 'visible' });
     const colours = Array.from({ length: 256 }, (_, i): [number, number, number] => [i, 0, 0]);
     store.palettes = [{ id: 'iron', label: 'Iron', fusion_safe: true, colours }];
-    settings.catalogueCame();
+    settings.reconsiderMissing();
     expect(asked.at(-1)?.change).toEqual({ missing: '#808080' });
+  });
+
+  it('keeps the visible colours where nothing has a temperature, also when a scene takes the place of one that had', async () => {
+    const { store, settings, asked } = setUp();
+    const colours = Array.from({ length: 256 }, (_, i): [number, number, number] => [i, 0, 0]);
+    store.palettes = [{ id: 'iron', label: 'Iron', fusion_safe: true, colours }];
+    const sceneWith = (min: number | null) => {
+      store.scene = { temperature: { min } } as unknown as NonNullable<Store['scene']>;
+      settings.reconsiderMissing();
+    };
+    sceneWith(null);
+    expect(asked).toEqual([]);
+    settings.setViewMode('thermal');
+    expect(asked.at(-1)?.change).toEqual({ method: 'thermal_only' });
+    await asked.at(-1)?.answer(1, fusionWith(1, 'thermal_only'));
+    sceneWith(10);
+    expect(asked.at(-1)?.change).toEqual({ missing: '#808080' });
+    await asked.at(-1)?.answer(2, { ...fusionWith(1, 'thermal_only'), missing: '#808080' });
+    sceneWith(null);
+    expect(asked.at(-1)?.change).toEqual({ missing: 'visible' });
+    await asked.at(-1)?.answer(3, fusionWith(1, 'thermal_only'));
+    expect(asked).toHaveLength(3);
+    // While there is no scene nobody knows.
+    store.scene = null;
+    settings.reconsiderMissing();
+    expect(asked).toHaveLength(3);
+  });
+
+  it('names a range that follows the scene once it is in force, and one that is held at once', async () => {
+    const { store, settings, asked } = setUp();
+    settings.setRange(12, 28, true);
+    expect(store.range).toMatchObject({ mode: 'manual', min: 12, max: 28 });
+    await asked.at(-1)?.answer(1, { ...fusionWith(0.5), range: { mode: 'manual', min: 12, max: 28 } });
+    store.link = { phase: 'waiting', attempt: 1, retry_at: 0 };
+    settings.toggleRangeExtremes();
+    expect(store.wanted?.range?.mode).toBe('auto');
+    expect(store.range).toMatchObject({ mode: 'manual', min: 12, max: 28 });
+    settings.inForce(2, fusionWith(0.5));
+    expect(store.range).toMatchObject({ mode: 'auto', min: 10, max: 30 });
   });
 
   it('holds the range where it is and lets it go again', async () => {
@@ -303,8 +343,9 @@ describe('Settings that are fused here', () => {
     expect(store.generation).toBe(3);
   });
 
-  it('are in force without a link', () => {
-    const { store, settings, asked, fuseHere } = setUp();
+  it('are in force without a link, and in the picture when that has been drawn', () => {
+    const { store, settings, asked, fuseHere, events } = setUp();
+    store.pictureMethod = 'before';
     store.fusionInForce = fusionWith(0.4);
     store.link = { phase: 'connecting', attempt: 3 };
     fuseHere(shownBy);
@@ -312,6 +353,7 @@ describe('Settings that are fused here', () => {
     expect(store.fusionInForce?.params['alpha']).toBe(0.9);
     expect(store.wanted).toBeNull();
     expect(asked).toHaveLength(0);
+    expect([store.pictureMethod, events.shownHere]).toEqual(['before', ['blend']]);
   });
 
   it('are refused here in the words of the library', () => {

@@ -33,6 +33,8 @@ export interface SettingsSession {
   onProblem: (error: unknown) => void;
   /** Shows settings by what is here; null when the robot has to. Throws FusionRefusal. */
   fuseHere: (wanted: Fusion) => Fusion | null;
+  /** The next picture shows this method by what is here. */
+  onShownHere: (method: string) => void;
 }
 
 /**
@@ -180,10 +182,10 @@ export class Settings {
     return before;
   }
 
-  /** Methods and palettes are there: what is said of vertices without temperature may have waited for them. */
-  catalogueCame(): void {
-    const { fusion } = this.store;
-    if (!this.#hasChosen || fusion === null) return;
+  /** Methods and palettes are there, or another scene: what is to be said of vertices without temperature depends on them. */
+  reconsiderMissing(): void {
+    const { fusion, scene } = this.store;
+    if (!this.#hasChosen || fusion === null || scene == null) return;
     const change = this.#missingFor(fusion.method, fusion.palette);
     if (change.missing !== undefined) this.#change(change, true);
   }
@@ -249,7 +251,7 @@ export class Settings {
       return true;
     }
     store.wanted = null;
-    store.pictureMethod = store.fusionInForce.method;
+    this.session.onShownHere(store.fusionInForce.method);
     if (store.connected) {
       this.#teller.push(change);
       if (isSettled && change.method !== undefined) this.#teller.flush();
@@ -270,11 +272,11 @@ export class Settings {
     }
   }
 
-  /** What is to be said of vertices without temperature beside another method or palette. */
+  /** What is to be said of vertices without temperature beside another method or palette; where none has one, all show the visible colours. */
   #missingFor(method: string, palette_id: string): Pick<FusionChange, 'missing'> {
     const palette = this.store.palettes.find(({ id }) => id === palette_id);
     if (!this.store.missingIsAutomatic || palette === undefined) return {};
-    const missing = viewModeOf(method) === 'thermal' ? unmeasuredColour(palette) : 'visible';
+    const missing = viewModeOf(method) === 'thermal' && this.store.hasThermal ? unmeasuredColour(palette) : 'visible';
     return missing === this.store.fusion?.missing ? {} : { missing };
   }
 

@@ -126,6 +126,8 @@ export class Store {
   round_trip_ms = $state<number | null>(null);
   /** Since when the picture has been behind the settings; null when it is not. */
   behindSince = $state<number | null>(null);
+  /** Since when settings that are shown by what is here have not been in the picture; null when they are. */
+  hereSince = $state<number | null>(null);
   /** Share of the tiles that show the newest settings. */
   progress = $state(1);
   /** Method that all of the picture showed when it was last complete; null before the first time. */
@@ -162,6 +164,10 @@ export class Store {
 
   /** The settings as the controls show them: in force, with what is on its way laid over. */
   readonly fusion = $derived(this.fusionInForce === null ? null : withChange(this.fusionInForce, this.wanted, this.methods));
+  /** The range as it is named: one that follows the scene once it is in force, as nobody here knows its ends before. */
+  readonly range = $derived(
+    (this.wanted?.range !== undefined && this.wanted.range.mode !== 'manual' ? this.fusionInForce : this.fusion)?.range ?? null,
+  );
   readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
   readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
   readonly hasThermal = $derived(this.scene?.temperature.min != null);
@@ -196,9 +202,15 @@ export class Store {
   /** The scene has a baseline, and when it was marked (Unix seconds; null: never); undefined: it has none. */
   readonly baseline = $derived(this.scene?.baseline);
   readonly connected = $derived(this.link.phase === 'open');
-  /** All that was asked for has come. */
-  readonly settled = $derived(this.complete !== null && this.behindSince === null);
-  readonly behind = $derived(this.behindSince !== null && this.now - this.behindSince > 150);
+  /** Since when the picture has been behind what is named, whoever makes its colours; null when it is not. */
+  readonly lateSince = $derived(
+    this.behindSince === null || this.hereSince === null
+      ? (this.behindSince ?? this.hereSince)
+      : Math.min(this.behindSince, this.hereSince),
+  );
+  readonly behind = $derived(this.lateSince !== null && this.now - this.lateSince > 150);
+  /** All that was asked for has come, and is drawn or will be in a moment. */
+  readonly settled = $derived(this.complete !== null && this.behindSince === null && !this.behind);
   /** What is on its way for longer than a moment, or waits for a connection. */
   readonly unconfirmed = $derived<FusionChange | null>(
     this.wanted !== null && (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS))
@@ -211,7 +223,7 @@ export class Store {
   readonly methodIsPending = $derived(
     this.pictureMethod !== null &&
       this.otherMethods.length > 0 &&
-      (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS)),
+      ((!this.connected && this.hereSince === null) || (this.lateSince !== null && this.now - this.lateSince > PENDING_AFTER_MS)),
   );
   /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual. */
   readonly silentFor_s = $derived(

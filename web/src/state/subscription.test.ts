@@ -41,6 +41,7 @@ function setUp() {
       greeted: () => before.fusion as never,
       send: () => (sent.wait ? new Promise<void>((resolve) => (settle = resolve)) : Promise.resolve()),
       busy: false,
+      reconsiderMissing: vi.fn(),
     },
     quality: {
       greeted: () => before.quality as never,
@@ -56,7 +57,7 @@ function setUp() {
     progress: { begin: vi.fn() },
     look: { sceneIs: vi.fn() },
     catalogue: { want: vi.fn(), wantNone: vi.fn() },
-    fusing: { greeted: vi.fn(), channels: ['fused'] },
+    fusing: { greeted: vi.fn(), sceneGone: vi.fn(), channels: ['fused'] },
   };
   const subscription = new Subscription(store, 'ws://robot:8080/ws?hello=brief', concerned, {
     request: (method, params) =>
@@ -197,6 +198,17 @@ describe('a subscription', () => {
     // A running connection says itself what goes.
     subscription.sceneChanged({ ...HELLO.scene!, name: 'a third' } as Scene);
     expect(cleared()).toBe(1);
+  });
+
+  it('says that there is no scene before the connection goes on with colours that are made here', () => {
+    const { subscription, concerned } = setUp();
+    const { greeted, sceneGone } = concerned.fusing;
+    subscription.greeted(HELLO);
+    expect(sceneGone).not.toHaveBeenCalled();
+    subscription.greeted(WITHOUT_SCENE);
+    expect(sceneGone.mock.invocationCallOrder[0]).toBeLessThan(greeted.mock.invocationCallOrder[1]!);
+    subscription.sceneChanged(HELLO.scene);
+    expect(concerned.settings.reconsiderMissing).toHaveBeenCalledTimes(3);
   });
 
   it('forgets what is pinned in another scene, and not while the same one grows', () => {

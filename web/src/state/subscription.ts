@@ -20,13 +20,13 @@ const MOST_VALUES = 9900;
 export interface Concerned {
   tiles: Pick<TileSet, 'clear' | 'claims' | 'layersOf' | 'resume'>;
   intake: Pick<FrameIntake, 'beginConnection'>;
-  settings: Pick<Settings, 'greeted' | 'send' | 'busy'>;
+  settings: Pick<Settings, 'greeted' | 'send' | 'busy' | 'reconsiderMissing'>;
   quality: Pick<QualityWish, 'greeted' | 'send' | 'askMarks' | 'sceneHasStep'>;
   readings: Pick<Readings, 'beginConnection' | 'clear' | 'askFacts'>;
   progress: Pick<Progress, 'begin'>;
   look: Pick<FirstLook, 'sceneIs'>;
   catalogue: Pick<CatalogueLoader, 'want' | 'wantNone'>;
-  fusing: Pick<Fusing, 'greeted' | 'channels'>;
+  fusing: Pick<Fusing, 'greeted' | 'channels' | 'sceneGone'>;
 }
 
 /** What the subscription needs of the session it belongs to. */
@@ -83,12 +83,13 @@ export class Subscription {
     store.lostAt = null;
     store.statuses = [];
     store.complete = null;
-    this.concerned.fusing.greeted(message.capabilities);
     intake.beginConnection();
     this.#setScene(message.scene, true);
+    this.concerned.fusing.greeted(message.capabilities);
     this.session.tellCamera();
     progress.begin();
     void this.#subscribe(message, fusionBefore, qualityBefore);
+    settings.reconsiderMissing();
     // Before the stream, which is asked for at the end of this task at the earliest.
     quality.askMarks();
   }
@@ -96,6 +97,7 @@ export class Subscription {
   /** The server says that its scene is another one, or has changed. */
   sceneChanged(scene: Scene | null): void {
     this.#setScene(scene, false);
+    this.concerned.settings.reconsiderMissing();
     this.concerned.progress.begin();
   }
 
@@ -158,10 +160,11 @@ export class Subscription {
 
   #setScene(next: Scene | null, fresh: boolean): void {
     const { store } = this;
-    const { tiles, look, readings, quality } = this.concerned;
+    const { tiles, look, readings, quality, fusing } = this.concerned;
     const before = store.scene;
     store.scene = next;
     if (next === null) {
+      fusing.sceneGone();
       tiles.clear();
       look.sceneIs(null);
       readings.clear();

@@ -10,6 +10,12 @@ const methods = [
 const plain = (words: string[]) => words.map((word) => word.replaceAll('\u202f', ' '));
 
 describe('wishWords', () => {
+  it('tells a range that leaves the outermost temperatures out from one to the extremes', () => {
+    expect(wishWords({ range: { mode: 'percentile', low: 0.5, high: 99.5 } }, methods, [], 'blend')).toEqual([
+      'range 0.5\u201399.5 %',
+    ]);
+  });
+
   it('says what is asked for, setting by setting', () => {
     const words = wishWords(
       {
@@ -36,7 +42,7 @@ describe('wishWords', () => {
     expect(wishWords({ params: { alpha: 0.75, other: true } }, methods, [], 'blend')).toEqual(['Opacity 0.75', 'other true']);
     expect(wishWords({ params: { threshold: null }, range: { mode: 'auto' } }, methods, [], 'threshold')).toEqual([
       'Threshold automatic',
-      'range by itself',
+      'range to the extremes',
     ]);
     expect(wishWords(null, methods, [], 'blend')).toEqual([]);
   });

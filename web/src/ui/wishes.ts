@@ -27,8 +27,10 @@ export function wishWords(
   const palette = change.palette;
   if (palette !== undefined) words.push(`palette ${palettes.find(({ id }) => id === palette)?.label ?? palette}`);
   if (change.range !== undefined) {
-    const { mode, min, max } = change.range;
-    words.push(mode === 'manual' ? `range ${celsius(min)} to ${celsius(max)}` : 'range by itself');
+    const { mode, min, max, low, high } = change.range;
+    if (mode === 'manual') words.push(`range ${celsius(min)} to ${celsius(max)}`);
+    else if (mode === 'auto') words.push('range to the extremes');
+    else words.push(`range ${figures(low ?? 1, 3)}\u2013${figures(high ?? 99, 3)} %`);
   }
   if (change.age?.mode !== undefined) words.push(change.age.mode === 'fade' ? 'fading by age' : 'no fading by age');
   if (change.age?.half_life_s !== undefined) words.push(`half-life ${figures(change.age.half_life_s, 3)} s`);

@@ -113,6 +113,11 @@ export class Viewport {
     return this.#drawn;
   }
 
+  /** Number of the first picture that has all that has changed so far, as `pictures` counts them. */
+  get nextPicture(): number {
+    return this.#commands.length > 0 ? this.#sent + 1 : this.#sent;
+  }
+
   /** True when the last picture that was asked for has been drawn, and none is due. */
   get isUpToDate(): boolean {
     return this.#drawn > 0 && this.#frame === 0 && !this.#isMoving && !this.#isHeldUp && this.#drawn === this.#sent;
