@@ -96,6 +96,41 @@ export function addFusingTests(browser, scratch) {
     await server.stop();
   });
 
+  test('A value that is refused here goes back to what is in force, with the reason beside it', async () => {
+    const server = await startServer(['--demo']);
+    const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 900 }, { fusing: 'here' });
+    await settled(page, 180_000);
+    await isHere(page);
+    await setMethod(page, 'thermal_highlighting');
+    await settled(page);
+    const field = page.locator('[data-parameter="high"]');
+    const entry = field.locator('input[type=number]');
+    const before = await entry.inputValue();
+    await entry.fill('-5');
+    await entry.press('Enter');
+    await field.getByRole('alert').waitFor();
+    assert.equal(await entry.inputValue(), before);
+    assert.equal(await page.locator('[data-parameter="low"] [role=alert]').count(), 0);
+
+    // What is said of highlights is never of other settings than those that are set.
+    await setMethod(page, 'histogram_distribution');
+    const note = page.locator('[data-highlight]');
+    await note.filter({ hasText: /% of the surface/ }).waitFor();
+    const [share, at_once] = await page.evaluate(async () => {
+      const { store, settings } = globalThis.spectra;
+      const known = store.histogram.highlighted_share;
+      settings.setParameter('k', 5, true);
+      await new Promise((resolve) => setTimeout(resolve));
+      return [known, document.querySelector('[data-highlight]').textContent];
+    });
+    assert.equal(at_once, '…');
+    await note.filter({ hasText: /surface|Nothing/ }).waitFor();
+    assert.notEqual(await page.evaluate(() => globalThis.spectra.store.histogram.highlighted_share), share);
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
   test('How much is highlighted is said where colours are made here, as the robot says it', async () => {
     const server = await startServer(['--demo']);
     const words = async (fusing) => {

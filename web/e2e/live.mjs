@@ -115,6 +115,33 @@ export function addLiveTests(browser) {
     await server.stop();
   });
 
+  test('What is read of a place is read again when the map changes, and goes with what was there', async () => {
+    const server = await startServer(['--live']);
+    const { page, problems } = await openClient(browser, server.url, { width: 1000, height: 700 });
+    await shows(page, await put(server, 0, 0));
+    const [x, y] = await placeOf(page, 0, 0);
+    await page.mouse.click(x, y);
+    const card = page.locator('.card');
+    const bothSay = async (words) => {
+      for (const label of ['.card [data-probe]', '.hover'])
+        await page.locator(label).filter({ hasText: words }).waitFor({ timeout: 10_000 });
+    };
+    await card.waitFor();
+    await page.mouse.move(x + 60, y, { steps: 3 });
+    await bothSay(/^\s*(19|20|21)\.\d/);
+    await put(server, 0, 0, { celsius: 80 });
+    await bothSay(/^\s*(79|80|81)\.\d/);
+    await put(server, 0, 0, { celsius: -10 });
+    await bothSay(/^\s*\u2212(9|10|11)\.\d/);
+    await fetch(`${server.url}api/v1/blocks/b0.0`, { method: 'DELETE' });
+    await page.getByText('The map is empty yet').waitFor();
+    await card.waitFor({ state: 'detached', timeout: 10_000 });
+    await page.locator('.hover').waitFor({ state: 'detached', timeout: 10_000 });
+    assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
   test('What has become warmer since the baseline was marked is shown where it is; a probe says how long ago and since when; what is old fades', async () => {
     const server = await startServer(['--live']);
     let revision = 0;

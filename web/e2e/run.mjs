@@ -218,6 +218,15 @@ test('A threshold handle on the axis turns the hot place from palette to visible
   await says(/% of the surface, above/);
   const hot = (await screenshot(page, 'threshold-low')).at(place.x, place.y);
 
+  for (const [key, celsius] of [
+    ['End', scene.temperature.max],
+    ['Home', scene.temperature.min],
+  ]) {
+    await handle.press(key);
+    await settled(page);
+    assert.equal(Math.fround((await state()).fusion.params.threshold), Math.fround(celsius), key);
+  }
+
   // By keyboard to the very top: nothing is.
   await page.locator('[data-parameter="threshold"] input[type=number]').fill(String(scene.temperature.max + 1));
   await page.keyboard.press('Enter');
@@ -350,6 +359,19 @@ test('A click reads the temperature', async () => {
   await card.waitFor();
   assert.match(await card.innerText(), /°C|no temperature/);
   await label.waitFor({ state: 'detached' });
+  // Nothing of the picture shows through, and no label lies over it.
+  const look = await card.evaluate((element) => {
+    const { backgroundColor, zIndex } = getComputedStyle(element);
+    const labels = [...document.querySelectorAll('.label, .mark')].map((other) => Number(getComputedStyle(other).zIndex));
+    return { backgroundColor, isAbove: labels.every((other) => other < Number(zIndex)) };
+  });
+  assert.match(look.backgroundColor, /^rgb\(/, 'opaque');
+  assert.ok(look.isAbove);
+  await card.getByRole('button').press('Enter');
+  await card.waitFor({ state: 'detached' });
+  assert.equal(await page.evaluate(() => document.activeElement.tagName), 'CANVAS', 'where the keys are');
+  await page.mouse.click(place.x, place.y);
+  await card.waitFor();
   await page.keyboard.press('Escape');
   await card.waitFor({ state: 'detached' });
 });

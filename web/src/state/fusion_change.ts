@@ -56,6 +56,16 @@ export function wholeChange(fusion: Fusion): FusionChange {
   };
 }
 
+/** What somebody has set that decides which temperatures are highlighted; equal texts where it is the same. */
+export function highlightKey({ method, params, range }: Fusion): string {
+  const sorted = Object.entries(params).sort(([a], [b]) => (a < b ? -1 : 1));
+  const held = range.mode === 'manual' ? [range.min, range.max] : range.mode;
+  // The same number may have come by another way, rounded.
+  return JSON.stringify([method, sorted, held], (_key, value: unknown) =>
+    typeof value === 'number' ? Number(value.toPrecision(6)) : value,
+  );
+}
+
 /** What sets a range that is in force. */
 export function rangeChange({ mode, min, max, low, high }: Range | RangeChange): RangeChange {
   if (mode === 'manual') return { mode, min: min ?? null, max: max ?? null };

@@ -10,6 +10,8 @@ function setUp() {
     histogram: { edges: [0, 1], counts: [1], mean: 0, sigma: 0, highlighted: [] },
     highlighting: {},
     fusingPlace: 'here',
+    fusionInForce: { method: 'hot', params: { threshold: 30 }, range: { mode: 'auto' } },
+    shareOf: null,
   } as unknown as Store;
   const judged: Uint8Array[] = [];
   const highlighting = () =>
@@ -27,13 +29,33 @@ describe('Highlighted share of what is fused here', () => {
     expect(store.histogram?.highlighted).toEqual([[30, 40]]);
     await wait();
     expect(store.histogram?.highlighted_share).toBe(0.25);
+    const first = store.shareOf;
+    expect(first).toContain('threshold');
+    store.fusionInForce = { ...store.fusionInForce!, params: { threshold: 20 } };
     [picture.isUpToDate, picture.share] = [false, 0.5];
     share.changed('hot', [[20, 40]]);
     await wait();
     expect(store.histogram).toMatchObject({ highlighted: [[20, 40]], highlighted_share: 0.25 });
+    expect(store.shareOf).toBe(first);
     picture.isUpToDate = true;
     await wait();
     expect(store.histogram?.highlighted_share).toBe(0.5);
+    expect(store.shareOf).not.toBe(first);
+  });
+
+  it('is none where no temperature is highlighted, though rounded ones may be drawn so', async () => {
+    const { store, picture, share, wait } = setUp();
+    share.changed('hot', [[30, 40]]);
+    await wait();
+    picture.share = 1e-5;
+    share.changed('hot', []);
+    await wait();
+    expect(store.histogram?.highlighted_share).toBe(0);
+    // What is beyond the sensor's range is highlighted by no temperature.
+    store.scene = { temperature: { over_range_count: 3, under_range_count: 0 } } as Store['scene'];
+    share.changed('hot', []);
+    await wait();
+    expect(store.histogram?.highlighted_share).toBe(1e-5);
   });
 
   it('is nothing where a method that highlights finds nothing, and none of a method that does not', async () => {

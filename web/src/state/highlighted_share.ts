@@ -1,4 +1,5 @@
 import type { Highlighting } from '../draw/surface_share';
+import { highlightKey } from './fusion_change';
 import type { Store } from './store.svelte';
 
 /** What is needed of the picture. */
@@ -34,7 +35,7 @@ export class HighlightedShare {
     clearTimeout(this.#timer);
     if (store.histogram === null) return;
     if (highlighted.length > 0) store.highlighting[method] = true;
-    // Until the picture says it, that of before stands, as it does while the robot is asked.
+    // Until the picture says it, that of before is kept: whoever shows it looks whether it is of what is set.
     const { highlighted_share: before, ...rest } = store.histogram;
     const isKept = store.highlighting[method] !== undefined && before !== undefined;
     store.histogram = { ...rest, highlighted, ...(isKept ? { highlighted_share: before } : {}) };
@@ -44,6 +45,12 @@ export class HighlightedShare {
   dispose(): void {
     this.#number += 1;
     clearTimeout(this.#timer);
+  }
+
+  /** No temperature is highlighted, nor is any beyond the sensor's range: the steps that temperatures come in may put a few on the wrong side. */
+  #isNothing(highlighted: readonly unknown[]): boolean {
+    const { over_range_count = 0, under_range_count = 0 } = this.store.scene?.temperature ?? {};
+    return highlighted.length === 0 && over_range_count + under_range_count === 0;
   }
 
   #look(method: string): void {
@@ -58,7 +65,8 @@ export class HighlightedShare {
     if (number !== this.#number || store.fusingPlace !== 'here' || store.histogram === null) return;
     const { highlighted_share: _before, ...rest } = store.histogram;
     const isSaid = found !== null && store.highlighting[method] !== undefined;
-    store.histogram = isSaid ? { ...rest, highlighted_share: found.share } : rest;
+    store.histogram = isSaid ? { ...rest, highlighted_share: this.#isNothing(rest.highlighted) ? 0 : found.share } : rest;
+    store.shareOf = store.fusionInForce === null ? null : highlightKey(store.fusionInForce);
     if (found !== null) this.onColours(found.colours);
   }
 }

@@ -1,7 +1,7 @@
 import type { ProbedVertex } from '../draw/render_messages';
 import { readFileSync } from 'node:fs';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import type { CameraPose, Extremes, Hello, Probe, Scene, Vec3 } from '../protocol/messages';
+import type { CameraPose, Extremes, Fusion, Hello, Probe, Scene, Vec3 } from '../protocol/messages';
 import { RpcError } from '../transport/connection';
 import { Readings } from './readings';
 import { Store } from './store.svelte';
@@ -15,12 +15,22 @@ const golden = (name: string): unknown =>
 const EXTREMES = golden('scene.extremes') as Extremes;
 const PROBE = golden('scene.probe') as Probe;
 
+const FUSION: Fusion = {
+  method: 'hot',
+  params: { threshold: 30 },
+  params_in_force: { threshold: 30 },
+  palette: 'iron',
+  range: { mode: 'auto', min: 10, max: 40 },
+  missing: 'visible',
+};
+
 const later = () => vi.advanceTimersByTimeAsync(0);
 
 function setUp() {
   const store = new Store();
   store.link = { phase: 'open' };
-  store.scene = { name: 'room' } as Scene;
+  store.scene = { name: 'room', bounds: { min: [0, 0, 0], max: [2, 2, 1] } } as unknown as Scene;
+  store.fusionInForce = FUSION;
   store.pictureStands = true;
   store.server = { capabilities: ['extremes_in_view'] } as unknown as Hello;
   const asked: {
@@ -30,7 +40,7 @@ function setUp() {
     refuse: (error: Error) => Promise<void>;
   }[] = [];
   const seen = { extremes: [] as (Extremes | null)[], problems: [] as unknown[], aimed: [] as Vec3[] };
-  const picture = { under: [1, 2, 3] as Vec3 | null, shift: 0, vertex: null as ProbedVertex | null };
+  const picture = { under: [1, 2, 3] as Vec3 | null, shift: 0, vertex: null as ProbedVertex | null, isBusy: false };
   const readings = new Readings(
     store,
     {
@@ -56,6 +66,7 @@ function setUp() {
         }),
       onExtremes: (extremes) => seen.extremes.push(extremes),
       onProblem: (error) => seen.problems.push(error),
+      isBusy: () => picture.isBusy,
       probeHere: () => Promise.resolve(picture.vertex),
     },
   );
@@ -158,6 +169,105 @@ describe('Readings', () => {
     store.marksShown = false;
     expect(await readings.extremesInView(camera, [0, 0, 1, 1])).toBeNull();
     expect(asked).toHaveLength(2);
+  });
+});
+
+describe('Readings of a scene that changes', () => {
+  const probes = (asked: { method: string }[]) => asked.filter(({ method }) => method === 'scene.probe');
+
+  it('are asked for again, once a second at most, and only those that are shown', async () => {
+    const { store, readings, asked } = setUp();
+    const all = () => probes(asked) as typeof asked;
+    readings.askFacts();
+    readings.pictureIsOf(2);
+    await vi.advanceTimersByTimeAsync(2500);
+    expect(all()).toHaveLength(0);
+    void readings.pin({ x: 5, y: 6 });
+    await later();
+    await all()[0]!.answer({ ...PROBE, temperature: 21.1, distance: 0.01 });
+    for (let i = 0; i < 5; i += 1) readings.askFacts();
+    await later();
+    expect(all()).toHaveLength(2);
+    expect(all()[1]!.params).toEqual({ position: [1, 2, 3] });
+    await all()[1]!.answer({ ...PROBE, temperature: 80, distance: 0.01 });
+    expect(store.pinned?.reading.probe.temperature).toBe(80);
+    // What came meanwhile is asked once more; a picture that is known is no news.
+    await vi.advanceTimersByTimeAsync(1500);
+    expect(all()).toHaveLength(3);
+    await all()[2]!.answer({ ...PROBE, temperature: -10, distance: 0.01 });
+    readings.pictureIsOf(2);
+    await vi.advanceTimersByTimeAsync(1500);
+    expect(all()).toHaveLength(3);
+    expect(store.pinned?.reading.probe.temperature).toBe(-10);
+  });
+
+  it('are asked for again where the pointer rests', async () => {
+    const { store, readings, asked } = setUp();
+    const all = () => probes(asked) as typeof asked;
+    readings.hover({ x: 7, y: 8 });
+    await later();
+    await all()[0]!.answer({ ...PROBE, temperature: 20 });
+    readings.pictureIsOf(2);
+    await vi.advanceTimersByTimeAsync(500);
+    await all()[1]!.answer({ ...PROBE, temperature: 80 });
+    expect(store.hover?.probe.temperature).toBe(80);
+    readings.hover(null);
+    readings.pictureIsOf(3);
+    await vi.advanceTimersByTimeAsync(1500);
+    expect(all()).toHaveLength(2);
+  });
+
+  it('go where nothing is any more', async () => {
+    for (const gone of ['far', 'empty', 'no scene'] as const) {
+      const { store, readings, asked } = setUp();
+      const all = () => probes(asked) as typeof asked;
+      void readings.pin({ x: 5, y: 6 });
+      await later();
+      await all()[0]!.answer({ ...PROBE, distance: 0.01 });
+      await vi.advanceTimersByTimeAsync(1000);
+      if (gone === 'no scene') readings.clear();
+      else readings.askFacts();
+      await later();
+      if (gone === 'far') await all()[1]!.answer({ ...PROBE, distance: 0.5 });
+      const nothing = new RpcError({ code: -32004, message: 'none', data: { field: '', reason: 'the scene has no vertex' } });
+      if (gone === 'empty') await all()[1]!.refuse(nothing);
+      expect(store.pinned, gone).toBeNull();
+    }
+  });
+});
+
+describe('How much is highlighted', () => {
+  it('is known of exactly the settings for which it was asked', async () => {
+    const { store, readings, asked } = setUp();
+    readings.askHistogram();
+    await asked[0]!.answer(golden('scene.histogram'));
+    expect(store.isShareKnown).toBe(true);
+    // Wanted, and not answered yet; then in force, and not asked for yet.
+    store.wanted = { params: { threshold: 35 } };
+    expect(store.isShareKnown).toBe(false);
+    store.wanted = null;
+    expect(store.isShareKnown).toBe(true);
+    store.fusionInForce = { ...FUSION, params: { threshold: 35 } };
+    expect(store.isShareKnown).toBe(false);
+    // An answer for settings of before.
+    await vi.advanceTimersByTimeAsync(200);
+    readings.askHistogram();
+    await later();
+    store.generation += 1;
+    await asked[1]!.answer(golden('scene.histogram'));
+    expect([store.isShareKnown, store.histogram?.highlighted_share]).toEqual([false, undefined]);
+  });
+
+  it('is not what a robot says that does not know yet what is shown here', async () => {
+    const { store, readings, asked, picture } = setUp();
+    store.fusingPlace = 'here';
+    store.histogram = { edges: [0, 1], counts: [1], mean: 0, sigma: 0, highlighted: [[30, 40]], highlighted_share: 0.5 };
+    picture.isBusy = true;
+    readings.askHistogram();
+    await asked[0]!.answer(golden('scene.histogram'));
+    expect(store.histogram).toMatchObject({ highlighted: [[30, 40]], highlighted_share: 0.5 });
+    expect(store.histogram.edges).toEqual((golden('scene.histogram') as { edges: number[] }).edges);
+    expect([store.isShareKnown, Object.keys(store.highlighting)]).toEqual([false, []]);
   });
 });
 

@@ -9,14 +9,22 @@ import {
   type Vec3,
 } from '../protocol/messages';
 import { Coalescer } from '../transport/coalescer';
-import { RpcError } from '../transport/connection';
+import { BUSY, RpcError } from '../transport/connection';
 import type { ProbedVertex } from '../draw/render_messages';
 import type { Window } from '../view/markers';
+import { highlightKey } from './fusion_change';
 import type { Store } from './store.svelte';
 
 const HISTOGRAM_BINS = 192;
 const HISTOGRAM_INTERVAL_MS = 100;
 const HOVER_INTERVAL_MS = 120;
+/** Least time between two readings of the same place, which are of another scene. */
+const AGAIN_INTERVAL_MS = 1000;
+/** RpcError.code where there is nothing to read. */
+const NO_SCENE = -32004;
+/** What is read again may be so far from where it was pinned, in distances of the vertex that was read first, and in diagonals of the scene. */
+const REACH_OF_DISTANCE = 3;
+const REACH_OF_SCENE = 0.01;
 
 type Place = { x: number; y: number };
 
@@ -35,6 +43,8 @@ export interface ReadingsSession {
   request: (method: string, params: object) => Promise<unknown>;
   onExtremes: (extremes: Extremes | null) => void;
   onProblem: (error: unknown) => void;
+  /** Settings are on their way to the server, or it has not answered yet. */
+  isBusy: () => boolean;
   /** The nearest vertex of what is drawn, where raw values of it are here; null where not. */
   probeHere: (point: Vec3) => Promise<ProbedVertex | null>;
 }
@@ -43,7 +53,12 @@ export interface ReadingsSession {
 export class Readings {
   readonly #histogramAsker: Coalescer<true>;
   readonly #hoverAsker: Coalescer<Place>;
-  #isHovering = false;
+  readonly #againAsker: Coalescer<true>;
+  /** Under the pointer. */
+  #hovered: Place | null = null;
+  /** Where in the scene the pinned reading was asked for, and from how far a vertex may answer for it. */
+  #pinnedAt: { point: Vec3; reach: number } | null = null;
+  #shownRevision: number | null = null;
 
   constructor(
     private readonly store: Store,
@@ -62,11 +77,18 @@ export class Readings {
       interval_ms: HOVER_INTERVAL_MS,
       max_in_flight: 1,
     });
+    this.#againAsker = new Coalescer({
+      send: () => this.#readAgain(),
+      merge: () => true,
+      interval_ms: AGAIN_INTERVAL_MS,
+      max_in_flight: 1,
+    });
   }
 
   /** A new connection: what the one before was asked is not answered any more. */
   beginConnection(): void {
     this.#histogramAsker.reset();
+    this.#againAsker.reset();
   }
 
   /** There is no scene to read. */
@@ -88,6 +110,7 @@ export class Readings {
     const { store } = this;
     if (!store.scene || !store.pictureStands) return;
     this.askHistogram();
+    this.#againAsker.push(true);
     this.session
       .request('scene.extremes', {})
       .then((answer) => {
@@ -110,9 +133,16 @@ export class Readings {
     }
   }
 
+  /** All of this revision of the scene is on the screen: something else may be under the pointer. */
+  pictureIsOf(revision: number): void {
+    if (revision === this.#shownRevision) return;
+    this.#shownRevision = revision;
+    this.#againAsker.push(true);
+  }
+
   /** The pointer is over this place of the canvas; null when it has left. */
   hover(place: Place | null): void {
-    this.#isHovering = place !== null;
+    this.#hovered = place;
     if (place === null) {
       this.#hoverAsker.reset();
       this.store.hover = null;
@@ -131,6 +161,7 @@ export class Readings {
       }
       const answer = await this.#probe(point);
       if (answer === null) return;
+      this.#pinnedAt = { point, reach: this.#reach(answer) };
       this.store.pinned = { reading: { ...place, probe: answer }, place: this.picture.project(answer.position) };
     } catch (error) {
       this.session.onProblem(error);
@@ -163,16 +194,57 @@ export class Readings {
   }
 
   async #askHistogram(): Promise<void> {
-    if (!this.store.scene || !this.store.pictureStands) return;
+    const { store, session } = this;
+    if (!store.scene || !store.pictureStands) return;
+    const { generation } = store;
+    // What is shown here is told to the robot later.
+    const isTold = () => store.fusingPlace !== 'here' || !session.isBusy();
+    const wasTold = isTold();
     try {
-      const answer = await this.session.request('scene.histogram', { bins: HISTOGRAM_BINS });
-      const found = histogram(answer, 'scene.histogram');
-      const method = this.store.fusionInForce?.method;
-      if (found.highlighted_share !== undefined && method !== undefined) this.store.highlighting[method] = true;
-      this.store.histogram = found;
+      const answer = await session.request('scene.histogram', { bins: HISTOGRAM_BINS });
+      const { highlighted, highlighted_share, ...rest } = histogram(answer, 'scene.histogram');
+      const { fusionInForce: fusion, histogram: before } = store;
+      if (fusion !== null && generation === store.generation && wasTold && isTold()) {
+        if (highlighted_share !== undefined) store.highlighting[fusion.method] = true;
+        store.histogram = { ...rest, highlighted, ...(highlighted_share === undefined ? {} : { highlighted_share }) };
+        store.shareOf = highlightKey(fusion);
+      } else if (store.fusingPlace === 'here' && before !== null) {
+        store.histogram = { ...before, ...rest };
+      } else {
+        // Other settings are in force meanwhile, for which it is asked for again.
+        store.histogram = { ...rest, highlighted };
+        store.shareOf = null;
+      }
     } catch (error) {
       this.session.onProblem(error);
     }
+  }
+
+  #reach({ distance }: Probe): number {
+    const { min, max } = this.store.scene?.bounds ?? { min: [0, 0, 0], max: [0, 0, 0] };
+    const diagonal = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
+    return Math.max(REACH_OF_DISTANCE * distance, REACH_OF_SCENE * diagonal);
+  }
+
+  /** The scene is another one: what is said of a place is of now, and of a place with nothing nothing is said. */
+  async #readAgain(): Promise<void> {
+    const { store } = this;
+    if (!store.connected) return;
+    if (this.#hovered !== null) this.#hoverAsker.push(this.#hovered);
+    const at = this.#pinnedAt;
+    if (at === null || store.pinned === null) return;
+    let answer: Probe | null = null;
+    try {
+      answer = probe(await this.session.request('scene.probe', { position: at.point }), 'scene.probe');
+    } catch (error) {
+      if (error instanceof RpcError && error.code === BUSY) return this.#againAsker.push(true);
+      if (!(error instanceof RpcError && error.code === NO_SCENE)) return this.session.onProblem(error);
+    }
+    if (at !== this.#pinnedAt || store.pinned === null) return;
+    store.pinned =
+      answer === null || answer.distance > at.reach
+        ? null
+        : { reading: { ...store.pinned.reading, probe: answer }, place: this.picture.project(answer.position) };
   }
 
   /** At full accuracy by the robot; without a link by what is here, if anything is. */
@@ -194,7 +266,7 @@ export class Readings {
       const point = await this.picture.pick(place.x, place.y);
       if (point !== null) this.picture.aimAt(point);
       const answer = point && (await this.#probe(point));
-      this.store.hover = answer === null || !this.#isHovering ? null : { ...place, probe: answer };
+      this.store.hover = answer === null || this.#hovered === null ? null : { ...place, probe: answer };
     } catch {
       this.store.hover = null;
     }

@@ -111,6 +111,7 @@ export class Session {
       request,
       onExtremes: (found) => this.#markers.extremesAre(found),
       onProblem: say,
+      isBusy: () => this.settings.busy,
       probeHere: async (point) => (this.fusing.isHere ? this.viewport.probe(point) : null),
     });
     this.#markers = new Markers(
@@ -433,6 +434,7 @@ export class Session {
     this.tiles.settle();
     this.store.shown = this.tiles.counts();
     this.#markers.update();
+    this.readings.pictureIsOf(message.scene_revision);
     this.#progress.completed(message);
     this.fusing.completed();
   }

@@ -367,4 +367,19 @@ describe('Settings that are fused here', () => {
     expect(store.fusion).toEqual(fusionWith(0.4));
     expect(asked).toHaveLength(0);
   });
+
+  it('are refused at the value that was changed, whichever of two the sentence begins with', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    settings.setParameter('high', 5, true);
+    await asked[0]?.refuse(refusal('params.low', 'low must not be above high'));
+    expect(store.refusals).toEqual({ 'params.high': 'low must not be above high' });
+    store.fusionInForce = { ...fusionWith(0.4), params: { low: 9, high: null } };
+    fuseHere(() => {
+      throw new FusionRefusal(105, 'low', 'low must not be above high');
+    });
+    settings.setParameter('high', 4, true);
+    expect(store.refusals).toEqual({ 'params.high': 'low must not be above high' });
+    settings.setParameter('low', 30, true);
+    expect(store.refusals).toEqual({ 'params.low': 'low must not be above high' });
+  });
 });

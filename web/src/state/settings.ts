@@ -200,7 +200,7 @@ export class Settings {
         // Too fast for the server, not wrong: the newest wish is still to be told.
         await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
         if (this.store.connected) this.#sender.push(this.store.wanted ?? change);
-      } else if (error instanceof RpcError) this.refused(error);
+      } else if (error instanceof RpcError) this.refused(error, change);
       else if (error instanceof ConnectionLost) this.#hasUnanswered = true;
       else this.session.onProblem(error);
     }
@@ -218,9 +218,9 @@ export class Settings {
     if (isNew) this.session.onInForce();
   }
 
-  /** Shows a refusal at the field it is about. */
-  refused(error: RpcError): void {
-    this.store.refusals = { ...this.store.refusals, [error.field ?? '']: error.message };
+  /** Shows a refusal at the field it is about, or at the one that was changed. */
+  refused(error: RpcError, change: FusionChange = {}): void {
+    this.store.refusals = { ...this.store.refusals, [refusedField(error.field ?? '', change)]: error.message };
   }
 
   #change(change: FusionChange, isSettled: boolean): void {
@@ -247,7 +247,7 @@ export class Settings {
       if (!(error instanceof FusionRefusal)) throw error;
       store.wanted = null;
       const field = error.field in (store.fusion?.params ?? {}) ? `params.${error.field}` : error.field;
-      store.refusals = { [field]: error.message };
+      store.refusals = { [refusedField(field, change)]: error.message };
       return true;
     }
     store.wanted = null;
@@ -267,7 +267,7 @@ export class Settings {
       this.store.generation = Math.max(this.store.generation, generation);
     } catch (error) {
       if (error instanceof RpcError && error.code === BUSY) this.#teller.push(change);
-      else if (error instanceof RpcError) this.refused(error);
+      else if (error instanceof RpcError) this.refused(error, change);
       else this.session.onProblem(error);
     }
   }
@@ -293,4 +293,11 @@ export class Settings {
   #rememberFused(fusion: Fusion): void {
     if (viewModeOf(fusion.method) === 'fused') this.#lastFusedMethod = fusion.method;
   }
+}
+
+/** Of two values that contradict each other, the one that somebody has just changed is refused, whichever the sentence begins with. */
+function refusedField(field: string, { method, params }: FusionChange): string {
+  const changed = Object.keys(params ?? {}).map((name) => `params.${name}`);
+  const isOfAnother = method === undefined && field.startsWith('params.') && !changed.includes(field);
+  return isOfAnother ? (changed.at(-1) ?? field) : field;
 }

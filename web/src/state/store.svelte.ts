@@ -22,7 +22,7 @@ import type { PartFailure } from '../transport/part_loader';
 import { type LinkState, QUIET_MS } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
-import { withChange } from './fusion_change';
+import { highlightKey, withChange } from './fusion_change';
 import { MapAge } from './map_age';
 import { type Note, notesOf } from './notes';
 import type { Robot } from './robot';
@@ -86,6 +86,8 @@ export class Store {
   refusals = $state<Record<string, string>>({});
 
   histogram = $state.raw<Histogram | null>(null);
+  /** Of which settings the histogram says how much is highlighted: their highlightKey; null: of none that are known. */
+  shareOf = $state<string | null>(null);
   /** Methods that are known to highlight. */
   readonly highlighting: Record<string, true> = {};
   extremes = $state.raw<Extremes | null>(null);
@@ -168,6 +170,8 @@ export class Store {
   readonly range = $derived(
     (this.wanted?.range !== undefined && this.wanted.range.mode !== 'manual' ? this.fusionInForce : this.fusion)?.range ?? null,
   );
+  /** How much is highlighted is known of exactly what the controls show. */
+  readonly isShareKnown = $derived(this.fusion !== null && this.shareOf === highlightKey(this.fusion));
   readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
   readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
   readonly hasThermal = $derived(this.scene?.temperature.min != null);

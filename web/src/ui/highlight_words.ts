@@ -25,6 +25,9 @@ function places(highlighted: readonly (readonly [number, number])[], lowest: num
     .join(' or ');
 }
 
+/** How much is highlighted is not known yet. */
+export const NOT_KNOWN_YET = '…';
+
 /**
  * One sentence: "0.3 % of the surface, above 27.4 °C", or that nothing is highlighted; and of thresholds that lie beyond the
  * data that they do. Null for a method that shows all temperatures alike.
