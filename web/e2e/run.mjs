@@ -362,7 +362,9 @@ test('A click reads the temperature', async () => {
   // Nothing of the picture shows through, and no label lies over it.
   const look = await card.evaluate((element) => {
     const { backgroundColor, zIndex } = getComputedStyle(element);
-    const labels = [...document.querySelectorAll('.label, .mark')].map((other) => Number(getComputedStyle(other).zIndex));
+    const labels = [...document.querySelectorAll('[data-mark], [data-mark] + .label')].map((other) =>
+      Number(getComputedStyle(other).zIndex),
+    );
     return { backgroundColor, isAbove: labels.every((other) => other < Number(zIndex)) };
   });
   assert.match(look.backgroundColor, /^rgb\(/, 'opaque');

@@ -53,6 +53,29 @@ describe('the progress of a picture', () => {
     expect(store.behindSince).toBeNull();
   });
 
+  it('is not behind of settings that were refused', () => {
+    const { store, clock, progress } = setUp();
+    store.generation = 4;
+    store.complete = complete(4);
+    progress.begin(true);
+    clock.isBusy = true;
+    progress.tick();
+    expect(store.behindSince).toBe(1000);
+    // Taken, they are another generation, which is to come.
+    clock.isBusy = false;
+    store.generation = 5;
+    progress.tick();
+    expect(store.behindSince).toBe(1000);
+    store.generation = 4;
+    progress.tick();
+    expect(store.behindSince).toBeNull();
+    // The scene is another one, too.
+    progress.begin();
+    progress.begin(true);
+    progress.tick();
+    expect(store.behindSince).toBe(1000);
+  });
+
   it('is the share of the tiles: of all there may be before the first picture, of those that are wanted after it', () => {
     const { store, tiles, progress } = setUp();
     store.scene = { tile_count: 8 } as Scene;

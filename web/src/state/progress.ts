@@ -18,6 +18,9 @@ export class Progress {
   /** Settings that are shown here and are in no picture yet, by the number of the picture that they will be in. */
   #here: { picture: number; method: string; at: number }[] = [];
 
+  /** What the picture is behind of are settings alone. */
+  #mayBeRefused = false;
+
   /** `isBusy`: settings are still on their way to the server. */
   constructor(
     private readonly store: Store,
@@ -26,9 +29,11 @@ export class Progress {
     private readonly now: () => number = () => performance.now(),
   ) {}
 
-  /** Another picture was asked for, or announced. */
-  begin(): void {
-    if (this.store.behindSince !== null) return;
+  /** Another picture was asked for, or announced. `mayBeRefused`: by settings, of which the server may want no other picture. */
+  begin(mayBeRefused = false): void {
+    const isBehind = this.store.behindSince !== null;
+    this.#mayBeRefused = mayBeRefused && (!isBehind || this.#mayBeRefused);
+    if (isBehind) return;
     this.store.behindSince = this.now();
     this.#bytesBefore = this.store.received_bytes;
   }
@@ -80,6 +85,9 @@ export class Progress {
     const now = this.now();
     this.#window = this.#window.filter(({ at }) => now - at < RATE_MS);
     store.rate_bytes_per_s = (this.#window.reduce((sum, { bytes }) => sum + bytes, 0) / RATE_MS) * 1000;
+    // What was refused changes no picture: nothing more comes.
+    const isShown = store.complete !== null && store.complete.generation >= store.generation;
+    if (this.#mayBeRefused && isShown && !this.isBusy()) store.behindSince = null;
     // What is made here comes into the picture all at once.
     if (store.hereSince !== null) store.progress = 0;
     else if (store.behindSince !== null) store.progress = this.#share();

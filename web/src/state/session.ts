@@ -166,7 +166,7 @@ export class Session {
     const onChange = (): void => this.#progress.begin();
     this.settings = new Settings(store, {
       request,
-      onChange,
+      onChange: () => this.#progress.begin(true),
       onInForce: () => this.readings.askHistogram(),
       onProblem: say,
       fuseHere: (wanted) => this.fusing.apply(wanted),
