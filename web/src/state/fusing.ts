@@ -102,7 +102,7 @@ export class Fusing {
     if (this.#wantsRaw) this.factsChanged();
   }
 
-  /** There is no scene: the picture of the next one comes from the robot first. */
+  /** There is no scene any more, or another one: its picture comes from the robot first. */
   sceneGone(): void {
     this.#facts = null;
     this.#factsNumber += 1;

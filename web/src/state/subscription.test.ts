@@ -188,13 +188,15 @@ describe('a subscription', () => {
   });
 
   it('keeps tiles of the same scene on a new connection, and none of another one', () => {
-    const { subscription, diary } = setUp();
+    const { subscription, diary, concerned } = setUp();
     const cleared = () => diary.filter((what) => what === 'tiles cleared').length;
     subscription.greeted(HELLO);
     subscription.greeted(HELLO);
     expect(cleared()).toBe(0);
+    expect(concerned.fusing.sceneGone).not.toHaveBeenCalled();
     subscription.greeted({ ...HELLO, scene: { ...HELLO.scene!, name: 'another' } });
     expect(cleared()).toBe(1);
+    expect(concerned.fusing.sceneGone).toHaveBeenCalledOnce();
     // A running connection says itself what goes.
     subscription.sceneChanged({ ...HELLO.scene!, name: 'a third' } as Scene);
     expect(cleared()).toBe(1);

@@ -173,7 +173,10 @@ export class Subscription {
     }
     const same = before?.name === next.name;
     // A running connection says itself what goes; what a new one does not know of must go when it is of another scene.
-    if (fresh && before && !(same && JSON.stringify(before.origin) === JSON.stringify(next.origin))) tiles.clear();
+    if (fresh && before && !(same && JSON.stringify(before.origin) === JSON.stringify(next.origin))) {
+      fusing.sceneGone();
+      tiles.clear();
+    }
     look.sceneIs(next);
     quality.sceneHasStep(next.position_step_m);
     if (!same) {
