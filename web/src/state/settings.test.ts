@@ -280,6 +280,17 @@ describe('Settings', () => {
     store.scene = null;
     settings.reconsiderMissing();
     expect(asked).toHaveLength(3);
+    // What the user has said holds again where anything has a temperature.
+    store.scene = { temperature: { min: 10 } } as unknown as NonNullable<Store['scene']>;
+    settings.setMissing('#ff00ff', true);
+    await asked.at(-1)?.answer(4, { ...fusionWith(1, 'thermal_only'), missing: '#ff00ff' });
+    sceneWith(null);
+    await vi.advanceTimersByTimeAsync(100);
+    expect(asked.at(-1)?.change).toEqual({ missing: 'visible' });
+    await asked.at(-1)?.answer(5, fusionWith(1, 'thermal_only'));
+    sceneWith(10);
+    await vi.advanceTimersByTimeAsync(100);
+    expect(asked.at(-1)?.change).toEqual({ missing: '#ff00ff' });
   });
 
   it('names a range that follows the scene once it is in force, and one that is held at once', async () => {

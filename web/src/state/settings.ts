@@ -50,6 +50,8 @@ export class Settings {
   /** How the range followed the scene before it was held, and which percentiles it last had. */
   #following: RangeChange = FIRST_PERCENTILES;
   #percentiles: RangeChange = FIRST_PERCENTILES;
+  /** What the user has said of vertices without temperature; null: nothing. */
+  #chosenMissing: string | null = null;
   /** The user has chosen settings; those of a first view are the server's, which knows the scene. */
   #hasChosen = false;
   /** By generation, of this connection. */
@@ -122,6 +124,7 @@ export class Settings {
   /** A colour, "visible", or "automatic": a colour in the view of temperatures alone, where a visible colour would be read as one of them. */
   setMissing(missing: string, settled: boolean): void {
     this.store.missingIsAutomatic = missing === 'automatic';
+    this.#chosenMissing = this.store.missingIsAutomatic ? null : missing;
     if (!this.store.missingIsAutomatic) this.#change({ missing }, settled);
     else if (this.store.fusion !== null) {
       const change = this.#missingFor(this.store.fusion.method, this.store.fusion.palette);
@@ -274,10 +277,18 @@ export class Settings {
 
   /** What is to be said of vertices without temperature beside another method or palette; where none has one, all show the visible colours. */
   #missingFor(method: string, palette_id: string): Pick<FusionChange, 'missing'> {
-    const palette = this.store.palettes.find(({ id }) => id === palette_id);
-    if (!this.store.missingIsAutomatic || palette === undefined) return {};
-    const missing = viewModeOf(method) === 'thermal' && this.store.hasThermal ? unmeasuredColour(palette) : 'visible';
-    return missing === this.store.fusion?.missing ? {} : { missing };
+    const missing = this.#missingWanted(method, palette_id);
+    return missing === null || missing === this.store.fusion?.missing ? {} : { missing };
+  }
+
+  /** Null: as it is. */
+  #missingWanted(method: string, palette_id: string): string | null {
+    const { palettes, scene, hasThermal, missingIsAutomatic } = this.store;
+    if (scene != null && !hasThermal) return 'visible';
+    if (!missingIsAutomatic) return this.#chosenMissing;
+    const palette = palettes.find(({ id }) => id === palette_id);
+    if (palette === undefined) return null;
+    return viewModeOf(method) === 'thermal' && hasThermal ? unmeasuredColour(palette) : 'visible';
   }
 
   /** A temperature that both methods have by the same name is the user's, not the method's: it goes along. */
