@@ -46,11 +46,11 @@ async function put(block, height = 0) {
 
 /** Coarse tiles have followed what was put. */
 async function still() {
-  for (let before = null; ; ) {
+  for (let before = null, unchanged = 0; unchanged < 4; ) {
     const { revision } = await (await fetch(`${server.url}/api/v1/scene`)).json();
-    if (revision === before) return;
+    unchanged = revision === before ? unchanged + 1 : 0;
     before = revision;
-    await sleep(500);
+    await sleep(400);
   }
 }
 
