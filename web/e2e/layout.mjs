@@ -1,7 +1,10 @@
 // The controls on every screen that people bring: nothing is cut, nothing lies over something else, a finger finds its targets, and
 // the keyboard and other aids reach everything.
 import assert from 'node:assert/strict';
-import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { execFileSync } from 'node:child_process';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { drawn, openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
 
 /** Width and height in CSS pixels; `touch` screens have no mouse. */
 const SCREENS = [
@@ -15,6 +18,43 @@ const SCREENS = [
   { width: 2560, height: 1440 },
   { width: 3840, height: 2160 },
 ];
+
+/** Sizes at which one page is looked at with all that it may have to say; `touch` as above. */
+const CROWDED = [
+  { width: 360, height: 740, touch: true },
+  { width: 320, height: 568, touch: true },
+  { width: 740, height: 360, touch: true },
+  { width: 1180, height: 820, touch: true },
+  { width: 320, height: 256 },
+  { width: 640, height: 360 },
+  { width: 1000, height: 700 },
+];
+
+/** A picture that comes slowly, of a map that grows: everything that can be long is. */
+function crowd(page) {
+  return page.evaluate(() => {
+    const { store, tiles } = globalThis.spectra;
+    tiles.drawnError = () => ({ position_m: 0.1234, colour_levels: 43.2, rounding_levels: 0.5, temperature_celsius: 0.406 });
+    tiles.counts = () => ({ ...store.shown, vertices: 20_100 });
+    store.shown = { ...store.shown, vertices: 20_100 };
+    setInterval(() => {
+      store.behindSince = performance.now() - 13_900;
+      store.heardAt = performance.now();
+    }, 20);
+    store.scene = { ...store.scene, live: true, vertex_count: 28_300, triangle_count: 56_000 };
+    const up = { min: [0, 0, 0], max: [1, 1, 1] };
+    store.robot = { position: up.min, forward: [1, 0, 0], up: [0, 0, 1], isLost: true, path: [up.min, up.max] };
+    store.statuses = [
+      {
+        id: 'scene.no_temperature',
+        level: 'info',
+        message:
+          'block unit_1_1_1: 1256 vertices without a temperature, which have the colour of what was not measured until something measures them (and 21 more blocks)',
+      },
+      { id: 'map', level: 'info', message: 'Frames are late.' },
+    ];
+  });
+}
 
 /** What the page shows, as boxes: controls and texts with what cuts them, and the parts that must not lie over each other. */
 function boxes(page) {
@@ -53,8 +93,8 @@ function boxes(page) {
       for (const item of footer.querySelectorAll('.item')) {
         if (!seen(item)) continue;
         const box = item.getBoundingClientRect();
-        const isIn = box.top < bar.bottom - 1 && box.bottom > bar.top + 1;
         const room = item.parentElement.getBoundingClientRect();
+        const isIn = box.top < room.bottom - 1 && box.bottom > room.top + 1;
         if (isIn && (box.left < room.left - 0.5 || box.right > room.right + 0.5 || box.bottom > bar.bottom + 0.5))
           problems.push(`the status bar cuts ${name(item)}`);
       }
@@ -62,7 +102,7 @@ function boxes(page) {
     // Texts of the axis: a digit that the edge swallows makes 27.4 a 7.4, and two over each other are none.
     const axis = document.querySelector('.axis');
     const labels = texts
-      .filter((element) => axis?.contains(element) && !element.matches('.announced, .announced *'))
+      .filter((element) => axis?.contains(element))
       .map((element) => {
         const range = document.createRange();
         range.selectNodeContents(element);
@@ -88,7 +128,9 @@ function boxes(page) {
           problems.push(`${a.of} and ${b.of} of the axis lie over each other: ${width.toFixed(1)} x ${height.toFixed(1)}`);
       }
     const parts = [
-      ...document.querySelectorAll('.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .strong, .card, .show'),
+      ...document.querySelectorAll(
+        '.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .strong, .card, .show, [title^="Go along"]',
+      ),
     ].filter(seen);
     for (const [i, a] of parts.entries())
       for (const b of parts.slice(i + 1)) {
@@ -124,7 +166,7 @@ function boxes(page) {
   });
 }
 
-export function addLayoutTests(browser) {
+export function addLayoutTests(browser, scratch) {
   for (const { width, height, touch } of SCREENS) {
     test(`Nothing is cut and nothing lies over something else at ${width} x ${height}`, async () => {
       const server = await startServer(['--demo']);
@@ -201,6 +243,119 @@ export function addLayoutTests(browser) {
       await context.close();
     });
   }
+
+  for (const touch of [true, false]) {
+    test(`A slow picture of a growing map: its words are whole and beside each other, ${touch ? 'under a finger' : 'with a mouse'}`, async () => {
+      const file = join(scratch, 'few.ply');
+      execFileSync(PROGRAM, ['demo-scene', file, '--vertices', '5000']);
+      const server = await startServer([file]);
+      const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, hasTouch: touch, isMobile: touch });
+      const { page, problems } = await openClient(context, server.url, null);
+      await settled(page);
+      await page.locator('aside.panel').waitFor();
+      await crowd(page);
+      await page.getByText('Robot lost its place').waitFor();
+      const faults = [];
+      const set = async (change) => {
+        await page.evaluate((values) => Object.assign(globalThis.spectra.store, values), change);
+        for (let i = 0; i < 4; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+      };
+      for (const size of CROWDED.filter((one) => (one.touch === true) === touch)) {
+        const name = `${size.width}x${size.height}`;
+        await page.setViewportSize({ width: size.width, height: size.height });
+        await page.waitForFunction((wide) => globalThis.spectra.viewport.size[0] === wide, size.width);
+        const look = async (what) => {
+          const { problems: found, targets } = await boxes(page);
+          if (what === 'note') await screenshot(page, `crowded-${name}`);
+          faults.push(...found.map((fault) => `${name}, ${what}: ${fault}`));
+          const small = targets.filter((target) => target.width < 43.5 || target.height < 43.5);
+          if (touch) faults.push(...small.map((one) => `${name}, ${what}: smaller than a finger: ${JSON.stringify(one)}`));
+        };
+        await set({ closedNotes: [] });
+        await look('note');
+        const bar = (await page.locator('footer').innerText()).replace(/\s+/g, ' ');
+        assert.match(bar, /coarse: within [\d.]+ (cm|units), 44 levels, 0\.41 °C/, name);
+        assert.match(bar, /13\.\d s behind/, name);
+        await page.evaluate(() => {
+          const { store } = globalThis.spectra;
+          const range = { ...store.fusionInForce.range, mode: 'percentile' };
+          store.fusionInForce = { ...store.fusionInForce, range: { ...range, max: (range.max ?? 30) + 0.1 } };
+        });
+        await set({});
+        await look('range');
+        // Closed notes stay closed whatever they count by now, and can be had again.
+        while ((await page.getByLabel('Close this note').count()) > 0) await page.getByLabel('Close this note').first().click();
+        await page.evaluate(() => {
+          const { store } = globalThis.spectra;
+          store.statuses = store.statuses.map((one) => ({ ...one, message: one.message.replaceAll('1', '2') }));
+        });
+        await set({});
+        assert.equal(await page.locator('[data-notice]').count(), 0, `${name}: a note has come back`);
+        await page.locator('footer .notes').click({ timeout: 5000 });
+        await set({});
+        await look('notes');
+        await set({ notesOpen: false });
+        const complete = await page.evaluateHandle(() => globalThis.spectra.store.complete);
+        await set({ complete: null });
+        await look('loading');
+        await page.evaluate((value) => (globalThis.spectra.store.complete = value), complete);
+        await page.evaluate(() => {
+          const { store, tiles } = globalThis.spectra;
+          globalThis.drawnGenerations ??= tiles.drawnGenerations;
+          tiles.drawnGenerations = () => [null];
+          store.pictureMethod = 'visible_only';
+          store.shownMethods = ['visible_only'];
+          store.closedNotes = [];
+        });
+        await page.locator('[data-pending-method]').waitFor();
+        await set({});
+        await look('sign');
+        await page.evaluate(async () => {
+          const { width, height } = document.querySelector('canvas').getBoundingClientRect();
+          for (let i = 399; i >= 0; i -= 1) {
+            const at = { x: ((i % 20) + 0.5) * (width / 20), y: (Math.floor(i / 20) + 0.5) * (height / 20) };
+            if (await globalThis.spectra.viewport.pick(at.x, at.y)) return globalThis.spectra.pin(at);
+          }
+        });
+        await page.locator('.card').waitFor();
+        await set({});
+        await look('sign and reading');
+        await page.evaluate(() => {
+          const { store, tiles } = globalThis.spectra;
+          globalThis.spectra.unpin();
+          tiles.drawnGenerations = globalThis.drawnGenerations;
+          store.shownMethods = [store.fusion.method];
+          store.pictureMethod = store.fusion.method;
+        });
+      }
+      assert.deepEqual(faults, []);
+      assert.deepEqual(problems, []);
+      await context.close();
+      await server.stop();
+    });
+  }
+
+  test('A scene of one temperature has one number for both ends of its range', async () => {
+    const file = join(scratch, 'one-temperature.ply');
+    const head =
+      'ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n' +
+      'property uchar green\nproperty uchar blue\nproperty float temperature\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n';
+    const corners = ['0 0 0', '1 0 0', '1 1 0', '0 1 0'].map((place) => `${place} 40 90 200 21\n`).join('');
+    writeFileSync(file, `${head}${corners}3 0 1 2\n3 0 2 3\n`);
+    const server = await startServer([file]);
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    await page.locator('.handle.range').first().waitFor();
+    for (const { width, height } of CROWDED.filter(({ width }) => width < 1000)) {
+      await page.setViewportSize({ width, height });
+      await page.waitForFunction((wide) => globalThis.spectra.viewport.size[0] === wide, width);
+      for (let i = 0; i < 2; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
+      assert.deepEqual((await boxes(page)).problems, [], `${width} x ${height}`);
+      assert.deepEqual(await page.locator('.handle.range text').allTextContents(), ['21.0'], `${width} x ${height}`);
+    }
+    await page.close();
+    await server.stop();
+  });
 
   test('On a phone too, the marks tell the hottest of all that is seen', async () => {
     const server = await startServer(['--demo']);
@@ -353,6 +508,23 @@ export function addLayoutTests(browser) {
     const column = [];
     for (let y = slider.y; y < slider.y + slider.height; y += 1) column.push(image.at(slider.x + slider.width * 0.9, y).join());
     assert.ok(new Set(column).size > 1, 'the track of a slider cannot be seen');
+    await page.evaluate(() => globalThis.spectra.settings.setMethod('intensity_hue'));
+    // Switches, and the marks of palettes, are painted.
+    for (const selector of ['.toggle input[role=switch]', '.legend .safe', '.legend .sided']) {
+      const part = page.locator(selector).first();
+      await part.waitFor();
+      await part.scrollIntoViewIfNeeded();
+      const box = await part.boundingBox();
+      const lower = await screenshot(page, 'forced-colours-lower');
+      const seen = new Set();
+      for (let y = 0; y < box.height; y += 1) seen.add(lower.at(box.x + box.width / 2, box.y + y).join());
+      for (let x = 0; x < box.width; x += 1) seen.add(lower.at(box.x + x, box.y + box.height / 2).join());
+      const beside = lower.at(box.x - 3, box.y + box.height / 2).join();
+      assert.ok(
+        [...seen].some((colour) => colour !== beside),
+        `${selector} cannot be seen`,
+      );
+    }
     await context.close();
     await server.stop();
   });

@@ -587,7 +587,7 @@ addAccuracyTests(browser);
 addAxeTests(browser);
 addFusingTests(browser, scratch);
 addKeptTests(browser, scratch);
-addLayoutTests(browser);
+addLayoutTests(browser, scratch);
 addLetteringTests(browser);
 addLinkTests(browser);
 addLiveTests(browser);

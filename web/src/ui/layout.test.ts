@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { cardPlace, isNarrow, labelPlaces, narrowCardRoom } from './layout';
+import { cardPlace, hasRoomForGizmo, isCramped, isNarrow, labelPlaces, narrowCardRoom } from './layout';
 
 describe('isNarrow', () => {
   it.each([
@@ -13,6 +13,18 @@ describe('isNarrow', () => {
     [640, 360, true],
   ])('%i x %i: %s', (width, height, expected) => {
     expect(isNarrow(width, height)).toBe(expected);
+  });
+});
+
+describe('isCramped', () => {
+  it.each([
+    [360, 740, true],
+    [740, 360, true],
+    [844, 390, true],
+    [1000, 500, false],
+    [1180, 820, false],
+  ])('%i x %i: %s', (width, height, expected) => {
+    expect(isCramped(width, height)).toBe(expected);
   });
 });
 
@@ -34,6 +46,15 @@ describe('cardPlace', () => {
         expect(top + size.height).toBeLessThanOrEqual(room.bottom);
       }
     }
+  });
+
+  it('stands beside or above what is kept free, if there is room', () => {
+    const kept = { left: 260, top: 300, right: 360, bottom: 400 };
+    expect(cardPlace({ x: 150, y: 390 }, { width: 100, height: 50 }, room, 14, kept)).toEqual({ left: 160, top: 326 });
+    expect(cardPlace({ x: 300, y: 390 }, size, room, 14, kept)).toEqual({ left: 106, top: 250 });
+    expect(cardPlace({ x: 230, y: 390 }, { width: 100, height: 50 }, room, 14, kept)).toEqual({ left: 160, top: 326 });
+    // Nowhere: over it.
+    expect(cardPlace({ x: 300, y: 390 }, { width: 250, height: 350 }, room, 14, kept)).toEqual({ left: 92, top: 26 });
   });
 
   it('begins at the left and the top of a room that is too small', () => {
@@ -65,6 +86,23 @@ describe('labelPlaces', () => {
 
   it('is left out where there is no room', () => {
     expect(labelPlaces([label(110, 10)], { ...room, right: 150, bottom: 20 }, 13)).toEqual([null]);
+  });
+});
+
+describe('hasRoomForGizmo', () => {
+  it.each([
+    [268, 370, null, 148, true],
+    [228, 274, null, 148, true],
+    [228, 260, null, 148, false],
+    [548, 172, null, 76, true],
+    [228, 99, null, 76, false],
+    [548, 70, null, 76, false],
+    // Beside a reading, below notices.
+    [268, 370, 67, 148, true],
+    [228, 273, 67, 148, false],
+    [548, 172, 100, 76, true],
+  ])('in %i x %i, with a reading and %s covered, of %i: %s', (width, height, covered, gizmo, expected) => {
+    expect(hasRoomForGizmo(width, height, covered, gizmo)).toBe(expected);
   });
 });
 

@@ -13,7 +13,7 @@ const isTouched = typeof matchMedia === 'function' && matchMedia('(pointer: coar
 export const GIZMO_SIZE = isTouched ? 148 : 76;
 
 /** Height of the status bar, which may hold a button; app.css has the same. */
-export const BAR_HEIGHT = isTouched ? 44 : 30;
+export const BAR_HEIGHT = isTouched ? 45 : 30;
 
 /** The panel becomes a sheet below the scene where it would leave too little beside it: phones, and tablets held upright. */
 export function isNarrow(width: number, height: number): boolean {
@@ -30,26 +30,55 @@ export function controlZoom(width: number): number {
   return width >= 2800 ? 1.5 : 1;
 }
 
+/** So little is left of the scene that only one thing has room over it: a phone, and a page that is hardly higher than one lying down. */
+export function isCramped(width: number, height: number): boolean {
+  return isNarrow(width, height) || height < 480;
+}
+
 /**
  * Left and top of a card of `size` beside a `place`: right of it and above, where that is within `room`, else mirrored, and in any
- * case pushed inside.
+ * case pushed inside; beside or above what is `kept` free, a corner of the room at its right and its bottom, if the room has place there.
  */
 export function cardPlace(
   place: { x: number; y: number },
   size: { width: number; height: number },
   room: Box,
   gap = 14,
+  kept: Box | null = null,
 ): { left: number; top: number } {
-  const left = place.x + gap + size.width <= room.right ? place.x + gap : place.x - gap - size.width;
-  const top = place.y - gap - size.height >= room.top ? place.y - gap - size.height : place.y + gap;
-  return {
-    left: clamp(left, room.left, room.right - size.width),
-    top: clamp(top, room.top, room.bottom - size.height),
-  };
+  const right = place.x + gap;
+  const above = place.y - gap - size.height;
+  const left = right + size.width <= room.right ? right : place.x - gap - size.width;
+  const top = above >= room.top ? above : place.y + gap;
+  const within = (x: number, y: number) => ({
+    left: clamp(x, room.left, room.right - size.width),
+    top: clamp(y, room.top, room.bottom - size.height),
+  });
+  const usual = within(left, top);
+  if (kept === null) return usual;
+  const isFree = (at: { left: number; top: number }) =>
+    !overlap({ ...at, right: at.left + size.width, bottom: at.top + size.height }, kept);
+  const others = [within(kept.left - size.width, top), within(left, kept.top - size.height)];
+  return [usual, ...others].find(isFree) ?? usual;
 }
+
+/** Least width of a notice that stands beside the orientation. */
+export const LEAST_NOTICE_WIDTH = 240;
+/** Least height of one that stands below it, with its margins. */
+const LEAST_NOTICE_HEIGHT = 122;
 
 /** Least size of a reading. */
 const CARD = { width: 200, height: 80 };
+
+/**
+ * Whether the scene of a narrow page, this wide and high, has room for the orientation and for a notice below or beside it; where there
+ * is a reading, for that as well, while notices cover `covered` of the height.
+ */
+export function hasRoomForGizmo(width: number, height: number, covered: number | null = null, gizmo = GIZMO_SIZE): boolean {
+  const hasNotice = height >= gizmo + LEAST_NOTICE_HEIGHT || (width >= gizmo + LEAST_NOTICE_WIDTH && height >= gizmo);
+  const hasCard = covered === null || height - covered >= gizmo + CARD.height + 16 || width >= gizmo + CARD.width + 16;
+  return hasNotice && hasCard;
+}
 
 /**
  * Where a card may stand on a narrow page, in `free`, which lies below the orientation: where that is too low, beside the orientation, and
