@@ -508,7 +508,7 @@ export function addLayoutTests(browser, scratch) {
     const column = [];
     for (let y = slider.y; y < slider.y + slider.height; y += 1) column.push(image.at(slider.x + slider.width * 0.9, y).join());
     assert.ok(new Set(column).size > 1, 'the track of a slider cannot be seen');
-    await page.evaluate(() => globalThis.spectra.settings.setMethod('intensity_hue'));
+    await page.evaluate(() => globalThis.spectra.settings.setMethod('colour_mapped_threshold'));
     // Switches, and the marks of palettes, are painted.
     for (const selector of ['.toggle input[role=switch]', '.legend .safe', '.legend .sided']) {
       const part = page.locator(selector).first();
