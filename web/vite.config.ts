@@ -29,7 +29,7 @@ export default defineConfig({
     cssCodeSplit: false,
     modulePreload: false,
     minify: 'terser',
-    terserOptions: { ecma: 2020, compress: { passes: 3, unsafe_arrows: true, keep_fargs: false } },
+    terserOptions: { ecma: 2020, compress: { passes: 3 } },
   },
   worker: { format: 'es', plugins: () => [leanThree(), shippedPackages()] },
   // By number: a machine without /etc/hosts does not know "localhost".

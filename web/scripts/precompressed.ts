@@ -19,7 +19,7 @@ export function precompressed(): Plugin {
         const plain = readFileSync(path);
         const versions = {
           br: brotliCompressSync(plain, { params: { [constants.BROTLI_PARAM_SIZE_HINT]: plain.length } }),
-          gz: await gzipAsync(plain, { numiterations: 10, blocksplittingmax: 0 }),
+          gz: await gzipAsync(plain, { numiterations: 15, blocksplittingmax: 0 }),
         };
         for (const [ending, version] of Object.entries(versions)) {
           if (version.length < plain.length) writeFileSync(`${path}.${ending}`, version);
