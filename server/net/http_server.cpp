@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
+#include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
@@ -64,6 +65,23 @@ void set_socket_options(tcp::socket& socket) {
   setsockopt(descriptor, IPPROTO_TCP, TCP_USER_TIMEOUT, &kUserTimeoutMs, sizeof kUserTimeoutMs);
 }
 
+/// Belongs to a coroutine, as its parameter: whatever way that ends, it runs no longer. One that finds no memory to wait with is taken apart by
+/// Asio without a word to whoever began it.
+class Running {
+ public:
+  explicit Running(std::atomic<bool>& is_running) : is_running_(&is_running) {}
+  Running(Running&& other) noexcept : is_running_(std::exchange(other.is_running_, nullptr)) {}
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  Running& operator=(Running&&) = delete;
+  ~Running() {
+    if (is_running_ != nullptr) *is_running_ = false;
+  }
+
+ private:
+  std::atomic<bool>* is_running_;
+};
+
 }  // namespace
 
 std::optional<ListenAddress> parsed_listen_address(std::string_view text) {
@@ -98,17 +116,17 @@ struct HttpServer::State {
         io(static_cast<int>(context.options.io_thread_count)),
         acceptor(asio::make_strand(io)),
         accept_timer(acceptor.get_executor()),
-        reserve_timer(acceptor.get_executor()),
         signals(acceptor.get_executor()),
         hangups(acceptor.get_executor()) {}
 
   void listen();
-  asio::awaitable<void> accept_connections();
+  /// To be called again and again: begins to accept, or to stop, also where that has ended for lack of memory, and fills the reserve.
+  /// Thread-safe.
+  void keep_going();
+  asio::awaitable<void> accept_connections(Running running);
   /// What is short, in words; empty when nothing is.
   asio::awaitable<std::string> accept_one();
-  /// Those who are there take of the reserve of memory, too, whether anybody comes or not.
-  asio::awaitable<void> fill_memory_reserve();
-  asio::awaitable<void> stop_in_stages();
+  asio::awaitable<void> stop_in_stages(Running running);
   /// Says why, as far as the peer takes it at once, and closes.
   void refuse(tcp::socket& socket, std::string_view why);
   void begin_stop();
@@ -120,11 +138,11 @@ struct HttpServer::State {
   asio::io_context io;
   tcp::acceptor acceptor;
   asio::steady_timer accept_timer;
-  asio::steady_timer reserve_timer;
   asio::signal_set signals;
   asio::signal_set hangups;
   tcp::endpoint endpoint;
-  bool is_stopping = false;
+  std::atomic<bool> is_stopping = false;
+  std::atomic<bool> is_accepting = false, is_ending = false;
 };
 
 void HttpServer::State::listen() {
@@ -170,7 +188,7 @@ void HttpServer::State::refuse(tcp::socket& socket, std::string_view why) {
   socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
-asio::awaitable<void> HttpServer::State::accept_connections() {
+asio::awaitable<void> HttpServer::State::accept_connections(Running /*while it is there*/) {
   bool was_short = false;
   while (!is_stopping) {
     std::string shortage;
@@ -230,23 +248,24 @@ asio::awaitable<std::string> HttpServer::State::accept_one() {
   co_return "";
 }
 
-asio::awaitable<void> HttpServer::State::fill_memory_reserve() {
-  while (!is_stopping) {
-    try {
-      reserve_timer.expires_after(context.options.limits.tick);
-      co_await reserve_timer.async_wait(kAwait);
-      refill_memory_reserve();
-    } catch (const std::bad_alloc&) {
-      std::this_thread::sleep_for(kMemoryPause);
-    }
+void HttpServer::State::keep_going() {
+  // Those who are there take of the reserve, too, whether anybody comes or not.
+  refill_memory_reserve();
+  const auto keep = [this](std::atomic<bool>& is_running, auto coroutine) {
+    if (is_running.exchange(true)) return;
+    asio::co_spawn(acceptor.get_executor(), (this->*coroutine)(Running(is_running)), asio::detached);
+  };
+  if (is_stopping) {
+    keep(is_ending, &State::stop_in_stages);
+  } else {
+    keep(is_accepting, &State::accept_connections);
   }
 }
 
-asio::awaitable<void> HttpServer::State::stop_in_stages() {
+asio::awaitable<void> HttpServer::State::stop_in_stages(Running /*while it is there*/) {
   error_code ignored;
   acceptor.close(ignored);
   accept_timer.cancel();
-  reserve_timer.cancel();
   signals.cancel(ignored);
   hangups.cancel(ignored);
   for (const auto& connection : context.begin_stop()) connection->begin_stop();
@@ -267,8 +286,8 @@ asio::awaitable<void> HttpServer::State::stop_in_stages() {
 }
 
 void HttpServer::State::begin_stop() {
-  if (std::exchange(is_stopping, true)) return;
-  asio::co_spawn(acceptor.get_executor(), stop_in_stages(), asio::detached);
+  is_stopping = true;
+  keep_going();
 }
 
 void HttpServer::State::reload_on_hangup() {
@@ -305,15 +324,15 @@ void HttpServer::run() {
     state.hangups.add(SIGHUP);
     state.reload_on_hangup();
   }
-  asio::co_spawn(state.acceptor.get_executor(), state.accept_connections(), asio::detached);
-  asio::co_spawn(state.acceptor.get_executor(), state.fill_memory_reserve(), asio::detached);
   const auto work = [&state] {
-    for (;;) {
+    while (!state.io.stopped()) {
       try {
-        return static_cast<void>(state.io.run());
+        state.keep_going();
+        state.io.run_for(state.context.options.limits.tick);
       } catch (const std::exception& error) {
-        // Of one connection, or of none: the others go on.
+        // Of one connection, or of none: the others go on, after a moment in which memory may be given back.
         spdlog::error("something on the network failed: {}", error.what());
+        std::this_thread::sleep_for(kMemoryPause);
       }
     }
   };

@@ -31,8 +31,8 @@ before(async () => {
   await sleep(AWAY_MS);
 });
 after(async () => {
-  await constant.close();
-  await proxy.close();
+  await constant?.close();
+  await proxy?.close();
   await server.stop();
 });
 
@@ -65,9 +65,10 @@ async function settled(client) {
 
 async function watching(url) {
   const client = await SpectraClient.connect(url);
-  await client.request("scene.subscribe", EVERYTHING);
   const { revision } = await (await fetch(`${server.url}/api/v1/scene`)).json();
-  await client.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision >= revision);
+  const complete = client.notification("stream.complete", 60_000, ({ scene_revision }) => scene_revision >= revision);
+  await client.request("scene.subscribe", EVERYTHING);
+  await complete;
   await settled(client);
   return client;
 }
