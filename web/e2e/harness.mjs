@@ -91,9 +91,11 @@ export async function settled(page, timeout = 60_000) {
   await drawn(page);
 }
 
-/** Waits until what is to be drawn has been drawn and is on the screen. */
+/** Waits until what is to be drawn has been drawn and is on the screen, and nothing says any more that it is not. */
 export async function drawn(page) {
-  await page.waitForFunction(() => globalThis.spectra.viewport.isUpToDate, null, { polling: 'raf' });
+  await page.waitForFunction(() => globalThis.spectra.viewport.isUpToDate && globalThis.spectra.store.hereSince === null, null, {
+    polling: 'raf',
+  });
   for (let i = 0; i < 3; i += 1) await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(resolve)));
 }
 
