@@ -51,7 +51,7 @@ export class Progress {
     if (store.behindSince !== null) {
       store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: this.now() - store.behindSince };
     }
-    store.behindSince = null;
+    this.#caughtUp();
     store.progress = 1;
     if (store.hereSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
   }
@@ -76,7 +76,7 @@ export class Progress {
 
   /** Nothing comes any more: there is nothing to be behind of. */
   disconnected(): void {
-    this.store.behindSince = null;
+    this.#caughtUp();
     this.store.rate_bytes_per_s = 0;
   }
 
@@ -87,10 +87,15 @@ export class Progress {
     store.rate_bytes_per_s = (this.#window.reduce((sum, { bytes }) => sum + bytes, 0) / RATE_MS) * 1000;
     // What was refused changes no picture: nothing more comes.
     const isShown = store.complete !== null && store.complete.generation >= store.generation;
-    if (this.#mayBeRefused && isShown && !this.isBusy()) store.behindSince = null;
+    if (this.#mayBeRefused && isShown && !this.isBusy()) this.#caughtUp();
     // What is made here comes into the picture all at once.
     if (store.hereSince !== null) store.progress = 0;
     else if (store.behindSince !== null) store.progress = this.#share();
+  }
+
+  #caughtUp(): void {
+    this.store.behindSince = null;
+    this.#mayBeRefused = false;
   }
 
   #share(): number {
