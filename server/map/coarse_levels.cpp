@@ -92,28 +92,33 @@ void take_tile(MapNode& node, const MapNode& from) {
   node.is_top = from.is_top;
 }
 
+/// Of a tile that says nothing of its colours.
+constexpr float kAnyLevel = 255;
+
 /// Of two temperatures beneath a node or of a tile; NaN where there is none.
 float largest_difference_celsius(const std::shared_ptr<const MapNode>& node, const Tile& tile) {
   TemperatureRange range{tile.lowest_celsius, tile.highest_celsius};
   for (const auto& leaf : leaves_of(node)) {
     range = range.joined({leaf->tile->lowest_celsius, leaf->tile->highest_celsius});
   }
+  if (std::isnan(range.lowest_celsius)) return range.lowest_celsius;
   constexpr float kMost = 1e30F;  // Where one is beyond the sensor's range.
-  return std::isnan(range.lowest_celsius) ? range.lowest_celsius
-                                          : std::min(range.highest_celsius - range.lowest_celsius, kMost);
+  const float difference = range.highest_celsius - range.lowest_celsius;
+  return std::isfinite(difference) ? difference : kMost;
 }
 
 /// What was seen of a cell before stays until its tile is made.
 void take_tile_of_before(const std::shared_ptr<MapNode>& node, const MapNode& before) {
   take_tile(*node, before);
   const std::uint8_t mask = child_mask_of(*node);
-  if (before.tile->child_mask == mask) return;
+  const bool was_full = before.is_leaf() || before.tile->colour_error_levels >= kAnyLevel;
+  if (before.tile->child_mask == mask && !was_full) return;
   const auto tile = std::make_shared<Tile>(*before.tile);
   tile->child_mask = mask;
-  if (before.is_leaf()) {
+  if (was_full) {
     // It was the full mesh and is not any more: nobody who looks from near should stay with it, and anything may be beside what it shows.
     tile->geometric_error_m = static_cast<float>(std::max(diagonal(node->bounds), diagonal(tile->bounds)));
-    tile->colour_error_levels = std::numeric_limits<std::uint8_t>::max();
+    tile->colour_error_levels = kAnyLevel;
     tile->temperature_error_celsius = largest_difference_celsius(node, *tile);
   }
   node->tile = tile;

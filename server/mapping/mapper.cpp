@@ -60,12 +60,17 @@ base::Result<void> Mapper::set_vignetting(PictureFloat picture) {
 }
 
 void Mapper::fuse(const Frame& frame, const Trajectory& trajectory, FaultLog& faults, FaultLog* faults_of_earlier) {
-  if (!begin_s_) begin_s_ = frame.time_s;
-  newest_s_ = frame.time_s;
-  if (tracker_)
+  if (tracker_) {
+    note_time(frame);
     return fuse_tracked(frame, trajectory, faults, faults_of_earlier != nullptr ? *faults_of_earlier : faults);
+  }
   if (!frame.depth.empty() && !fuse_surface(frame, trajectory, faults)) return;
   if (!frame.thermal.empty() && heat_) fuse_heat(frame, trajectory, faults);
+}
+
+void Mapper::note_time(const Frame& frame) {
+  newest_s_ = begin_s_ ? std::max(newest_s_, frame.time_s) : frame.time_s;
+  if (!begin_s_) begin_s_ = frame.time_s;
 }
 
 bool Mapper::find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults) {
@@ -89,6 +94,7 @@ bool Mapper::find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& 
 bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   PoseAnswer pose;
   if (!find_pose(trajectory, frame.time_s + calibration_.depth.delay_s, pose, faults)) return false;
+  note_time(frame);
   const DepthFrame depth =
       prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
   const DepthLook look{depth, calibration_.depth.camera, rays_, calibration_.depth.noise, pose.pose};
@@ -222,7 +228,9 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
 void Mapper::fuse_heat(const Frame& frame, const Trajectory& trajectory, FaultLog& faults) {
   PoseAnswer pose;
   const double moment = frame.time_s + calibration_.thermal->delay_s;
-  if (!find_pose(trajectory, moment, pose, faults) || is_doubtful_ || (submaps_ && !submaps_->is_open())) return;
+  if (!find_pose(trajectory, moment, pose, faults)) return;
+  note_time(frame);
+  if (is_doubtful_ || (submaps_ && !submaps_->is_open())) return;
   const HeatReport report =
       heat_->fuse(fused(), frame.thermal, beside(pose, calibration_.thermal->from_depth), moment - *begin_s_, pool_);
   ++(report.is_frozen ? figures_.frozen_frames : figures_.thermal_frames);

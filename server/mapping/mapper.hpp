@@ -94,9 +94,9 @@ class Mapper {
   /// How the last picture that was tracked fitted; all 0 without tracking.
   Alignment last_alignment() const { return tracker_ ? tracker_->last() : Alignment{}; }
   const MapperFigures& figures() const { return figures_; }
-  /// The time of the first frame, which seen_s counts from.
+  /// The time of the first frame that had a pose (of tracking: the first), which seen_s counts from.
   double begin_s() const { return begin_s_.value_or(0); }
-  /// The time of the last frame.
+  /// The newest time of such a frame.
   double newest_s() const { return newest_s_; }
 
  private:
@@ -107,6 +107,7 @@ class Mapper {
   VoxelMap& fused() { return submaps_ ? submaps_->newest() : map_; }
   /// The pose of the depth camera, if it can be used; else what is wrong stands in `faults`.
   bool find_pose(const Trajectory& trajectory, double time_s, PoseAnswer& answer, FaultLog& faults);
+  void note_time(const Frame& frame);
   bool fuse_surface(const Frame& frame, const Trajectory& trajectory, FaultLog& faults);
   void fuse_prepared(const Frame& frame, const DepthLook& look, const Trajectory& trajectory, FaultLog& faults);
   void fuse_tracked(const Frame& frame, const Trajectory& trajectory, FaultLog& faults, FaultLog& faults_of_earlier);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "server/net/steady_seconds.hpp"
 #include "server/sources/frame_bodies.hpp"
 
 namespace spectra::sources {
@@ -26,12 +27,9 @@ Eigen::Isometry3d depth_pose(const mapping::Calibration& calibration, const Eige
 
 }  // namespace
 
-double steady_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 void FrameIntake::begin_sender() {
   has_sender_ = true;
+  ++sender_count_;
   is_flushing_ = false;
   clock_.begin_sender();
   pose_end_s_.reset();
@@ -102,16 +100,27 @@ net::FrameOutcome FrameIntake::take_calibration(const net::IncomingFrame& frame)
 
 void FrameIntake::add_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into) {
   pose_end_s_ = clock_.on_own_clock(stamp_s);
-  clock_.accept(stamp_s, steady_s());
+  clock_.accept(stamp_s, net::steady_seconds());
   into.emplace_back(*pose_end_s_, pose);
 }
 
-void FrameIntake::believe_lone_pose(mapping::StampedPoses& into) {
+void FrameIntake::believe_lone_pose(mapping::StampedPoses& into, Answers& answers) {
   const LonePose lone = *std::exchange(lone_pose_, std::nullopt);
   if (!pose_end_s_ && !clock_.has_said_near(lone.stamp_s)) {
-    // Poses tell the time, not pictures that came before the first of them.
+    // Poses tell the time, not pictures that came before the first of them: on this clock those are of another moment than they say.
     clock_.forget_sender();
     last_s_ = {};
+    for (auto at = waiting_.begin(); at != waiting_.end();) {
+      if (at->second.sender != sender_count_) {
+        ++at;
+        continue;
+      }
+      answers.emplace_back(std::move(at->second.done),
+                           refused(FaultKind::NoPose, "no_pose", "time",
+                                   picture_name(*at->second.frame.head.sensor) +
+                                       " that came before the first pose has a stamp more than 10 s from it"));
+      at = waiting_.erase(at);
+    }
   }
   add_pose(lone.stamp_s, lone.pose, into);
 }
@@ -123,9 +132,9 @@ void FrameIntake::leave_lone_pose_out() {
 }
 
 std::optional<net::BlockRefusal> FrameIntake::take_pose(double stamp_s, const Eigen::Isometry3d& pose,
-                                                        mapping::StampedPoses& into) {
+                                                        mapping::StampedPoses& into, Answers& answers) {
   const bool is_first = !pose_end_s_;
-  const SenderClock::Verdict verdict = clock_.look(stamp_s, steady_s());
+  const SenderClock::Verdict verdict = clock_.look(stamp_s, net::steady_seconds());
   const bool is_ahead = verdict == SenderClock::Verdict::Ahead && !is_tracking_;
   if (!is_ahead) {
     if (auto refusal = refusal_of_stamp(verdict, "a pose")) return refusal;
@@ -139,7 +148,7 @@ std::optional<net::BlockRefusal> FrameIntake::take_pose(double stamp_s, const Ei
       lone_pose_ = LonePose{stamp_s, pose};
       return std::nullopt;
     }
-    believe_lone_pose(into);
+    believe_lone_pose(into, answers);
   }
   if (pose_end_s_ && !(clock_.on_own_clock(stamp_s) > *pose_end_s_)) {
     return refused(FaultKind::BackwardPose, "backward_pose", "poses", "a pose is not later than the one before");
@@ -149,7 +158,8 @@ std::optional<net::BlockRefusal> FrameIntake::take_pose(double stamp_s, const Ei
   return std::nullopt;
 }
 
-std::optional<net::FrameOutcome> FrameIntake::take_poses(const net::IncomingFrame& frame, Done& done) {
+std::optional<net::FrameOutcome> FrameIntake::take_poses(const net::IncomingFrame& frame, Done& done,
+                                                         Answers& answers) {
   if (!calibration_) {
     return refused(FaultKind::NoCalibration, "no_calibration", "", "poses have come before the calibration");
   }
@@ -163,7 +173,8 @@ std::optional<net::FrameOutcome> FrameIntake::take_poses(const net::IncomingFram
                   "a pose is not eight finite numbers with a rotation in the last four, less than 1,000 km from 0");
       continue;
     }
-    if (auto wrong = take_pose(values[0], depth_pose(*calibration_, *pose), news.poses)) refusal = std::move(wrong);
+    if (auto wrong = take_pose(values[0], depth_pose(*calibration_, *pose), news.poses, answers))
+      refusal = std::move(wrong);
   }
   if (refusal) news.outcome = *refusal;
   news.done = std::move(done);
@@ -222,12 +233,13 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
   if (is_near_lone_pose(*head.time)) {
     // Both are believed.
     PoseNews news;
-    believe_lone_pose(news.poses);
+    believe_lone_pose(news.poses, answers);
     new_poses_.push_back(std::move(news));
   }
   // Poses tell the time where there are any.
   if (is_tracking_ || !pose_end_s_) {
-    if (auto refusal = refusal_of_stamp(clock_.look(*head.time, steady_s()), name)) return std::move(*refusal);
+    if (auto refusal = refusal_of_stamp(clock_.look(*head.time, net::steady_seconds()), name))
+      return std::move(*refusal);
   }
   const double time_s = clock_.on_own_clock(*head.time);
   if (auto refusal = refusal_of_picture(head, time_s)) return std::move(*refusal);
@@ -239,13 +251,13 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
     return refused(FaultKind::BackwardClock, "backward_clock", "time", name + " is not later than the one before");
   }
   last_s = time_s;
-  clock_.accept(*head.time, steady_s());
+  clock_.accept(*head.time, net::steady_seconds());
   if (is_tracking_ && lone_pose_ && !pose_end_s_) {
     // Where the map begins, whenever that was.
     new_poses_.push_back(
         {.poses = {{time_s, std::exchange(lone_pose_, std::nullopt)->pose}}, .done = {}, .outcome = {}});
   }
-  waiting_.emplace(Key{time_s, rank}, Waiting{std::move(frame), std::move(done)});
+  waiting_.emplace(Key{time_s, rank}, Waiting{std::move(frame), std::move(done), sender_count_});
   if (waiting_.size() <= kMostWaiting) return std::nullopt;
   // The picture itself is not lost among those of another sensor: the one that sends most gives way.
   std::array<std::size_t, 3> counts{};
@@ -256,14 +268,14 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
   });
   if (skipped_count_ == 0) spdlog::warn("pictures come faster than they can be mapped: some are skipped; said once");
   ++skipped_count_;
-  last_skip_s_ = steady_s();
+  last_skip_s_ = net::steady_seconds();
   answers.emplace_back(std::move(oldest->second.done), net::FrameTaken{true, wanted_rate()});
   waiting_.erase(oldest);
   return std::nullopt;
 }
 
 std::optional<double> FrameIntake::wanted_rate() const {
-  if (picture_s_ <= 0 || steady_s() - last_skip_s_ > kOverloadS) return std::nullopt;
+  if (picture_s_ <= 0 || net::steady_seconds() - last_skip_s_ > kOverloadS) return std::nullopt;
   return kAskedShare / picture_s_;
 }
 
@@ -272,7 +284,7 @@ std::optional<net::FrameOutcome> FrameIntake::take_kind(net::IncomingFrame& fram
     case FramesKind::Calibration:
       return take_calibration(frame);
     case FramesKind::Poses:
-      return take_poses(frame, done);
+      return take_poses(frame, done, answers);
     case FramesKind::CorrectedPoses:
       return take_corrections(frame, done);
     case FramesKind::Picture:
@@ -285,7 +297,7 @@ std::optional<net::FrameOutcome> FrameIntake::take_kind(net::IncomingFrame& fram
 }
 
 void FrameIntake::take(net::IncomingFrame frame, Done done, Answers& answers) {
-  last_arrival_s_ = steady_s();
+  last_arrival_s_ = net::steady_seconds();
   if (auto outcome = take_kind(frame, done, answers)) answers.emplace_back(std::move(done), std::move(*outcome));
 }
 
@@ -297,7 +309,7 @@ void FrameIntake::give_up(const net::FrameOutcome& outcome, Answers& answers) {
 }
 
 double FrameIntake::quiet_s() const {
-  return steady_s() - last_arrival_s_;
+  return net::steady_seconds() - last_arrival_s_;
 }
 
 bool FrameIntake::is_ready() const {

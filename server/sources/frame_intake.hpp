@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
@@ -16,9 +17,6 @@
 #include "server/sources/sender_clock.hpp"
 
 namespace spectra::sources {
-
-/// Seconds of a clock that is never set.
-double steady_s();
 
 /// What a robot has sent and is not mapped yet: checks messages, brings their stamps onto one clock, and has poses and pictures wait for whoever
 /// maps. A picture waits until poses of its moment are there, but no longer than until something kPatienceS later has come, or nothing for as
@@ -39,6 +37,7 @@ class FrameIntake {
   struct Waiting {
     net::IncomingFrame frame;
     Done done;
+    std::uint64_t sender = 0;  ///< The how manieth.
   };
   using Picture = std::pair<Key, Waiting>;
   /// Poses of the depth camera, or what corrects those before.
@@ -92,23 +91,24 @@ class FrameIntake {
   std::optional<net::FrameOutcome> take_kind(net::IncomingFrame& frame, Done& done, Answers& answers);
   net::FrameOutcome take_calibration(const net::IncomingFrame& frame);
   std::optional<net::FrameOutcome> take_corrections(const net::IncomingFrame& frame, Done& done);
-  std::optional<net::FrameOutcome> take_poses(const net::IncomingFrame& frame, Done& done);
+  std::optional<net::FrameOutcome> take_poses(const net::IncomingFrame& frame, Done& done, Answers& answers);
   std::optional<net::FrameOutcome> take_picture(net::IncomingFrame& frame, Done& done, Answers& answers);
   std::optional<net::BlockRefusal> refusal_of_picture(const protocol::FrameHead& head, double time_s);
   std::optional<net::BlockRefusal> refusal_of_stamp(SenderClock::Verdict verdict, const std::string& whose);
   /// One pose, which goes into `into` with what was waiting for it, or waits itself.
-  std::optional<net::BlockRefusal> take_pose(double stamp_s, const Eigen::Isometry3d& pose,
-                                             mapping::StampedPoses& into);
+  std::optional<net::BlockRefusal> take_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into,
+                                             Answers& answers);
   void add_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into);
   bool is_near_lone_pose(double stamp_s) const {
     return lone_pose_ && std::abs(stamp_s - lone_pose_->stamp_s) <= kFarthestStampS;
   }
-  void believe_lone_pose(mapping::StampedPoses& into);
+  void believe_lone_pose(mapping::StampedPoses& into, Answers& answers);
   void leave_lone_pose_out();
   void note(mapping::FaultKind kind, const std::string& what, std::size_t count = 1);
 
   const bool is_tracking_, has_submaps_;
   bool has_sender_ = false;
+  std::uint64_t sender_count_ = 0;
   bool is_flushing_ = false;  ///< Nobody is waited for any more.
   std::string calibration_text_;
   std::optional<mapping::Calibration> calibration_;

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "server/mapping/map_ply.hpp"
+#include "server/net/steady_seconds.hpp"
 #include "server/sources/frame_bodies.hpp"
 #include "server/sources/map_feed.hpp"
 
@@ -146,11 +147,11 @@ void LiveFeed::apply_poses() {
       for (const auto& [time_s, pose] : some.poses) trajectory_.add(time_s, pose);
     }
   }
-  std::vector<FrameIntake::PoseNews> applied;
-  applied.swap(poses_in_hand_);
-  for (FrameIntake::PoseNews& some : applied) {
-    if (some.done) some.done(std::move(some.outcome));
+  // Where an answer finds no memory those after it are answered when mapping ends.
+  for (FrameIntake::PoseNews& some : poses_in_hand_) {
+    if (const FrameIntake::Done done = std::exchange(some.done, nullptr)) done(std::move(some.outcome));
   }
+  poses_in_hand_.clear();
 }
 
 void LiveFeed::tell_found_pose() {
@@ -196,11 +197,11 @@ void LiveFeed::work() {
       if (latest.state != mapping::PoseState::Unknown) sinks_.moved(robot, false);
     }
     if (picture_in_hand_) {
-      const double begun_s = steady_s();
+      const double begun_s = net::steady_seconds();
       net::FrameOutcome outcome = map_picture(picture_in_hand_->first, picture_in_hand_->second.frame);
       {
         const std::lock_guard lock(mutex_);
-        intake_.note_took(steady_s() - begun_s);
+        intake_.note_took(net::steady_seconds() - begun_s);
         if (auto* taken = std::get_if<net::FrameTaken>(&outcome)) taken->pictures_per_s = intake_.wanted_rate();
       }
       const FrameIntake::Done done = std::move(picture_in_hand_->second.done);
@@ -210,11 +211,12 @@ void LiveFeed::work() {
     if (!mapper_) continue;
     // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
     const std::size_t room = sinks_.room(), waiting_units = publisher_.waiting_count();
-    const bool is_due = steady_s() - last_published_s >= publish_every_.count() && (has_changed_ || waiting_units > 0);
+    const bool is_due =
+        net::steady_seconds() - last_published_s >= publish_every_.count() && (has_changed_ || waiting_units > 0);
     // While frames come, whoever makes tiles of it needs the time between.
     const bool is_left = is_idle && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
     if (room == 0 || !(is_due || is_left)) continue;
-    last_published_s = steady_s();
+    last_published_s = net::steady_seconds();
     has_changed_ = false;
     sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_, pool_);
   }

@@ -265,7 +265,10 @@ void ViewerStream::run_job() {
   if (raw) {
     encode(*raw, *cache_);
     const std::lock_guard lock(mutex_);
-    if (raw_.finish(*raw, demand_)) ++failed_tile_count_;
+    if (raw_.finish(*raw, demand_)) {
+      ++failed_tile_count_;
+      look_again();
+    }
   }
   while (encoding) {
     const auto begin = UrgentBudget::Clock::now();

@@ -270,6 +270,15 @@ TEST_F(LivingMapTest, ALeafThatHasGrownSaysThatAnythingMayBeBesideIt) {
     EXPECT_GT(tile->geometric_error_m, 0);
   }
   EXPECT_GT(grown, 0U);
+  // Also of what comes before it is made anew.
+  const auto hot = apply(put("small", terrain(50, 0, 500)));
+  std::size_t placeholders = 0;
+  for (const auto& tile : hot->tiles()) {
+    if (tile->colour_error_levels < 255) continue;
+    ++placeholders;
+    EXPECT_GE(tile->temperature_error_celsius, 400);
+  }
+  EXPECT_GT(placeholders, 0U);
   const auto complete = completed();
   for (const auto& tile : complete->tiles()) EXPECT_LT(tile->colour_error_levels, 255);
 }

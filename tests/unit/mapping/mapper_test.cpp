@@ -56,6 +56,18 @@ TEST_F(MapperTest, MakesAMeshWithTemperatures) {
   EXPECT_GT(warm, 50U);
 }
 
+TEST_F(MapperTest, BeginsWithTheFirstFrameThatHasAPose) {
+  Mapper mapper(calibration_, settings_, pool_);
+  Frame stray = frame_at(0);
+  stray.time_s = 1e9;
+  mapper.fuse(stray, trajectory_, faults_);
+  EXPECT_EQ(faults_.of(FaultKind::NoPose).count, 1U);
+  mapper.fuse(frame_at(0.11), trajectory_, faults_);
+  mapper.fuse(frame_at(0.22), trajectory_, faults_);
+  EXPECT_EQ(mapper.begin_s(), 0.11);
+  EXPECT_EQ(mapper.newest_s(), 0.22);
+}
+
 TEST_F(MapperTest, DoesNotWaitForAMissingModality) {
   Mapper mapper(calibration_, settings_, pool_);
   Frame frame = frame_at(0.1);

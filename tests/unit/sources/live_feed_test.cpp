@@ -422,6 +422,25 @@ TEST_F(LiveFeedTest, PicturesBeforeTheFirstPoseDoNotSetTheClock) {
   expect_robot_is_here_now();
 }
 
+TEST_F(LiveFeedTest, PicturesOfAClockThatIsForgottenAreNotMapped) {
+  ASSERT_EQ(begun(), "begun");
+  code_of(calibrate());
+  Answer first = depth(0);
+  EXPECT_EQ(code_of(pose(1000)), "taken");
+  EXPECT_EQ(code_of(pose(1000.05)), "taken");
+  EXPECT_EQ(code_of(std::move(first)), "no_pose");
+  EXPECT_EQ(code_of(depth(1000.05)), "taken");
+  own_->end();
+  // On the map's clock its stamps, and those of the poses after it, begin at the same moment.
+  ASSERT_EQ(begun(), "begun");
+  Answer second = depth(0);
+  EXPECT_EQ(code_of(pose(50)), "taken");
+  EXPECT_EQ(code_of(pose(50.05)), "taken");
+  EXPECT_EQ(code_of(std::move(second)), "no_pose");
+  EXPECT_EQ(code_of(depth(50.05)), "taken");
+  expect_robot_is_here_now();
+}
+
 TEST_F(LiveFeedTest, StillsMayBeMinutesApart) {
   ASSERT_EQ(begun(), "begun");
   code_of(calibrate());
