@@ -8,6 +8,7 @@
 #include <atomic>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -17,10 +18,13 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
 #include <charconv>
+#include <condition_variable>
 #include <csignal>
 #include <exception>
+#include <mutex>
 #include <new>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -136,6 +140,8 @@ struct HttpServer::State {
   StaticFiles files;
   ServerContext context;
   asio::io_context io;
+  /// Until it stops: nobody may be waited for, for a moment, when memory is short.
+  std::optional<asio::executor_work_guard<asio::io_context::executor_type>> running_work{asio::make_work_guard(io)};
   tcp::acceptor acceptor;
   asio::steady_timer accept_timer;
   asio::signal_set signals;
@@ -283,6 +289,7 @@ asio::awaitable<void> HttpServer::State::stop_in_stages(Running /*while it is th
     timer.expires_after(kStopPoll);
     co_await timer.async_wait(kAwait);
   }
+  running_work.reset();
 }
 
 void HttpServer::State::begin_stop() {
@@ -324,11 +331,24 @@ void HttpServer::run() {
     state.hangups.add(SIGHUP);
     state.reload_on_hangup();
   }
-  const auto work = [&state] {
-    while (!state.io.stopped()) {
+  state.keep_going();
+  // Coroutines that were lost are begun anew by a thread that needs no memory to wait.
+  const std::jthread keeper([&state](const std::stop_token& is_over) {
+    std::mutex mutex;
+    std::condition_variable_any over;
+    std::unique_lock lock(mutex);
+    while (!over.wait_for(lock, is_over, state.context.options.limits.tick, [&] { return is_over.stop_requested(); })) {
       try {
         state.keep_going();
-        state.io.run_for(state.context.options.limits.tick);
+      } catch (const std::bad_alloc&) {
+        // There may be some at the next tick.
+      }
+    }
+  });
+  const auto work = [&state] {
+    for (;;) {
+      try {
+        return static_cast<void>(state.io.run());
       } catch (const std::exception& error) {
         // Of one connection, or of none: the others go on, after a moment in which memory may be given back.
         spdlog::error("something on the network failed: {}", error.what());

@@ -10,6 +10,10 @@ struct MessageRoom::Holder {
   explicit Holder(std::function<void()> give_way_in) : give_way(std::move(give_way_in)) {}
 
   std::size_t held_bytes() const { return waiting_bytes + taken_bytes; }
+  std::size_t waiting_bytes_of() const { return waiting_bytes; }
+  bool may_give_way(std::size_t more_than_bytes) const {
+    return !has_given_way && waiting_bytes > 0 && held_bytes() > more_than_bytes;
+  }
 
   const std::function<void()> give_way;
   std::size_t waiting_bytes = 0;
@@ -39,7 +43,11 @@ void MessageRoom::Share::add(std::size_t bytes) {
     holder_->waiting_bytes += bytes;
     if (holder_->has_given_way) return;
     room_->used_bytes_ += bytes;
-    room_->make_room(0, 0, dropped);
+    // Answers that are being made are soon there: while they are most of it, nobody is cut for a message.
+    if (room_->used_bytes_ > room_->size_bytes_ &&
+        2 * room_->bytes_that_wait(0, &Holder::waiting_bytes_of) > room_->size_bytes_) {
+      room_->make_room(0, 0, dropped);
+    }
   }
   tell(dropped);
 }
@@ -92,6 +100,9 @@ std::size_t MessageRoom::used_bytes() const {
 }
 
 bool MessageRoom::make_room(std::size_t bytes, std::size_t more_than_bytes, Holders& dropped) {
+  if (used_bytes_ + bytes <= size_bytes_) return true;
+  // Nobody gives way where that is not enough.
+  if (used_bytes_ + bytes > size_bytes_ + bytes_that_wait(more_than_bytes, &Holder::held_bytes)) return false;
   while (used_bytes_ + bytes > size_bytes_) {
     const auto holder = who_gives_way(more_than_bytes);
     if (!holder) return false;
@@ -102,17 +113,22 @@ bool MessageRoom::make_room(std::size_t bytes, std::size_t more_than_bytes, Hold
   return true;
 }
 
+std::size_t MessageRoom::bytes_that_wait(std::size_t more_than_bytes, std::size_t (Holder::*bytes)() const) const {
+  std::size_t sum = 0;
+  for (const auto& holder : holders_) {
+    if (holder->may_give_way(more_than_bytes)) sum += (*holder.*bytes)();
+  }
+  return sum;
+}
+
 std::shared_ptr<MessageRoom::Holder> MessageRoom::who_gives_way(std::size_t more_than_bytes) const {
-  const auto may = [more_than_bytes](const Holder& holder) {
-    return !holder.has_given_way && holder.waiting_bytes > 0 && holder.held_bytes() > more_than_bytes;
-  };
   std::size_t most_bytes = 0;
   for (const auto& holder : holders_) {
-    if (may(*holder)) most_bytes = std::max(most_bytes, holder->held_bytes());
+    if (holder->may_give_way(more_than_bytes)) most_bytes = std::max(most_bytes, holder->held_bytes());
   }
   std::shared_ptr<Holder> chosen;
   for (const auto& holder : holders_) {
-    if (!may(*holder) || holder->held_bytes() < most_bytes / 2) continue;
+    if (!holder->may_give_way(more_than_bytes) || holder->held_bytes() < most_bytes / 2) continue;
     if (!chosen || holder->stuck_since < chosen->stuck_since) chosen = holder;
   }
   return chosen;

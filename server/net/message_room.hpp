@@ -10,8 +10,8 @@
 namespace spectra::net {
 
 /// The memory that the messages to all viewers may take together, from when an answer begins to be made until it is written. Where there is
-/// no room, whoever holds most of it gives way; of those who hold at least half as much, the one who has taken nothing for longest.
-/// Thread-safe.
+/// no room, whoever holds most of it gives way; of those who hold at least half as much, the one who has taken nothing for longest. Nobody
+/// does where that would not make room. Messages may go beyond it by a half, while answers that are being made take most of it. Thread-safe.
 class MessageRoom : public std::enable_shared_from_this<MessageRoom> {
   struct Holder;
 
@@ -52,6 +52,8 @@ class MessageRoom : public std::enable_shared_from_this<MessageRoom> {
   // With the lock held.
   /// Makes room for so many bytes at the cost of those who hold more than that; they are to be told without the lock. False: there is none.
   bool make_room(std::size_t bytes, std::size_t more_than_bytes, Holders& dropped);
+  /// Of those who keep messages waiting and hold more than that, all together.
+  std::size_t bytes_that_wait(std::size_t more_than_bytes, std::size_t (Holder::*bytes)() const) const;
   /// One that keeps messages waiting and holds more than so much; null: none.
   std::shared_ptr<Holder> who_gives_way(std::size_t more_than_bytes) const;
   void give_back(Holder& holder, std::size_t bytes);

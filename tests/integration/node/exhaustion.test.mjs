@@ -51,7 +51,11 @@ test("without memory connections are refused or lost, and with it again everythi
     let seen;
     for (let i = 0; i < 400; i += 1) {
       const { text } = await ask("/metrics");
-      const sum = (name) => [...text.matchAll(new RegExp(`^${name}(?:{.*})? (-?\\d+)$`, "gm"))].reduce((all, [, value]) => all + Number(value), 0);
+      const sum = (name) => {
+        const found = [...text.matchAll(new RegExp(`^${name}(?:{.*})? (\\S+)$`, "gm"))];
+        assert.ok(found.length > 0, `no ${name}`);
+        return found.reduce((all, [, value]) => all + Number(value), 0);
+      };
       seen = Object.fromEntries(Object.keys(expected).map((name) => [name, sum(name)]));
       if (JSON.stringify(seen) === JSON.stringify(expected)) return;
       await sleep(50);

@@ -69,8 +69,13 @@ TEST_F(MessageRoomTest, WhoHoldsMostHimselfIsRefused) {
 TEST_F(MessageRoomTest, AnswersThatAreOnlyBeingMadeGiveNoWay) {
   const auto taken = a_.share->take(900);
   ASSERT_TRUE(taken);
+  c_.share->add(10);
   EXPECT_FALSE(b_.share->take(200)) << "their viewer is not slow";
-  EXPECT_EQ(a_.told_count, 0);
+  EXPECT_EQ(c_.told_count, 0) << "nothing would be won";
+  c_.share->add(300);
+  EXPECT_EQ(a_.told_count + b_.told_count + c_.told_count, 0) << "a message does not pay for answers";
+  b_.share->add(300);
+  EXPECT_EQ(b_.told_count + c_.told_count, 2) << "beyond a half, too much waits";
 }
 
 TEST_F(MessageRoomTest, OfThoseWhoHoldMuchTheOneThatIsStuckForLongestGivesWay) {
