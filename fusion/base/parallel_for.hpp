@@ -10,7 +10,7 @@
 
 namespace spectra::base {
 
-/// Calls `work(i)` once for each i of 0..count, in as many threads as there are processors, and returns when all are done. What one throws
+/// Calls `work(i)` once for each i of 0..count, in as many threads as there are processors, or as can be begun, and returns when all are done. What one throws
 /// (the first) is thrown here; others that had not begun then are left out.
 template <class Work>
 void parallel_for(std::size_t count, const Work& work) {
@@ -29,7 +29,11 @@ void parallel_for(std::size_t count, const Work& work) {
   {
     std::vector<std::jthread> threads;
     const std::size_t thread_count = std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), count);
-    for (std::size_t i = 1; i < thread_count; ++i) threads.emplace_back(run);
+    try {
+      for (std::size_t i = 1; i < thread_count; ++i) threads.emplace_back(run);
+    } catch (...) {
+      // Fewer do.
+    }
     run();
   }
   if (thrown) std::rethrow_exception(thrown);

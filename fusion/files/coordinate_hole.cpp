@@ -166,6 +166,8 @@ class Finder {
   }
 
   static bool is_certain(const Candidate& candidate, NumberKind kind, const Evidence& evidence) {
+    // Two places, say: what is far is told by how large the scene is.
+    if (!(evidence.size > 0)) return false;
     const auto is_away = [&](double sizes) { return candidate.gap > sizes * evidence.size; };
     if (is_away(kBeyondAllForms)) return true;
     if (kind == NumberKind::WrittenForNone) {

@@ -67,6 +67,7 @@ TEST(CoordinateHole, EndsOfPipesAndTanksAreForm) {
       }
     }
   }
+  EXPECT_FALSE(holes_of(rings(0, {0, 1000}, 24, true), false).certain) << "two places";
   // A length of nines and an end of 16 bits need as much where triangles use them.
   for (const double end : {-999.0, 9999.0, -32'768.0}) {
     EXPECT_FALSE(holes_of(rings(300, {0, end}, 24, true), true).certain) << end;

@@ -90,14 +90,25 @@ TEST(SenderClock, MomentsOfASenderBeforeStayWhereTheyWere) {
 }
 
 TEST(SenderClock, ManySendersAreKeptAccountOfWithinBounds) {
+  // The first two are of another clock than the map.
   SenderClock clock;
+  clock.accept(1e6, 0);
+  clock.begin_sender();
+  clock.accept(-500, 0);
+  const double first_shift_s = clock.moment_of(-500) + 500;
+  EXPECT_GT(first_shift_s, 1e6);
+  clock.begin_sender();
   for (int i = 0; i < 2000; ++i) {
-    clock.accept(100.0 * i, i);
-    clock.accept(100.0 * i + 1, i);
+    if (i == 100) {
+      EXPECT_EQ(clock.moment_of(-500), first_shift_s - 500);
+    }
+    clock.accept(2e6 + 100.0 * i, i);
+    clock.accept(2e6 + 100.0 * i + 1, i);
     clock.begin_sender();
   }
-  EXPECT_EQ(clock.moment_of(199'900.5), 199'900.5);
-  EXPECT_EQ(clock.newest_s(), 199'901);
+  EXPECT_EQ(clock.moment_of(-500), -500) << "it is forgotten; the last sender's counts";
+  EXPECT_EQ(clock.moment_of(2'199'900.5), 2'199'900.5);
+  EXPECT_EQ(clock.newest_s(), 2'199'901);
 }
 
 TEST(SenderClock, ASenderThatIsForgottenHasSaidNothing) {
