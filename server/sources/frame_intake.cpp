@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "server/net/steady_seconds.hpp"
 #include "server/sources/frame_bodies.hpp"
 
 namespace spectra::sources {
@@ -26,6 +25,10 @@ Eigen::Isometry3d depth_pose(const mapping::Calibration& calibration, const Eige
 }
 
 }  // namespace
+
+double steady_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 void FrameIntake::begin_sender() {
   has_sender_ = true;
@@ -100,7 +103,7 @@ net::FrameOutcome FrameIntake::take_calibration(const net::IncomingFrame& frame)
 
 void FrameIntake::add_pose(double stamp_s, const Eigen::Isometry3d& pose, mapping::StampedPoses& into) {
   pose_end_s_ = clock_.on_own_clock(stamp_s);
-  clock_.accept(stamp_s, net::steady_seconds());
+  clock_.accept(stamp_s, steady_s());
   into.emplace_back(*pose_end_s_, pose);
 }
 
@@ -134,7 +137,7 @@ void FrameIntake::leave_lone_pose_out() {
 std::optional<net::BlockRefusal> FrameIntake::take_pose(double stamp_s, const Eigen::Isometry3d& pose,
                                                         mapping::StampedPoses& into, Answers& answers) {
   const bool is_first = !pose_end_s_;
-  const SenderClock::Verdict verdict = clock_.look(stamp_s, net::steady_seconds());
+  const SenderClock::Verdict verdict = clock_.look(stamp_s, steady_s());
   const bool is_ahead = verdict == SenderClock::Verdict::Ahead && !is_tracking_;
   if (!is_ahead) {
     if (auto refusal = refusal_of_stamp(verdict, "a pose")) return refusal;
@@ -238,8 +241,7 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
   }
   // Poses tell the time where there are any.
   if (is_tracking_ || !pose_end_s_) {
-    if (auto refusal = refusal_of_stamp(clock_.look(*head.time, net::steady_seconds()), name))
-      return std::move(*refusal);
+    if (auto refusal = refusal_of_stamp(clock_.look(*head.time, steady_s()), name)) return std::move(*refusal);
   }
   const double time_s = clock_.on_own_clock(*head.time);
   if (auto refusal = refusal_of_picture(head, time_s)) return std::move(*refusal);
@@ -251,7 +253,7 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
     return refused(FaultKind::BackwardClock, "backward_clock", "time", name + " is not later than the one before");
   }
   last_s = time_s;
-  clock_.accept(*head.time, net::steady_seconds());
+  clock_.accept(*head.time, steady_s());
   if (is_tracking_ && lone_pose_ && !pose_end_s_) {
     // Where the map begins, whenever that was.
     new_poses_.push_back(
@@ -268,14 +270,14 @@ std::optional<net::FrameOutcome> FrameIntake::take_picture(net::IncomingFrame& f
   });
   if (skipped_count_ == 0) spdlog::warn("pictures come faster than they can be mapped: some are skipped; said once");
   ++skipped_count_;
-  last_skip_s_ = net::steady_seconds();
+  last_skip_s_ = steady_s();
   answers.emplace_back(std::move(oldest->second.done), net::FrameTaken{true, wanted_rate()});
   waiting_.erase(oldest);
   return std::nullopt;
 }
 
 std::optional<double> FrameIntake::wanted_rate() const {
-  if (picture_s_ <= 0 || net::steady_seconds() - last_skip_s_ > kOverloadS) return std::nullopt;
+  if (picture_s_ <= 0 || steady_s() - last_skip_s_ > kOverloadS) return std::nullopt;
   return kAskedShare / picture_s_;
 }
 
@@ -297,7 +299,7 @@ std::optional<net::FrameOutcome> FrameIntake::take_kind(net::IncomingFrame& fram
 }
 
 void FrameIntake::take(net::IncomingFrame frame, Done done, Answers& answers) {
-  last_arrival_s_ = net::steady_seconds();
+  last_arrival_s_ = steady_s();
   if (auto outcome = take_kind(frame, done, answers)) answers.emplace_back(std::move(done), std::move(*outcome));
 }
 
@@ -309,7 +311,7 @@ void FrameIntake::give_up(const net::FrameOutcome& outcome, Answers& answers) {
 }
 
 double FrameIntake::quiet_s() const {
-  return net::steady_seconds() - last_arrival_s_;
+  return steady_s() - last_arrival_s_;
 }
 
 bool FrameIntake::is_ready() const {

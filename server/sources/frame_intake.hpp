@@ -18,6 +18,9 @@
 
 namespace spectra::sources {
 
+/// Seconds of a clock that is never set.
+double steady_s();
+
 /// What a robot has sent and is not mapped yet: checks messages, brings their stamps onto one clock, and has poses and pictures wait for whoever
 /// maps. A picture waits until poses of its moment are there, but no longer than until something kPatienceS later has come, or nothing for as
 /// long; pictures are taken in the order of their time. When more than kMostWaiting wait, the oldest of the sensor that has most of them is skipped,

@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "server/mapping/map_ply.hpp"
-#include "server/net/steady_seconds.hpp"
 #include "server/sources/frame_bodies.hpp"
 #include "server/sources/map_feed.hpp"
 
@@ -197,11 +196,11 @@ void LiveFeed::work() {
       if (latest.state != mapping::PoseState::Unknown) sinks_.moved(robot, false);
     }
     if (picture_in_hand_) {
-      const double begun_s = net::steady_seconds();
+      const double begun_s = steady_s();
       net::FrameOutcome outcome = map_picture(picture_in_hand_->first, picture_in_hand_->second.frame);
       {
         const std::lock_guard lock(mutex_);
-        intake_.note_took(net::steady_seconds() - begun_s);
+        intake_.note_took(steady_s() - begun_s);
         if (auto* taken = std::get_if<net::FrameTaken>(&outcome)) taken->pictures_per_s = intake_.wanted_rate();
       }
       const FrameIntake::Done done = std::move(picture_in_hand_->second.done);
@@ -211,12 +210,11 @@ void LiveFeed::work() {
     if (!mapper_) continue;
     // A map that is behind gets what it can take, the hot and the near first; mapping does not wait for it.
     const std::size_t room = sinks_.room(), waiting_units = publisher_.waiting_count();
-    const bool is_due =
-        net::steady_seconds() - last_published_s >= publish_every_.count() && (has_changed_ || waiting_units > 0);
+    const bool is_due = steady_s() - last_published_s >= publish_every_.count() && (has_changed_ || waiting_units > 0);
     // While frames come, whoever makes tiles of it needs the time between.
     const bool is_left = is_idle && waiting_units > 0 && room >= UnitHandOver::kUnderWay / 2;
     if (room == 0 || !(is_due || is_left)) continue;
-    last_published_s = net::steady_seconds();
+    last_published_s = steady_s();
     has_changed_ = false;
     sinks_.hand_over(mapper_->changed_units(publisher_, moment_.eye, pool_, room), moment_, pool_);
   }

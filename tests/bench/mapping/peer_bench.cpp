@@ -3,7 +3,7 @@
 //
 //   OMP_NUM_THREADS=1 peer_bench [--seconds S] [--seed N] [--voxel M] [--threads N]
 //
-// Threads: with the one that calls; 1 by default, as many are to be told to Open3D (whose threads wait for each other busily, which counts). Its pictures are made beforehand. Bytes are those that
+// Milliseconds are processor time, in the mean. Threads of ours beside the one that calls: 1 by default, the fewest. Open3D is to be told one (its threads wait for each other busily, which counts). Its pictures are made beforehand. Bytes are those that
 // malloc has given out for each. Complete is the share of the true surface's vertices that have a vertex of the map within one voxel, and within two.
 #include <malloc.h>
 #include <open3d/geometry/Image.h>
@@ -12,10 +12,12 @@
 #include <open3d/geometry/RGBDImage.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "comparison.hpp"
@@ -60,6 +62,11 @@ peer::RGBDImage rgbd_of(const Frame& frame, double unit_m) {
   return image;
 }
 
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(std::max<std::size_t>(1, values.size()));
+}
+
 /// Share of the vertices of the truth that a map has reached, percent.
 double complete(const std::vector<Eigen::Vector3d>& map, const mesh::MultispectralMesh& truth, double within_m) {
   peer::PointCloud cloud;
@@ -82,7 +89,7 @@ int main(int argc, char** argv) {
   DriveOptions options;
   options.seconds = 20;
   MapperSettings settings;
-  unsigned threads = 1;
+  unsigned threads = 1;  // Beside the one that calls.
   for (int i = 1; i + 1 < argc; i += 2) {
     const auto is = [&](const char* name) { return std::strcmp(argv[i], name) == 0; };
     if (is("--seconds")) options.seconds = std::atof(argv[i + 1]);
@@ -94,7 +101,7 @@ int main(int argc, char** argv) {
   const CameraModel& camera = drive.calibration().depth.camera;
   const open3d::camera::PinholeCameraIntrinsic lens(camera.width, camera.height, camera.fx, camera.fy, camera.cx,
                                                     camera.cy);
-  jobs::WorkerPool pool(threads - 1);
+  jobs::WorkerPool pool(threads);
   Mapper mapper(drive.calibration(), settings, pool);
   FaultLog faults;
   open3d::pipelines::integration::ScalableTSDFVolume volume(settings.voxel_m, 4 * settings.voxel_m,
@@ -131,9 +138,13 @@ int main(int argc, char** argv) {
   of_cloud.celsius.resize(of_cloud.positions.size(), std::numeric_limits<float>::quiet_NaN());
   of_cloud.sigma_kelvin = of_cloud.celsius;
 
-  const double ours_ms = quantile(ours.ms, 0.5), depth_ms = quantile(depth_alone.ms, 0.5),
-               peer_ms = quantile(of_peer.ms, 0.5);
-  std::printf("%zu depth pictures, voxels of %g cm, %u threads\n", of_peer.ms.size(), 100 * settings.voxel_m, threads);
+  for (const FrameFault& fault : faults.all()) {
+    if (fault.count > 0) std::printf("  %s (%zu times)\n", fault.what.c_str(), fault.count);
+  }
+  if (mapper.figures().depth_frames != of_peer.ms.size()) return 1;
+  const double ours_ms = mean(ours.ms), depth_ms = mean(depth_alone.ms), peer_ms = mean(of_peer.ms);
+  std::printf("%zu depth pictures, voxels of %g cm, %u threads and the one that calls\n", of_peer.ms.size(),
+              100 * settings.voxel_m, threads);
   std::printf("%-34s %10s %9s %10s %6s\n", "", "ms a frame", "MB", "complete", "");
   const auto print_cost = [&](const char* name, double ms, double bytes, const std::vector<Eigen::Vector3d>& map) {
     std::printf("%-34s %10.1f %9.1f %9.2f%% %5.2f%%\n", name, ms, bytes / 1e6,
