@@ -133,6 +133,17 @@ export function addLiveTests(browser) {
     await bothSay(/^\s*(79|80|81)\.\d/);
     await put(server, 0, 0, { celsius: -10 });
     await bothSay(/^\s*\u2212(9|10|11)\.\d/);
+    // While the camera is dragged nothing is read under the pointer, whatever comes meanwhile.
+    await page.mouse.down();
+    await page.mouse.move(x + 66, y, { steps: 3 });
+    await page.locator('.hover').waitFor({ state: 'detached' });
+    await put(server, 0, 0, { celsius: 40 });
+    await card.filter({ hasText: /\b(39|40|41)\.\d/ }).waitFor({ timeout: 10_000 });
+    await page.waitForTimeout(1500);
+    assert.equal(await page.locator('.hover').count(), 0);
+    await page.mouse.up();
+    await page.mouse.move(x + 60, y, { steps: 3 });
+    await page.locator('.hover').waitFor();
     await fetch(`${server.url}api/v1/blocks/b0.0`, { method: 'DELETE' });
     await page.getByText('The map is empty yet').waitFor();
     await card.waitFor({ state: 'detached', timeout: 10_000 });

@@ -179,7 +179,8 @@ describe('Readings of a scene that changes', () => {
     const { store, readings, asked } = setUp();
     const all = () => probes(asked) as typeof asked;
     readings.askFacts();
-    readings.pictureIsOf(2);
+    readings.pictureIsOf(2, 7);
+    readings.drawn(7);
     await vi.advanceTimersByTimeAsync(2500);
     expect(all()).toHaveLength(0);
     void readings.pin({ x: 5, y: 6 });
@@ -195,26 +196,53 @@ describe('Readings of a scene that changes', () => {
     await vi.advanceTimersByTimeAsync(1500);
     expect(all()).toHaveLength(3);
     await all()[2]!.answer({ ...PROBE, temperature: -10, distance: 0.01 });
-    readings.pictureIsOf(2);
+    readings.pictureIsOf(2, 8);
+    readings.drawn(8);
     await vi.advanceTimersByTimeAsync(1500);
     expect(all()).toHaveLength(3);
     expect(store.pinned?.reading.probe.temperature).toBe(-10);
   });
 
-  it('are asked for again where the pointer rests', async () => {
-    const { store, readings, asked } = setUp();
+  it('are asked for again where the pointer rests, once the picture of it has been drawn', async () => {
+    const { store, readings, asked, picture } = setUp();
     const all = () => probes(asked) as typeof asked;
     readings.hover({ x: 7, y: 8 });
     await later();
     await all()[0]!.answer({ ...PROBE, temperature: 20 });
-    readings.pictureIsOf(2);
+    readings.pictureIsOf(2, 7);
+    readings.drawn(6);
     await vi.advanceTimersByTimeAsync(500);
+    expect(all()).toHaveLength(1);
+    picture.under = [4, 5, 6];
+    readings.drawn(7);
+    readings.drawn(8);
+    await vi.advanceTimersByTimeAsync(500);
+    expect(all()[1]!.params).toEqual({ position: [4, 5, 6] });
     await all()[1]!.answer({ ...PROBE, temperature: 80 });
     expect(store.hover?.probe.temperature).toBe(80);
     readings.hover(null);
-    readings.pictureIsOf(3);
+    readings.pictureIsOf(3, 9);
+    readings.drawn(9);
     await vi.advanceTimersByTimeAsync(1500);
     expect(all()).toHaveLength(2);
+  });
+
+  it('are asked for again of the same revision of another server', async () => {
+    const { readings, asked } = setUp();
+    const picture = (number: number) => {
+      readings.pictureIsOf(1, number);
+      readings.drawn(number);
+      return vi.advanceTimersByTimeAsync(2500);
+    };
+    await picture(1);
+    readings.hover({ x: 7, y: 8 });
+    await later();
+    await asked[0]!.answer(PROBE);
+    await picture(2);
+    expect(probes(asked)).toHaveLength(1);
+    readings.beginConnection();
+    await picture(3);
+    expect(probes(asked)).toHaveLength(2);
   });
 
   it('go where nothing is any more', async () => {

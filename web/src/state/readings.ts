@@ -59,6 +59,8 @@ export class Readings {
   /** Where in the scene the pinned reading was asked for, and from how far a vertex may answer for it. */
   #pinnedAt: { point: Vec3; reach: number } | null = null;
   #shownRevision: number | null = null;
+  /** Number of the picture in which something else may be under the pointer. */
+  #newPicture = Infinity;
 
   constructor(
     private readonly store: Store,
@@ -89,6 +91,8 @@ export class Readings {
   beginConnection(): void {
     this.#histogramAsker.reset();
     this.#againAsker.reset();
+    // Another server may count from the beginning.
+    this.#shownRevision = null;
   }
 
   /** There is no scene to read. */
@@ -133,10 +137,17 @@ export class Readings {
     }
   }
 
-  /** All of this revision of the scene is on the screen: something else may be under the pointer. */
-  pictureIsOf(revision: number): void {
+  /** All of this revision of the scene is in the picture of this number, which is yet to be drawn. */
+  pictureIsOf(revision: number, picture: number): void {
     if (revision === this.#shownRevision) return;
     this.#shownRevision = revision;
+    this.#newPicture = picture;
+  }
+
+  /** The pictures up to this number have been drawn: something else may be under the pointer. */
+  drawn(picture: number): void {
+    if (picture < this.#newPicture) return;
+    this.#newPicture = Infinity;
     this.#againAsker.push(true);
   }
 

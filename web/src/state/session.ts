@@ -434,7 +434,7 @@ export class Session {
     this.tiles.settle();
     this.store.shown = this.tiles.counts();
     this.#markers.update();
-    this.readings.pictureIsOf(message.scene_revision);
+    this.readings.pictureIsOf(message.scene_revision, this.viewport.nextPicture);
     this.#progress.completed(message);
     this.fusing.completed();
   }
@@ -453,6 +453,7 @@ export class Session {
     this.store.now = performance.now();
     this.store.heardAt = this.store.connected ? this.#connection.lastMessageAt : null;
     this.#progress.drawnHere(this.viewport.pictures);
+    this.readings.drawn(this.viewport.pictures);
     this.#progress.tick();
     this.#sayError();
     this.fusing.consider();
