@@ -233,6 +233,7 @@ export function addFusingTests(browser, scratch) {
     assert.ok(apart(theirs, here) > 0.2, 'the two settings look alike');
     assert.ok(apart(change, theirs) < 0.002, `${apart(change, theirs)} of the pixels are not the robot's`);
     await page.locator('[data-fusing="robot"]', { hasText: 'temperatures of before' }).waitFor({ timeout: 10_000 });
+    await page.waitForFunction(() => globalThis.spectra.store.isShareKnown, null, { timeout: 5000 });
     await setMethod(page, 'thermal_only');
     await isHere(page);
     await drawn(page);

@@ -70,6 +70,7 @@ function setUp({
       resubscribe: () => diary.push(`subscribe ${fusing.channels.join('+')}`),
       isBusy: () => busy.settings,
       onHighlighted: () => undefined,
+      onLeft: () => diary.push(`left to ${store.fusingPlace}`),
     },
     load ?? (() => WebAssembly.compile(readFileSync(MODULE))),
     true,
@@ -218,7 +219,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     await later();
     expect(asked).toEqual([]);
     expect([store.fusingPlace, store.fusingProblem, fusing.channels]).toEqual(['robot', null, ['fused']]);
-    expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'subscribe fused']);
+    expect(diary.slice(-4)).toEqual(['not here', 'fuse nothing', 'left to robot', 'subscribe fused']);
     store.scene = scene;
     fusing.consider();
     await vi.waitFor(() => expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096 }));
@@ -238,7 +239,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     busy.settings = false;
     fusing.completed();
     expect(store.fusingPlace).toBe('robot');
-    expect(diary.slice(-2)).toEqual(['not here', 'fuse nothing']);
+    expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'left to robot']);
   });
 
   it.each([
@@ -252,7 +253,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     store.fusionInForce = wanted;
     fusing.completed();
     expect(store.fusingPlace).toBe('robot');
-    expect(diary.slice(-2)).toEqual(['not here', 'fuse nothing']);
+    expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'left to robot']);
     expect(store.fusingProblem).toBeNull();
     expect(fusing.leftToRobot).toContain(words);
     fusing.consider();

@@ -32,6 +32,8 @@ export interface FusingEvents {
   isBusy: () => boolean;
   /** What a method highlights in the settings that are now in force here. */
   onHighlighted: (method: string, intervals: [number, number][]) => void;
+  /** Colours are not made here any more, and the robot's settings are those that count. */
+  onLeft: () => void;
 }
 
 /** What fusing needs of the picture. */
@@ -294,12 +296,14 @@ export class Fusing {
 
   #leaveAtOnce(): void {
     const wasSubscribed = this.#wantsRaw;
+    const wasHere = this.isHere;
     this.#wantsRaw = false;
-    if (this.isHere) {
+    this.store.fusingPlace = 'robot';
+    if (wasHere) {
       this.tiles.setHere(false);
       this.picture.fuse(null);
+      this.events.onLeft();
     }
-    this.store.fusingPlace = 'robot';
     if (wasSubscribed && this.store.connected) this.events.resubscribe();
   }
 

@@ -67,13 +67,16 @@ describe('the progress of a picture', () => {
     progress.tick();
     expect(store.behindSince).toBe(1000);
     store.generation = 4;
+    [store.progress, clock.now] = [0.5, 1400];
     progress.tick();
     expect(store.behindSince).toBeNull();
+    // All of the picture is what is in force, as if it had been said to be complete.
+    expect([store.progress, store.pictureMethod, store.lastUpdate]).toEqual([1, 'blend', { bytes: 0, ms: 400 }]);
     // The scene is another one, too.
     progress.begin();
     progress.begin(true);
     progress.tick();
-    expect(store.behindSince).toBe(1000);
+    expect(store.behindSince).toBe(1400);
   });
 
   it('is the share of the tiles: of all there may be before the first picture, of those that are wanted after it', () => {
@@ -94,6 +97,20 @@ describe('the progress of a picture', () => {
     tiles.total = 0;
     progress.tick();
     expect(store.progress).toBe(0);
+  });
+
+  it('is not behind where there is no scene, whatever is asked for', () => {
+    const { store, progress } = setUp();
+    progress.begin();
+    expect(store.behindSince).toBe(1000);
+    store.scene = null;
+    progress.begin();
+    expect(store.behindSince).toBeNull();
+    progress.begin(true);
+    expect(store.behindSince).toBeNull();
+    store.scene = {} as Scene;
+    progress.begin();
+    expect(store.behindSince).toBe(1000);
   });
 
   it('tells the rate of the last two seconds, and of nothing once the link is lost', () => {
@@ -139,6 +156,18 @@ describe('the progress of a picture', () => {
     progress.drawnHere(9);
     progress.tick();
     expect([store.hereSince, store.progress, store.settled]).toEqual([null, 1, true]);
+  });
+
+  it('is not behind settings of here any more once the robot makes the colours', () => {
+    const { store, progress } = setUp();
+    progress.beginHere('threshold', 7);
+    progress.leftHere();
+    expect(store.hereSince).toBeNull();
+    progress.completed(complete(1));
+    expect(store.pictureMethod).toBe('blend');
+    // Of a picture of before nothing is said any more.
+    progress.drawnHere(8);
+    expect(store.pictureMethod).toBe('blend');
   });
 
   it('is nothing while the server has not said what the named method is', () => {

@@ -17,7 +17,6 @@ export class Progress {
   #window: { at: number; bytes: number }[] = [];
   /** Settings that are shown here and are in no picture yet, by the number of the picture that they will be in. */
   #here: { picture: number; method: string; at: number }[] = [];
-
   /** What the picture is behind of are settings alone. */
   #mayBeRefused = false;
 
@@ -31,6 +30,8 @@ export class Progress {
 
   /** Another picture was asked for, or announced. `mayBeRefused`: by settings, of which the server may want no other picture. */
   begin(mayBeRefused = false): void {
+    // There will be no picture.
+    if (this.store.scene === null) return this.#notBehind();
     const isBehind = this.store.behindSince !== null;
     this.#mayBeRefused = mayBeRefused && (!isBehind || this.#mayBeRefused);
     if (isBehind) return;
@@ -48,12 +49,7 @@ export class Progress {
     const { store } = this;
     store.complete = message;
     if (message.generation < store.generation || this.isBusy()) return;
-    if (store.behindSince !== null) {
-      store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: this.now() - store.behindSince };
-    }
     this.#caughtUp();
-    store.progress = 1;
-    if (store.hereSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
   }
 
   /** A method is shown by what is here, in the picture of this number. */
@@ -74,9 +70,15 @@ export class Progress {
     if (this.store.hereSince === null && this.store.behindSince === null) this.store.progress = 1;
   }
 
+  /** Nothing is made here any more. */
+  leftHere(): void {
+    this.#here = [];
+    this.store.hereSince = null;
+  }
+
   /** Nothing comes any more: there is nothing to be behind of. */
   disconnected(): void {
-    this.#caughtUp();
+    this.#notBehind();
     this.store.rate_bytes_per_s = 0;
   }
 
@@ -94,6 +96,16 @@ export class Progress {
   }
 
   #caughtUp(): void {
+    const { store } = this;
+    if (store.behindSince !== null) {
+      store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: this.now() - store.behindSince };
+    }
+    this.#notBehind();
+    store.progress = 1;
+    if (store.hereSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
+  }
+
+  #notBehind(): void {
     this.store.behindSince = null;
     this.#mayBeRefused = false;
   }

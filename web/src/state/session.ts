@@ -106,6 +106,10 @@ export class Session {
       resubscribe: () => void this.#subscription.channelsChanged(),
       isBusy: () => this.settings.busy,
       onHighlighted: (method, highlighted) => this.#share.changed(method, highlighted),
+      onLeft: () => {
+        this.#progress.leftHere();
+        this.readings.askHistogram();
+      },
     });
     this.readings = new Readings(store, this.viewport, {
       request,
@@ -435,8 +439,9 @@ export class Session {
     this.store.shown = this.tiles.counts();
     this.#markers.update();
     this.readings.pictureIsOf(message.scene_revision, this.viewport.nextPicture);
-    this.#progress.completed(message);
+    // What is not made here any more is not waited for.
     this.fusing.completed();
+    this.#progress.completed(message);
   }
 
   #cameraMoved(pose: CameraPose): void {

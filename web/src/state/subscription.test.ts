@@ -131,6 +131,16 @@ describe('a subscription', () => {
     expect(diary).toContain('readings cleared');
   });
 
+  it('is behind of nothing without a scene, and knows that before anything else is asked for', () => {
+    const { store, subscription, concerned } = setUp();
+    const scenes: unknown[] = [];
+    concerned.progress.begin.mockImplementation(() => scenes.push(store.scene));
+    subscription.greeted(HELLO);
+    subscription.sceneChanged(null);
+    subscription.greeted(WITHOUT_SCENE);
+    expect(scenes).toEqual([HELLO.scene, null, null]);
+  });
+
   it('claims what it holds of the session before, once that has been subscribed to', async () => {
     const { subscription, asked, concerned } = setUp();
     const able = { ...HELLO, capabilities: [...HELLO.capabilities, 'resume'] };
