@@ -427,7 +427,13 @@ asio::awaitable<void> HttpConnection::serve_frames(Request request) {
     co_return;
   }
   is_handed_over_ = true;
-  const auto session = std::make_shared<FramesSession>(std::move(stream_), context_, *context_.frames, *who_.identity);
+  std::shared_ptr<FramesSession> session;
+  try {
+    session = std::make_shared<FramesSession>(std::move(stream_), context_, *context_.frames, *who_.identity);
+  } catch (...) {
+    context_.frames->end();  // For the next robot.
+    throw;
+  }
   context_.remove(this);
   co_await session->run(std::move(request));
 }

@@ -28,9 +28,37 @@ SenderSession::SenderSession(Transport stream, ServerContext& context, access::A
       minder_timer_(ws_.get_executor()),
       reader_timer_(ws_.get_executor()) {}
 
+/// Held by each of a session's coroutines: one that is lost for lack of memory ends the session, whose receiver waits for another sender then.
+class SenderSession::Part {
+ public:
+  explicit Part(SenderSession& session) : session_(session.shared_from_this()) {}
+  ~Part() {
+    if (is_done_) return;
+    try {
+      session_->end(true, "there is no memory for it");
+    } catch (const std::exception& error) {
+      spdlog::error("the connection of {} could not be closed: {}", session_->kind_.name, error.what());
+    }
+  }
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
+  void done() { is_done_ = true; }
+
+ private:
+  const std::shared_ptr<SenderSession> session_;
+  bool is_done_ = false;
+};
+
+asio::awaitable<void> SenderSession::whole(asio::awaitable<void> work) {
+  Part part(*this);
+  co_await std::move(work);
+  part.done();
+}
+
 asio::awaitable<void> SenderSession::run(UpgradeRequest request) {
   using namespace asio::experimental::awaitable_operators;
   const auto self = shared_from_this();
+  Part part(*this);
   try {
     beast::get_lowest_layer(ws_).expires_never();
     set_up_websocket(ws_, context_.options.limits.header_timeout, std::string(kind_.subprotocol),
@@ -42,14 +70,16 @@ asio::awaitable<void> SenderSession::run(UpgradeRequest request) {
     const Registration registration(context_, self);
     if (accept_error || !registration.is_taken()) {
       end(false, "the upgrade was not finished");
+      part.done();
       co_return;
     }
     spdlog::info("{} has come", kind_.name);
-    co_await (read_messages() && write_answers() && mind_deadlines());
+    co_await (whole(read_messages()) && whole(write_answers()) && whole(mind_deadlines()));
   } catch (const std::exception& error) {
     spdlog::error("the session of {} failed: {}", kind_.name, error.what());
   }
   end(false, "");
+  part.done();
 }
 
 void SenderSession::control_received(websocket::frame_type kind, std::string_view payload) {
@@ -141,12 +171,12 @@ void SenderSession::close(std::uint16_t code, std::string_view reason) {
 void SenderSession::end(bool is_cut, std::string_view why) {
   if (is_ended_) return;
   is_ended_ = true;
+  ended();
   if (is_cut) {
     spdlog::info("{} is cut: {}", kind_.name, why);
   } else {
     spdlog::info("{} has gone: {}", kind_.name, why);
   }
-  ended();
   beast::get_lowest_layer(ws_).close();
   notify_writer();
   resume_reading();

@@ -80,6 +80,8 @@ class SenderSession : public Stoppable, public std::enable_shared_from_this<Send
   ServerContext& context_;
 
  private:
+  class Part;
+  boost::asio::awaitable<void> whole(boost::asio::awaitable<void> work);
   boost::asio::awaitable<void> write_answers();
   boost::asio::awaitable<bool> write(std::string text);
   boost::asio::awaitable<void> mind_deadlines();
