@@ -60,23 +60,11 @@ struct CodeRange {
 
 /// Characters that are not seen themselves, but move a terminal, turn the text beside them round, or make two names look the
 /// same: controls and formats (categories Cc, Cf, Zl and Zp of Unicode).
-constexpr std::array<CodeRange, 17> kUnseen = {{{0, 0x9F},
-                                                {0xAD, 0xAD},
-                                                {0x600, 0x605},
-                                                {0x61C, 0x61C},
-                                                {0x6DD, 0x6DD},
-                                                {0x70F, 0x70F},
-                                                {0x890, 0x891},
-                                                {0x8E2, 0x8E2},
-                                                {0x180E, 0x180E},
-                                                {0x200B, 0x200F},
-                                                {0x2028, 0x202E},
-                                                {0x2060, 0x206F},
-                                                {0xFEFF, 0xFEFF},
-                                                {0xFFF9, 0xFFFB},
-                                                {0x13430, 0x1343F},
-                                                {0x1D173, 0x1D17A},
-                                                {0xE0000, 0xE007F}}};
+constexpr std::array<CodeRange, 20> kUnseen = {
+    {{0, 0x9F},          {0xAD, 0xAD},       {0x600, 0x605},     {0x61C, 0x61C},     {0x6DD, 0x6DD},
+     {0x70F, 0x70F},     {0x890, 0x891},     {0x8E2, 0x8E2},     {0x180E, 0x180E},   {0x200B, 0x200F},
+     {0x2028, 0x202E},   {0x2060, 0x206F},   {0xFEFF, 0xFEFF},   {0xFFF9, 0xFFFB},   {0x110BD, 0x110BD},
+     {0x110CD, 0x110CD}, {0x13430, 0x1343F}, {0x1BCA0, 0x1BCA3}, {0x1D173, 0x1D17A}, {0xE0000, 0xE007F}}};
 
 /// The bytes of the UTF-8 character that the text begins with; 0 when it is none, or one that a terminal obeys or that turns
 /// the text beside it round.

@@ -18,10 +18,10 @@ class TokenBucket {
     return true;
   }
 
-  /// Takes a token that may not be there yet; returns the seconds after which it is. Who reserves later waits longer.
-  double reserve_s(double now_s) {
+  /// Takes tokens that may not be there yet; returns the seconds after which they are. Who reserves later waits longer.
+  double reserve_s(double now_s, double count = 1) {
     refill(now_s);
-    tokens_ -= 1;
+    tokens_ -= count;
     return std::max(0.0, -tokens_ / rate_per_s_);
   }
 

@@ -95,7 +95,8 @@ std::string metrics_text(const session::ServedScene& served, const sources::MapK
               as_double(net.accept_failures));
   out.counter("spectra_http_requests_total", "HTTP requests, upgrades included.", as_double(net.requests));
   out.counter("spectra_http_requests_delayed_total",
-              "HTTP requests that waited for their turn: too many of an address.", as_double(net.requests_delayed));
+              "HTTP requests that waited for their turn: too many, or too many bytes, of an address.",
+              as_double(net.requests_delayed));
   out.counter("spectra_http_requests_refused_total", "HTTP requests refused by a check.",
               as_double(net.requests_refused));
   out.counter("spectra_messages_received_total", "WebSocket messages from viewers.", as_double(net.messages_received));

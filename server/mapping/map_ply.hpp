@@ -20,7 +20,7 @@ base::Result<void> write_map_ply(const std::filesystem::path& file, const UnitMe
                                  const base::Progress& progress = {});
 
 /// The same in memory: what a server takes as a block. `begin_unix_s`: when the map's first moment was, Unix seconds. Inconsistent where the mesh
-/// has not one value of each kind for each vertex.
+/// has fewer values of a kind than vertices.
 base::Result<std::string> block_ply(const UnitMesh& mesh, double begin_unix_s);
 
 /// The same of units, by all threads of a pool; empty for one without a surface.

@@ -141,6 +141,8 @@ HttpReply encrypted_elsewhere(const http::request<http::string_body>& request, s
 
 /// A token or a role.
 constexpr std::size_t kSessionBodyBytes = 1024;
+/// What a body is ahead of its rate by before its reading pauses.
+constexpr double kLeastPause_s = 0.02;
 /// For a peer who is refused while he is sending.
 constexpr std::chrono::seconds kFarewell{1};
 constexpr std::size_t kFarewellBytes = std::size_t{4} << 20U;
@@ -443,14 +445,18 @@ asio::awaitable<void> HttpConnection::refuse_upgrade(const Request& request, con
   co_await write(reply, request.version(), request.method() == http::verb::head, false);
 }
 
-asio::awaitable<void> HttpConnection::wait_for_turn() {
-  const double delay_s = context_.request_delay_s(peer_address_, steady_seconds());
-  if (delay_s <= 0 || is_stopping_) co_return;
-  context_.metrics.requests_delayed += 1;
+asio::awaitable<void> HttpConnection::pause(double delay_s) {
   stream_.next_layer().expires_never();
   turn_timer_.expires_after(
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(delay_s)));
   co_await turn_timer_.async_wait(kAwait);
+}
+
+asio::awaitable<void> HttpConnection::wait_for_turn() {
+  const double delay_s = context_.request_delay_s(peer_address_, steady_seconds());
+  if (delay_s <= 0 || is_stopping_) co_return;
+  context_.metrics.requests_delayed += 1;
+  co_await pause(delay_s);
   stream_.next_layer().expires_after(context_.options.limits.header_timeout);
 }
 
@@ -467,10 +473,16 @@ asio::awaitable<std::tuple<error_code, std::size_t>> HttpConnection::read_body(
   if (const auto error = co_await ask_for_body(parser)) co_return std::tuple(error, std::size_t{0});
   // Else it is read in pieces of the size that a header needed, each of which costs as much as a large one.
   if (!parser.is_done()) buffer_.reserve(buffer_.max_size());
+  bool is_delayed = false;
   while (!parser.is_done()) {
     stream_.next_layer().expires_after(context_.options.limits.body_timeout);
     const auto [error, size] = co_await http::async_read_some(stream_, buffer_, parser, kAwait);
     if (error) co_return std::tuple(error, size);
+    const double delay_s = context_.block_delay_s(peer_address_, size, steady_seconds());
+    if (parser.is_done() || delay_s < kLeastPause_s || is_stopping_) continue;
+    if (!is_delayed) context_.metrics.requests_delayed += 1;
+    is_delayed = true;
+    co_await pause(delay_s);
   }
   co_return std::tuple(error_code{}, std::size_t{0});
 }

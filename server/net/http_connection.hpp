@@ -45,6 +45,7 @@ class HttpConnection final : public Stoppable, public std::enable_shared_from_th
   boost::asio::awaitable<void> refuse_upgrade(const Request& request, const HttpReply& reply);
   boost::asio::awaitable<HttpReply> answer(const HttpRequest& request);
   boost::asio::awaitable<bool> write(const HttpReply& reply, unsigned version, bool is_head, bool keep_alive);
+  boost::asio::awaitable<void> pause(double delay_s);
   /// Waits as long as others of the address, and earlier requests, go before.
   boost::asio::awaitable<void> wait_for_turn();
   /// Tells who waits for it that the body may come.

@@ -36,6 +36,8 @@ constexpr std::array kEntries{
     Entry{"block-bytes", Unit::Bytes, &NetLimits::block_size_bytes, 1024, 4 * kGiga, "one block of the map: 413"},
     Entry{"block-bytes-at-once", Unit::Bytes, &NetLimits::block_bytes_at_once, 1024, 64 * kGiga,
           "all blocks that are being received or answered: 503, or the stream waits"},
+    Entry{"block-bytes-per-second", Unit::BytesPerSecond, &NetLimits::block_bytes_per_s, 1024, 100 * kGiga,
+          "bodies of blocks (PUT) from one address; then they are read more slowly"},
     Entry{"senders", Unit::Count, &NetLimits::ingest_sessions, 0, 1e4, "streams of blocks at a time: 503"},
     Entry{"credit-blocks", Unit::Count, &NetLimits::ingest_credit_blocks, 1, 1e6,
           "blocks of a stream that wait for their answers: 4001"},

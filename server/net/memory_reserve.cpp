@@ -24,8 +24,9 @@ void give_part_back() {
   for (auto& part : parts) {
     if (void* const memory = part.exchange(nullptr)) {
       ::munmap(memory, kPartBytes);
-      // A destructor on the way of an exception must not throw: the program would end. It tries again.
-      if (std::uncaught_exceptions() > 0) return;
+      // A destructor must not throw: the program would end. Whoever may be in one tries again: all of them while there is plenty, and on
+      // the way of an exception to the end.
+      if (std::uncaught_exceptions() > 0 || memory_reserve_bytes() >= kPartBytes * kPartCount / 2) return;
       break;
     }
   }

@@ -4,9 +4,9 @@
 
 namespace spectra::net {
 
-/// From now on, where `new` finds no memory, a part of a reserve goes back to the system before std::bad_alloc is thrown, so that what was
-/// begun can be taken apart: destructors may want memory, too (that of nlohmann::json does), and end the program where there is none:
-/// on the way of an exception it is not thrown, and `new` tries again. The
+/// From now on, where `new` finds no memory, a part of a reserve goes back to the system, so that what was begun can be taken apart:
+/// destructors may want memory, too (that of nlohmann::json does), and end the program where there is none. `new` tries again as long
+/// as half of the reserve is left, and on the way of an exception as long as any is; std::bad_alloc is thrown after that. The
 /// reserve is address space without pages. To be called once, before there are threads.
 void keep_memory_reserve();
 

@@ -17,7 +17,7 @@ struct NetMetrics {
   std::atomic<std::uint64_t> connections_refused{0};  ///< Over max_connections.
   std::atomic<std::uint64_t> handshakes_failed{0};    ///< Of TLS.
   std::atomic<std::uint64_t> requests{0};             ///< HTTP, upgrades included.
-  std::atomic<std::uint64_t> requests_delayed{0};     ///< Of an address that asks too often.
+  std::atomic<std::uint64_t> requests_delayed{0};     ///< Of an address that asks, or sends, too much.
   std::atomic<std::uint64_t> requests_refused{0};     ///< Answered with 4xx.
   std::atomic<std::int64_t> viewers{0};               ///< WebSocket sessions now.
   std::atomic<std::uint64_t> viewers_total{0};

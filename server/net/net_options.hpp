@@ -20,7 +20,8 @@ struct NetLimits {
   std::size_t body_size_bytes = 1024 * 1024;
   std::size_t block_size_bytes = std::size_t{256} * 1024 * 1024;     ///< One block that is put into the map.
   std::size_t block_bytes_at_once = std::size_t{512} * 1024 * 1024;  ///< All that are being received or answered.
-  std::size_t ingest_sessions = 16;                                  ///< Senders of blocks at a time.
+  double block_bytes_per_s = 100e6;          ///< Of one address; beyond it the reading of bodies of blocks pauses.
+  std::size_t ingest_sessions = 16;          ///< Senders of blocks at a time.
   std::uint64_t ingest_credit_blocks = 256;  ///< Messages of one sender that wait for their answers.
   std::uint64_t ingest_credit_bytes = std::uint64_t{32} * 1024 * 1024;  ///< Their bytes; the last may go beyond.
   std::size_t message_size_bytes = 64 * 1024;                           ///< One WebSocket message of a client.

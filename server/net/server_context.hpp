@@ -58,8 +58,13 @@ class ServerContext {
 
   /// Seconds for which a request from there is to wait for its turn.
   double request_delay_s(const std::string& address, double now_s) {
-    const std::lock_guard lock(request_rates_mutex_);
+    const std::lock_guard lock(address_rates_mutex_);
     return request_rates_.of(address).reserve_s(now_s);
+  }
+  /// Seconds for which the rest of a block from there is to wait, after so many bytes more of it.
+  double block_delay_s(const std::string& address, std::size_t size_bytes, double now_s) {
+    const std::lock_guard lock(address_rates_mutex_);
+    return block_rates_.of(address).reserve_s(now_s, static_cast<double>(size_bytes));
   }
 
   /// For the messages to viewers.
@@ -106,9 +111,11 @@ class ServerContext {
     return alive;
   }
 
-  std::mutex request_rates_mutex_;
+  std::mutex address_rates_mutex_;
   access::AddressRates request_rates_{options.limits.http_requests_per_s,
                                       options.limits.http_requests_per_s* options.limits.message_burst_s};
+  access::AddressRates block_rates_{options.limits.block_bytes_per_s,
+                                    options.limits.block_bytes_per_s* options.limits.message_burst_s};
   std::mutex mutex_;
   bool stopping_ = false;
   std::map<const Stoppable*, std::weak_ptr<Stoppable>> connections_;

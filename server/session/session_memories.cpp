@@ -59,7 +59,7 @@ SessionMemories::Sessions SessionMemories::forget(double now_s) {
     if (place->second.stream.expired()) {
       gone.insert(sessions_.extract(place));
     } else {
-      place->second.memory = nullptr;
+      gone[place->first].memory.swap(place->second.memory);
     }
     return next;
   };

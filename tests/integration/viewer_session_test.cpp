@@ -354,6 +354,27 @@ TEST_F(ViewerSessionTest, ARefusalReachesWhoIsStillSending) {
   }
 }
 
+TEST_F(ViewerSessionTest, BlocksAreReadMoreSlowlyFromWhoSendsTooMuch) {
+  server_->stop();
+  auto options = quick_options();
+  options.limits.block_bytes_per_s = 1e6;
+  options.limits.message_burst_s = 0.1;
+  start(options);
+  ASSERT_EQ(map_.restore(), std::nullopt);
+  const auto put = [&](std::size_t size) {
+    RawClient sender(server_->port());
+    sender.send("PUT /api/v1/blocks/a HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: " +
+                std::to_string(size) + "\r\n\r\n" + std::string(size, 'x'));
+    return status_of(sender.receive_all().value_or(""));
+  };
+  EXPECT_EQ(put(90'000), 422) << "is no PLY";
+  EXPECT_EQ(server_->metrics().requests_delayed, 0U);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(put(400'000), 422) << "is read to its end";
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(200));
+  EXPECT_EQ(server_->metrics().requests_delayed, 1U);
+}
+
 TEST_F(ViewerSessionTest, GreetsWithEverythingAClientNeeds) {
   serve(sheet(60));
   Viewer viewer(server_->port());

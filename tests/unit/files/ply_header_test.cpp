@@ -97,8 +97,9 @@ TEST(PlyHeader, NamesAreShownAsTheyAreUnlessTheyCannotBe) {
   EXPECT_EQ(printable("\xc0\xaf|\xed\xa0\x80|\xe6\xb8"), "??|???|??");  // Overlong, half a pair, cut short.
   EXPECT_EQ(printable("\xf4\x90\x80\x80|\xf5|\x80"), "????|?|?");
   EXPECT_EQ(printable("a\u009bb\u202ec\u2028d"), "a??b???c???d");  // They move a terminal or turn a line round.
-  for (const std::string unseen : {"\u00ad", "\u061c", "\u180e", "\u200b", "\u2066", "\ufeff", "\ufff9", "\ufffb",
-                                   "\U000e0001", "\U000e0020", "\U000e007f"}) {
+  for (const std::string unseen :
+       {"\u00ad", "\u061c", "\u180e", "\u200b", "\u2066", "\ufeff", "\ufff9", "\ufffb", "\U000110bd", "\U000110cd",
+        "\U0001bca3", "\U000e0001", "\U000e0020", "\U000e007f"}) {
     EXPECT_EQ(printable("a" + unseen + "b"), "a" + std::string(unseen.size(), '?') + "b") << unseen.size();
   }
   for (const std::string seen : {"\u00ac", "\u00ae", "\u061b", "\u180d", "\ufffc", "\U000e0080"}) {
