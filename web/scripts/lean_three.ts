@@ -1,11 +1,45 @@
 import type { Plugin } from 'vite';
 
-/** What WebGLRenderer asks of the parts that are never used here: as they answer when they are switched off. */
+/**
+ * What is asked of parts that are never used here: as they answer when they are switched off, or have raw shader materials alone to draw
+ * and one colour behind them.
+ */
 const HOLLOW: Record<string, string> = {
+  'core/Raycaster.js': 'export class Raycaster {}',
   'extras/PMREMGenerator.js': 'export class PMREMGenerator {}',
+  'renderers/shaders/ShaderChunk.js': 'export const ShaderChunk = {};',
+  'renderers/shaders/ShaderLib.js': 'export const ShaderLib = {};',
+  'renderers/webgl/WebGLBackground.js': `
+    import { Color } from '../../math/Color.js';
+    import { getUnlitUniformColorSpace } from '../shaders/UniformsUtils.js';
+    export function WebGLBackground(renderer, cubemaps, cubeuvmaps, state, objects, alpha, premultipliedAlpha) {
+      const colour = new Color(0);
+      const rgb = {};
+      let clearAlpha = alpha ? 0 : 1;
+      const set = () => {
+        colour.getRGB(rgb, getUnlitUniformColorSpace(renderer));
+        state.buffers.color.setClear(rgb.r, rgb.g, rgb.b, clearAlpha, premultipliedAlpha);
+      };
+      return {
+        getClearColor: () => colour,
+        setClearColor(next, alpha = 1) { colour.set(next); clearAlpha = alpha; set(); },
+        getClearAlpha: () => clearAlpha,
+        render() { set(); if (renderer.autoClear) renderer.clear(); },
+        addToRenderList() {},
+      };
+    }`,
   'renderers/webgl/WebGLCubeMaps.js': 'export function WebGLCubeMaps() { return { get: (texture) => texture, dispose() {} }; }',
   'renderers/webgl/WebGLCubeUVMaps.js':
     'export function WebGLCubeUVMaps() { return { get: (texture) => texture, dispose() {} }; }',
+  'renderers/webgl/WebGLLights.js': `export function WebGLLights() {
+    const none = [];
+    const state = { version: 0, directional: none, point: none, spot: none, spotLightMap: none, rectArea: none, hemi: none,
+      directionalShadowMap: none, pointShadowMap: none, spotShadowMap: none, numSpotLightShadowsWithMaps: 0, numLightProbes: 0 };
+    return { state, setup() {}, setupView() {} };
+  }`,
+  'renderers/webgl/WebGLMaterials.js': `export function WebGLMaterials() {
+    return { refreshMaterialUniforms(uniforms, material) { material.uniformsNeedUpdate = false; } };
+  }`,
   'renderers/webgl/WebGLMorphtargets.js': 'export function WebGLMorphtargets() { return { update() {} }; }',
   'renderers/webgl/WebGLUniformsGroups.js':
     'export function WebGLUniformsGroups() { return { bind() {}, update() {}, dispose() {} }; }',
@@ -33,13 +67,15 @@ export function leanThree(): Plugin {
       const [, file] = /\/three\/src\/(.*)$/.exec(id) ?? [];
       if (file === undefined) return null;
       if (/^renderers\/shaders\/ShaderChunk\/.*\.glsl\.js$/.test(file)) return "export default '';";
-      if (/^renderers\/shaders\/ShaderLib\/.*\.glsl\.js$/.test(file))
-        return "export const vertex = ''; export const fragment = '';";
       return HOLLOW[file] ?? null;
     },
-    // What it says to who programs with it: 6 kB in every worker that draws.
+    // Without what it says to who programs with it, and without how its objects are written to files and met by rays.
     transform(code, id) {
-      return /\/three\/src\//.test(id) ? { code: code.replace(/'THREE\.(?:[^'\\\n]|\\.)*'/g, "'three.js'"), map: null } : null;
+      if (!/\/three\/src\//.test(id)) return null;
+      const lean = code
+        .replace(/'THREE\.(?:[^'\\\n]|\\.)*'/g, "'three.js'")
+        .replace(/^\t(?:toJSON|raycast)\(.*\) \{\n[^]*?^\t\}\n/gm, '');
+      return { code: lean, map: null };
     },
   };
 }
