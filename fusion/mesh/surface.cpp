@@ -78,7 +78,9 @@ void sample(const base::Vec3f& a, const base::Vec3f& b, const base::Vec3f& c, do
 /// The largest distance seen; looks closer only at points that would raise it.
 class LargestDistance {
  public:
-  explicit LargestDistance(const Surface& surface) : surface_(surface) {}
+  /// Of those that are larger than `seen_squared`.
+  explicit LargestDistance(const Surface& surface, double seen_squared = 0)
+      : surface_(surface), largest_squared_(seen_squared) {}
 
   void add(const base::Vec3f& p, std::span<const std::uint32_t> starts) {
     double squared = std::numeric_limits<double>::infinity();
@@ -94,13 +96,13 @@ class LargestDistance {
     largest_squared_ = std::max(largest_squared_, squared);
   }
 
-  double metres() const { return std::sqrt(largest_squared_); }
+  double squared() const { return largest_squared_; }
 
  private:
   static constexpr int kMostExact = 1000;
 
   const Surface& surface_;
-  double largest_squared_ = 0;
+  double largest_squared_;
   int exact_count_ = 0;
 };
 
@@ -195,10 +197,10 @@ Surface::Surface(std::span<const base::Vec3f> positions, std::span<const base::T
   }
 }
 
-std::uint32_t Surface::nearest_vertex_near(const base::Vec3f& p, std::uint32_t start) const {
+std::uint32_t Surface::nearest_vertex_near(const base::Vec3f& p, std::uint32_t start, double enough) const {
   constexpr int kMostSteps = 24;
   double nearest = squared_distance(p, positions_[start]);
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMostSteps && nearest > enough; ++step) {
     const std::uint32_t from = start;
     const auto around = triangles_around(from);
     for (const std::uint32_t t : around.first(std::min(around.size(), kMostTriangles))) {
@@ -224,7 +226,7 @@ NearTriangle Surface::triangle_near(const base::Vec3f& p, std::uint32_t start, d
   std::array<std::uint32_t, kMostSteps> visited{};
   double best = std::numeric_limits<double>::infinity();
   std::uint32_t best_triangle = kNone;
-  std::uint32_t vertex = nearest_vertex_near(p, start);
+  std::uint32_t vertex = nearest_vertex_near(p, start, enough);
   for (std::size_t step = 0; step < kMostSteps; ++step) {
     visited[step] = vertex;
     const double before = best;
@@ -320,7 +322,7 @@ std::vector<bool> Surface::open_vertices() const {
 double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<const std::uint32_t> coarse_of_fine,
                           std::span<const std::uint32_t> fine_of_coarse) {
   const double spacing = 1.5 * mean_edge_length(fine);
-  LargestDistance from_coarse(coarse), from_fine(fine);
+  LargestDistance from_coarse(coarse);
   for (std::size_t v = 0; v < fine.positions().size(); ++v) {
     if (fine_of_coarse[coarse_of_fine[v]] != v) from_coarse.add(fine.positions()[v], {&coarse_of_fine[v], 1});
   }
@@ -332,8 +334,9 @@ double two_sided_distance(const Surface& fine, const Surface& coarse, std::span<
     }
   };
   add_samples(fine, from_coarse, coarse_of_fine);
-  add_samples(coarse, from_fine, fine_of_coarse);
-  return std::max(from_coarse.metres(), from_fine.metres());
+  LargestDistance either(fine, from_coarse.squared());
+  add_samples(coarse, either, fine_of_coarse);
+  return std::sqrt(either.squared());
 }
 
 }  // namespace spectra::mesh

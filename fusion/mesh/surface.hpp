@@ -66,8 +66,8 @@ class Surface {
   static constexpr std::size_t kMostTriangles =
       64;  ///< Looked at around a vertex: a hub of thousands would cost squares.
 
-  /// From vertex to vertex as long as they come nearer.
-  std::uint32_t nearest_vertex_near(const base::Vec3f& p, std::uint32_t start) const;
+  /// From vertex to vertex as long as they come nearer, and none is near enough (squared).
+  std::uint32_t nearest_vertex_near(const base::Vec3f& p, std::uint32_t start, double enough) const;
 
   std::span<const base::Vec3f> positions_;
   std::span<const base::Triangle> triangles_;
