@@ -65,7 +65,8 @@ const released = made.get(last);
 await client.complete(last, 300_000);
 
 const generations = [...made.keys()].sort((a, b) => a - b);
-const coarse = arrivals.filter(({ level }) => level === 0);
+const coarsest = Math.min(...arrivals.map(({ level }) => level));
+const coarse = arrivals.filter(({ level }) => level === coarsest);
 let shown = generations[0] - 1;
 let worst_lag_ms = 0;
 for (const { generation, at } of coarse) {
