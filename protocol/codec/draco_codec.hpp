@@ -40,7 +40,7 @@ Result<std::vector<std::byte>> encoded_colours(std::span<const ColourBytes> colo
                                                ColourTransform transform = ColourTransform::None,
                                                std::span<const std::uint8_t> marks = {});
 
-/// Temperatures as whole numbers: degC = code * scale + offset in 32-bit float, each operation rounded.
+/// Temperatures as whole numbers: degC = code * scale + offset; how that is rounded is fusion::TemperatureCodes'.
 struct TemperatureTable {
   float scale = 1;
   float offset = 0;

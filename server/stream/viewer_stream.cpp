@@ -361,6 +361,7 @@ void ViewerStream::take_channels(const Subscription& subscription) {
   if (subscription.temperature_step_celsius != raw.temperature_step_celsius) {
     raw.temperature_step_celsius = subscription.temperature_step_celsius;
     ++raw.epoch[RawDemand::kTemperature];
+    for (const auto& slot : tiles_.slots()) slot->raw[RawDemand::kTemperature].put_down();
   }
   raw.is_wanted[RawDemand::kTemperature] = subscription.temperature;
   raw.is_wanted[RawDemand::kVisible] = subscription.visible;

@@ -19,8 +19,7 @@ void TileSlot::forget_raw() {
   for (Raw& layer : raw) {
     layer.held_epoch = 0;
     layer.failed_epoch = 0;
-    layer.payload = nullptr;
-    if (layer.work == Work::Ready) layer.work = Work::Idle;
+    layer.put_down();
   }
 }
 

@@ -76,6 +76,12 @@ struct TileSlot {
     Payload payload;               ///< While Ready; of `held.revision`.
     std::uint64_t held_epoch = 0;  ///< Of RawDemand; 0 = the viewer does not have it.
     std::uint64_t failed_epoch = 0;
+    /// Ready -> Idle; anything else stays as it is.
+    void put_down() {
+      if (work != Work::Ready) return;
+      work = Work::Idle;
+      payload = nullptr;
+    }
   };
 
   Wish wish;

@@ -1,9 +1,11 @@
 // Raw layers on the wire: what they say, when they come, what a setting costs a client that fuses by itself, and that the web
 // client's module makes of them what the server sends as fused colours.
 import assert from "node:assert/strict";
-import { existsSync } from "node:fs";
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { test } from "node:test";
-import { KIND, SpectraClient } from "./spectra_client.mjs";
+import { celsiusOf, KIND, SpectraClient } from "./spectra_client.mjs";
 import { serve } from "./spectra_server.mjs";
 import { loadModule, moduleIsThere, Placed, prepare } from "../../module/client_module.mjs";
 
@@ -31,6 +33,16 @@ async function factsOf(client) {
 
 const changeOf = ({ method, params, palette, range, missing }) => ({ method, params, palette, range, missing });
 
+/** What the module makes of a tile's raw layers under its plan. */
+function fusedHere(module, { temperature: { codes, scale, offset }, visible }) {
+  const bytes = Buffer.from(codes.buffer, codes.byteOffset, codes.byteLength);
+  const placed = new Placed(module, bytes, visible, visible.length);
+  module.fuseCodes(placed.addresses[0], scale, offset, placed.addresses[1], placed.addresses[2], codes.length);
+  const fused = Buffer.from(module.bytes(placed.addresses[2], visible.length));
+  placed.release();
+  return fused;
+}
+
 test("raw layers follow the picture, and switching channels sends nothing again", async () => {
   const server = await serve(["--demo"]);
   try {
@@ -46,7 +58,7 @@ test("raw layers follow the picture, and switching channels sends nothing again"
       assert.equal(temperature.codes.length, frame.vertexCount);
       assert.equal(visible.length, 3 * frame.vertexCount);
       assert.ok(Math.abs(temperature.scale - 0.01) < 1e-6);
-      const degrees = [...temperature.codes].filter((code) => code < 65533).map((code) => code * temperature.scale + temperature.offset);
+      const degrees = [...temperature.codes].filter((code) => code < 65533).map((code) => celsiusOf(code, temperature));
       assert.ok(degrees.every((value) => value >= frame.lowest - 0.0051 && value <= frame.highest + 0.0051));
     }
 
@@ -91,14 +103,9 @@ test("the module makes of raw layers what the server fuses, within the step", { 
       let apart = 0;
       for (const tile of client.tiles.values()) {
         if (tile.generation !== generation || !tile.temperature || !tile.visible) continue;
-        const { codes, scale, offset } = tile.temperature;
-        const bytes = Buffer.from(codes.buffer, codes.byteOffset, codes.byteLength);
-        const placed = new Placed(module, bytes, tile.visible, tile.visible.length);
-        module.fuseCodes(placed.addresses[0], scale, offset, placed.addresses[1], placed.addresses[2], codes.length);
-        const fused = module.bytes(placed.addresses[2], tile.visible.length);
+        const fused = fusedHere(module, tile);
         channels += fused.length;
         for (let i = 0; i < fused.length; ++i) apart += Math.abs(fused[i] - tile.colours[i]) > 3 ? 1 : 0;
-        placed.release();
       }
       assert.ok(channels > 100_000, `${method}: ${channels} channels`);
       // Half a step is 0.005 degC: what stands on a threshold may go either way.
@@ -109,6 +116,70 @@ test("the module makes of raw layers what the server fuses, within the step", { 
     await server.stop();
   }
 });
+
+/** A sheet of 60 x 60 vertices; `celsiusAt` of each in its column, as it is to be written. */
+function sheet(celsiusAt) {
+  const side = 60;
+  const vertices = [];
+  const faces = [];
+  for (let x = 0; x < side; ++x) {
+    for (let y = 0; y < side; ++y) {
+      vertices.push(`${x * 0.05} ${y * 0.05} 0 90 ${4 * x} ${4 * y} ${celsiusAt(x)}`);
+      const v = x * side + y;
+      if (x > 0 && y > 0) faces.push(`3 ${v - side - 1} ${v - 1} ${v}`, `3 ${v - side - 1} ${v} ${v - side}`);
+    }
+  }
+  const properties = ["x", "y", "z"].map((name) => `property float ${name}\n`).join("");
+  const colours = ["red", "green", "blue"].map((name) => `property uchar ${name}\n`).join("");
+  return (
+    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\n${properties}${colours}property float temperature\n` +
+    `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header\n${vertices.join("\n")}\n${faces.join("\n")}\n`
+  );
+}
+
+const scenes = [
+  ["one temperature", () => "25.0", [undefined, 25]],
+  ["one odd temperature", () => "25.0037", [undefined, 25.0037]],
+  ["half degrees", (x) => (20 + Math.floor(x / 6) / 2).toFixed(1), [22, 22.5, 23, 21.99, 24.5]],
+  ["tenths", (x) => (-3 + x / 10).toFixed(1), [-2.9, -0.1, 0, 0.7, 2.3]],
+  ["hundredths", (x) => (36.5 + x / 100).toFixed(2), [36.5, 36.61, 36.99, 37]],
+];
+for (const [name, celsiusAt, thresholds] of scenes) {
+  test(`${name}: decoded as they were, and on the server's side of every threshold`, { skip: moduleIsThere ? false : "no module" }, async () => {
+    const scratch = mkdtempSync(join(tmpdir(), "spectra-raw-"));
+    const file = join(scratch, "sheet.ply");
+    writeFileSync(file, sheet(celsiusAt));
+    const server = await serve([file]);
+    try {
+      const module = await loadModule();
+      const client = await SpectraClient.connect(server.url);
+      await client.request("scene.subscribe", { channels: ["fused", ...RAW] });
+      await layersOf(client);
+      const facts = await factsOf(client);
+      const written = new Set(Array.from({ length: 60 }, (_, x) => Math.fround(Number(celsiusAt(x)))));
+      const seen = new Set();
+      for (const { temperature } of client.tiles.values()) for (const code of temperature.codes) seen.add(celsiusOf(code, temperature));
+      assert.deepEqual([...seen].sort((a, b) => a - b), [...written].sort((a, b) => a - b));
+      for (const threshold of thresholds) {
+        for (const [method, params] of [
+          ["colour_mapped_threshold", { threshold: threshold ?? null }],
+          ["monochrome_threshold", { threshold: threshold ?? null, invert: true }],
+          ["thermal_highlighting", { low: threshold ?? null, high: threshold ?? null }],
+        ]) {
+          const { generation, fusion } = await client.request("fusion.set", { method, params });
+          await client.complete(generation);
+          prepare(module, { settings: changeOf(fusion), facts });
+          for (const tile of client.tiles.values())
+            assert.ok(fusedHere(module, tile).equals(Buffer.from(tile.colours)), `${method} at ${threshold ?? "its own threshold"}`);
+        }
+      }
+      await client.close();
+    } finally {
+      await server.stop();
+      rmSync(scratch, { recursive: true });
+    }
+  });
+}
 
 test("a server that gives fused colours only says so", async () => {
   const server = await serve(["--demo", "--fused-only"]);

@@ -16,6 +16,15 @@ export const KIND = {
 export const isColours = ({ kind }) => kind === KIND.colours || kind === KIND.colours_subtract_green;
 const MAGIC = 0x31435053;
 
+/** What a code of kinds 4 and 8 stands for. */
+export function celsiusOf(code, { scale, offset }) {
+  if (code >= 65533) return [-Infinity, Infinity, NaN][code - 65533];
+  const perDegree = Math.round(1 / scale);
+  const first = Math.round(offset * perDegree);
+  const isWholePart = Math.fround(1 / perDegree) === scale && Math.fround(first / perDegree) === offset && Math.abs(first) <= 2 ** 22;
+  return isWholePart ? Math.fround((first + code) / perDegree) : Math.fround(Math.fround(code * scale) + offset);
+}
+
 /** Reads the header of a binary message; throws on anything docs/protocol.md does not allow. */
 export function readFrame(buffer) {
   const view = new DataView(buffer.buffer, buffer.byteOffset, buffer.byteLength);

@@ -38,6 +38,45 @@ TEST(TemperatureCodes, AreOffByHalfAStepAtMost) {
   }
 }
 
+TEST(TemperatureCodes, GiveRoundTemperaturesBackAsTheyWere) {
+  for (const double step : {0.01, 0.005, 0.001, 0.5}) {
+    const int hundredths = step > 0.01 ? 50 : 1;
+    for (const int from : {-4000, -27'300, 0, 2150, 12'350}) {
+      std::vector<float> celsius;
+      for (int i = 0; i < 6500; ++i) celsius.push_back(static_cast<float>((from + i * hundredths) / 100.0));
+      const TemperatureCodes codes = TemperatureCodes::covering(celsius.front(), celsius.back(), step);
+      const std::vector<float> back = round_trip(codes, celsius);
+      for (std::size_t i = 0; i < celsius.size(); ++i) ASSERT_EQ(back[i], celsius[i]) << "in steps of " << step;
+    }
+  }
+  // What a threshold of 22.5 degC is compared with, beside any other temperature of the tile.
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<float> between(-40, 22);
+  for (int round = 0; round < 1000; ++round) {
+    const TemperatureCodes codes = TemperatureCodes::covering(between(engine), between(engine) + 62.5F, 0.01);
+    ASSERT_EQ(round_trip(codes, {22.5F, 22.1F, 22.07F}), (std::vector<float>{22.5F, 22.1F, 22.07F}));
+  }
+}
+
+TEST(TemperatureCodes, OfOneTemperatureAreThatTemperature) {
+  for (const float celsius : {25.0F, 25.003F, 21.23456F, -273.15F, 0.0F, 1e-20F, 1234.567F, 1e30F, -3e38F}) {
+    for (const double step : {0.01, 0.3, 1e-9}) {
+      const TemperatureCodes codes = TemperatureCodes::covering(celsius, celsius, step);
+      EXPECT_EQ(round_trip(codes, {celsius})[0], celsius) << "in steps of " << step;
+    }
+  }
+}
+
+TEST(TemperatureCodes, OfOtherScalesAreReadWithEachOperationRounded) {
+  const TemperatureCodes codes{0.010000000707805157F, 20};
+  std::vector<float> back(1);
+  codes.decode(std::vector<std::uint16_t>{250}, back);
+  EXPECT_EQ(back[0], 250.0F * 0.010000000707805157F + 20.0F);
+  const TemperatureCodes moved{0.01F, 20.00123F};
+  moved.decode(std::vector<std::uint16_t>{250}, back);
+  EXPECT_EQ(back[0], 250.0F * 0.01F + 20.00123F);
+}
+
 TEST(TemperatureCodes, TakeALargerStepWhereTheSpanNeedsIt) {
   const TemperatureCodes codes = TemperatureCodes::covering(-500, 1500, 0.01);
   EXPECT_GT(codes.scale, 0.0305F);
@@ -62,7 +101,7 @@ TEST(TemperatureCodes, OfNeighboursWithOtherExtremesGiveEqualTemperaturesTheSame
   const TemperatureCodes left = TemperatureCodes::covering(17.003F, 25, 0.01);
   const TemperatureCodes right = TemperatureCodes::covering(19.998F, 31, 0.01);
   for (const float celsius : {20.0F, 21.234F, 24.999F}) {
-    EXPECT_NEAR(round_trip(left, {celsius})[0], round_trip(right, {celsius})[0], 4e-6);
+    EXPECT_EQ(round_trip(left, {celsius})[0], round_trip(right, {celsius})[0]);
   }
 }
 

@@ -166,6 +166,24 @@ TEST_F(RawLayers, OfOneStepAreNotThoseOfAnother) {
   for (const auto& [id, held] : viewer.tiles) EXPECT_FLOAT_EQ(held.temperature.table.scale, 0.25F);
 }
 
+TEST_F(RawLayers, ThatWereReadyInOneStepAreNotSentInAnother) {
+  scene_ = scene_of(tiles_of_tree(30, 40));
+  TestViewer viewer(scene_, cache_, pool_);
+  Subscription subscription{.in_flight_bytes = 40'000, .temperature = true, .visible = true};
+  viewer.stream().subscribe(subscription);
+  show(viewer, 0.3);
+  viewer.complete();
+  wait_until_idle(pool_);
+  viewer.take(4);
+  wait_until_idle(pool_);
+  ASSERT_GT(viewer.count(FrameKind::Temperature), 0U);
+  ASSERT_LT(viewer.count(FrameKind::Temperature), scene_->tiles().size());
+  subscription.temperature_step_celsius = 0.25;
+  viewer.stream().subscribe(subscription);
+  settle(viewer);
+  for (const auto& [id, held] : viewer.tiles) EXPECT_FLOAT_EQ(held.temperature.table.scale, 0.25F);
+}
+
 TEST_F(RawLayers, OfAChangedTileComeAgain) {
   TestViewer viewer(scene_, cache_, pool_);
   viewer.stream().subscribe(kEverything);

@@ -63,7 +63,7 @@ export interface DecodedVisible {
 }
 export interface DecodedTemperature {
   kind: 'temperature';
-  /** degC = code * scale + offset; the last three codes stand for what has no number. */
+  /** degC = code * scale + offset, see celsiusOf; the last three codes stand for what has no number. */
   codes: Uint16Array<ArrayBuffer>;
   scale: number;
   offset: number;
