@@ -43,6 +43,26 @@ function counter(page) {
 const setAlpha = (page, alpha) => page.evaluate((value) => globalThis.spectra.settings.setParameter('alpha', value, true), alpha);
 const setMethod = (page, method) => page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
 
+/** A sheet of 60 x 60 vertices; `celsiusAt` of each in its column, as it is to be written. */
+function sheet(celsiusAt) {
+  const side = 60;
+  const vertices = [];
+  const faces = [];
+  for (let x = 0; x < side; x += 1) {
+    for (let y = 0; y < side; y += 1) {
+      vertices.push(`${x * 0.05} ${y * 0.05} 0 90 ${4 * x} ${4 * y} ${celsiusAt(x, y)}`);
+      const v = x * side + y;
+      if (x > 0 && y > 0) faces.push(`3 ${v - side - 1} ${v - 1} ${v}`, `3 ${v - side - 1} ${v} ${v - side}`);
+    }
+  }
+  const properties = ['x', 'y', 'z'].map((name) => `property float ${name}\n`).join('');
+  const colours = ['red', 'green', 'blue'].map((name) => `property uchar ${name}\n`).join('');
+  return (
+    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\n${properties}${colours}property float temperature\n` +
+    `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header\n${vertices.join('\n')}\n${faces.join('\n')}\n`
+  );
+}
+
 export function addFusingTests(browser, scratch) {
   if (!existsSync(MODULE)) {
     console.log('skipped: fusing in the browser; deploy/build_module.sh could not make the library');
@@ -90,6 +110,131 @@ export function addFusingTests(browser, scratch) {
     const said = await page.evaluate(() => globalThis.spectra.store.generation);
     assert.ok(said >= 2);
 
+    assert.deepEqual(problems, []);
+    await robot.page.close();
+    await page.close();
+    await server.stop();
+  });
+
+  test('Temperatures that stand on a threshold are on its same side here and on the robot', async () => {
+    const scene = join(scratch, 'halves.ply');
+    writeFileSync(
+      scene,
+      sheet((x) => (20 + Math.floor(x / 6) / 2).toFixed(1)),
+    );
+    const server = await startServer([scene]);
+    const here = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    const robot = await openClient(browser, server.url);
+    const pages = [here.page, robot.page];
+    for (const page of pages) await settled(page, 180_000);
+    await isHere(here.page);
+    assert.match(await here.page.locator('footer').innerText(), /colours to 0\.005/, 'steps are not exact');
+    assert.match(await robot.page.locator('footer').innerText(), /colours exact/);
+    const pictures = [];
+    for (const threshold of [22, 22.5, 23]) {
+      for (const page of pages) {
+        await setMethod(page, 'colour_mapped_threshold');
+        await page.evaluate((value) => globalThis.spectra.settings.setParameter('threshold', value, true), threshold);
+        await settled(page);
+        await drawn(page);
+      }
+      const [own, theirs] = [
+        sample(await screenshot(here.page, 'halves-here')),
+        sample(await screenshot(robot.page, 'halves-there')),
+      ];
+      assert.ok(apart(own, theirs) < 0.002, `${threshold} °C: ${apart(own, theirs)} of the pixels differ`);
+      pictures.push(theirs);
+    }
+    assert.ok(apart(pictures[0], pictures[1]) > 0.02, 'the threshold is seen');
+    assert.equal(await here.page.evaluate(() => globalThis.spectra.store.fusingPlace), 'here');
+    for (const { page, problems } of [here, robot]) {
+      assert.deepEqual(problems, []);
+      await page.close();
+    }
+    await server.stop();
+  });
+
+  test('A narrow range gets finer temperatures, alone, and is said to be as exact as they are', async () => {
+    const server = await startServer(['--demo']);
+    const here = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
+    const kinds = new Set();
+    let isCounting = false;
+    here.page.on('websocket', (socket) =>
+      socket.on('framereceived', ({ payload }) => {
+        if (isCounting && typeof payload !== 'string') kinds.add(payload[4]);
+      }),
+    );
+    await here.page.goto(server.url);
+    const robot = await openClient(browser, server.url);
+    const pages = [here.page, robot.page];
+    for (const page of pages) {
+      await settled(page, 180_000);
+      await setMethod(page, 'thermal_only');
+      await settled(page);
+    }
+    await isHere(here.page);
+    const accuracy = () =>
+      here.page.evaluate(() => {
+        const { drawnError, fusingPlace } = globalThis.spectra.store;
+        return [fusingPlace, drawnError.rounding_celsius];
+      });
+    assert.deepEqual(await accuracy(), ['here', Math.fround(0.01) / 2]);
+    isCounting = true;
+    for (const page of pages) {
+      await page.evaluate(() => globalThis.spectra.settings.setRange(19.5, 19.7, true));
+      await settled(page);
+    }
+    // A 256th of the range, at most.
+    await here.page.waitForFunction(() => globalThis.spectra.store.drawnError.rounding_celsius < 0.2 / 512, null, {
+      timeout: 30_000,
+    });
+    await drawn(here.page);
+    assert.equal((await accuracy())[0], 'here');
+    assert.deepEqual([...kinds], [4], 'temperatures alone');
+    const [own, theirs] = [
+      sample(await screenshot(here.page, 'narrow-here')),
+      sample(await screenshot(robot.page, 'narrow-there')),
+    ];
+    assert.ok(apart(own, theirs) < 0.005, `${apart(own, theirs)} of the pixels differ`);
+    assert.match(await here.page.locator('footer').innerText(), /colours to 0\.000/);
+    for (const { page, problems } of [here, robot]) {
+      assert.deepEqual(problems, []);
+      await page.close();
+    }
+    await server.stop();
+  });
+
+  test('One temperature far out: a threshold is left to the robot, however wide the range is', async () => {
+    const scene = join(scratch, 'outlier.ply');
+    writeFileSync(
+      scene,
+      sheet((x, y) => (x + y === 0 ? '1e30' : (20 + x / 20).toFixed(2))),
+    );
+    const server = await startServer([scene]);
+    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    await settled(page, 180_000);
+    await setMethod(page, 'thermal_only');
+    await page.evaluate(() => {
+      const { store, settings } = globalThis.spectra;
+      if (store.fusion.range.mode !== 'auto') settings.toggleRangeExtremes();
+    });
+    await isHere(page);
+    await setMethod(page, 'colour_mapped_threshold');
+    await page.evaluate(() => globalThis.spectra.settings.setParameter('threshold', 21.5, true));
+    await isOnRobot(page);
+    await settled(page);
+    await page.locator('[data-fusing="robot"]', { hasText: 'too coarse for a threshold' }).waitFor({ timeout: 10_000 });
+    const robot = await openClient(browser, server.url);
+    await settled(robot.page);
+    await robot.page.evaluate(() => {
+      const { settings, store } = globalThis.spectra;
+      settings.setMethod('colour_mapped_threshold');
+      settings.setParameter('threshold', 21.5, true);
+      if (store.fusion.range.mode !== 'auto') settings.toggleRangeExtremes();
+    });
+    await settled(robot.page);
+    const [own, theirs] = [sample(await screenshot(page, 'outlier-own')), sample(await screenshot(robot.page, 'outlier-there'))];
+    assert.ok(apart(own, theirs) < 0.002, `${apart(own, theirs)} of the pixels differ`);
     assert.deepEqual(problems, []);
     await robot.page.close();
     await page.close();

@@ -193,7 +193,9 @@ export class PictureRenderer {
       }
       case 'raw': {
         const tile = this.#tiles.get(command.tile);
-        if (tile !== undefined) tile.raw = command.raw;
+        if (tile === undefined) break;
+        tile.raw = { ...tile.raw, ...command.raw } as RawArrays;
+        tile.fusedWith = 0;
         break;
       }
       case 'sigma': {

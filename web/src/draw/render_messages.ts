@@ -31,7 +31,8 @@ export interface TileArrays {
 export type RenderCommand =
   | { change: 'create'; tile: number; arrays: TileArrays }
   | { change: 'colours'; tile: number; rgba: Uint8Array<ArrayBuffer> }
-  | { change: 'raw'; tile: number; raw: RawArrays }
+  /** Both layers, or the one that has come anew. */
+  | { change: 'raw'; tile: number; raw: Partial<RawArrays> }
   /** The library that fuses, compiled. */
   | { change: 'module'; module: WebAssembly.Module }
   | { change: 'facts'; facts: SceneFacts }

@@ -37,8 +37,9 @@ function setUp({
   store.scene = { name: 'a', temperature: { min: 10, max: 700 }, live: false } as never;
   store.complete = {} as never;
   store.methods = [
-    { id: 'thermal_visible_blend', label: 'Blend' },
-    { id: 'thermal_change', label: 'Change', compares_with_baseline: true },
+    { id: 'thermal_visible_blend', label: 'Blend', params: [{ name: 'alpha', kind: 'number' }] },
+    { id: 'colour_mapped_threshold', label: 'Threshold', params: [{ name: 'threshold', kind: 'temperature' }] },
+    { id: 'thermal_change', label: 'Change', compares_with_baseline: true, params: [] },
   ] as never;
   store.pictureStands = true;
   store.fusionInForce = FUSION;
@@ -165,6 +166,51 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(store.fusingPlace).toBe('here');
     expect(fusing.apply({ ...FUSION, range: { mode: 'manual', min: 12, max: 15 } })).toBeNull();
     expect(fusing.channels).toContain('fused');
+  });
+
+  it('leaves thresholds to the robot where temperatures come in coarse steps, however wide the range is', async () => {
+    const { store, fusing, counts } = setUp();
+    store.fusionInForce = { ...FUSION, range: { mode: 'auto', min: 10, max: 1e30 } };
+    fusing.consider();
+    await later();
+    Object.assign(counts, { raw: 2, step_celsius: 1.5e25 });
+    fusing.consider();
+    expect(fusing.leftToRobot).toBeNull();
+    store.fusionInForce = { ...store.fusionInForce, method: 'colour_mapped_threshold', params: { threshold: 21.5 } };
+    fusing.consider();
+    expect(fusing.leftToRobot).toContain('too coarse for a threshold');
+    expect(fusing.channels).toEqual(['fused']);
+    counts.step_celsius = Math.fround(0.01);
+    store.scene = { name: 'a', temperature: { min: 10, max: 30 }, live: false } as never;
+    fusing.consider();
+    fusing.consider();
+    expect(fusing.leftToRobot).toBeNull();
+  });
+
+  it('asks for finer temperatures where the range is narrow, stays here meanwhile, and leaves what they cannot show to the robot', async () => {
+    const { store, fusing, counts, diary } = await here();
+    const set = (min: number, max: number) => {
+      diary.length = 0;
+      store.fusionInForce = { ...FUSION, range: { mode: 'manual', min, max } };
+      fusing.consider();
+      expect(store.fusingPlace).toBe('here');
+      return diary.join();
+    };
+    expect([set(10, 12.56), fusing.step_celsius]).toEqual(['', undefined]);
+    expect([set(10, 12.5), fusing.step_celsius]).toEqual(['subscribe temperature+visible', 0.002]);
+    // As long as finer ones are on their way.
+    counts.step_celsius = 0;
+    // Not for every step of a slider, and never coarser again: that would be sent anew.
+    expect([set(10, 11), set(10, 30), fusing.step_celsius]).toEqual(['', '', 0.002]);
+    expect([set(10, 10.5), fusing.step_celsius]).toEqual(['subscribe temperature+visible', 1 / 5000]);
+    expect([set(10, 10), fusing.step_celsius]).toEqual(['', 1 / 5000]);
+    counts.step_celsius = Math.fround(0.00046);
+    expect([set(10, 10.2), fusing.leftToRobot]).toEqual(['', null]);
+    set(10, 10.1);
+    expect(fusing.leftToRobot).toContain('steps of 0.00046 °C');
+    expect(diary.join()).toBe('subscribe fused');
+    fusing.sceneGone();
+    expect(fusing.step_celsius).toBeUndefined();
   });
 
   it('does not try again on a map whose temperatures move while what stands out stays, and does in another scene', async () => {

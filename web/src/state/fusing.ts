@@ -16,8 +16,12 @@ export const RAW_BYTES_PER_VERTEX = 2.1;
 export const CHANGE_BYTES_PER_VERTEX = 1.6;
 /** Temperatures come here in steps, of which a range needs so many: half of one is then half a level of 256 at most. */
 const STEPS_OF_A_RANGE = 256;
-/** The step that the robot chooses unless a tile spans too much for it; fine enough for every range that means anything. */
-const USUAL_STEP_CELSIUS = 0.0101;
+/** The step that the robot chooses unless a tile spans too much for it. */
+const USUAL_STEP_CELSIUS = 0.01;
+/** A narrower range gets a finer step, and so many of those, so that the next one that is a little narrower needs no other. */
+const FINER_STEPS_OF_A_RANGE = 4 * STEPS_OF_A_RANGE;
+/** A step of 32 bits is the same as that which was asked for. */
+const SAME = 1.0001;
 /** Of the span of a scene's temperatures: what stood far out is gone; the ends of a map that grows move by less all the time. */
 const NARROWED_SPAN = 7 / 8;
 /** Histograms that are got before they are needed, so that a lost link does not keep them away: of percentiles, and of bins by default. */
@@ -44,7 +48,7 @@ export interface FusingPicture {
 }
 
 export interface FusingTiles {
-  rawCounts(): { drawn: number; raw: number; step_celsius: number };
+  rawCounts(asked_celsius: number): { drawn: number; raw: number; step_celsius: number };
   setHere(isHere: boolean): void;
 }
 
@@ -68,6 +72,8 @@ export class Fusing {
   /** The coarsest in which temperatures of the picture have come, and of which scene, and which span of it, that was. */
   #step_celsius = 0;
   #stepOf = { scene: '', span_celsius: Infinity };
+  /** In which temperatures are asked for; it only gets finer. */
+  #asked_celsius = USUAL_STEP_CELSIUS;
 
   constructor(
     private readonly store: Store,
@@ -82,6 +88,11 @@ export class Fusing {
   get channels(): string[] {
     const raw = this.#wantsRaw ? ['temperature', 'visible'] : [];
     return this.isHere && !this.#isLeaving ? raw : ['fused', ...raw];
+  }
+
+  /** The same: in what steps temperatures are to come; undefined: as usual. */
+  get step_celsius(): number | undefined {
+    return this.#asked_celsius < USUAL_STEP_CELSIUS ? this.#asked_celsius : undefined;
   }
 
   get isHere(): boolean {
@@ -110,6 +121,7 @@ export class Fusing {
     this.#factsNumber += 1;
     this.#isAskingFacts = false;
     this.#isLeaving = false;
+    this.#asked_celsius = USUAL_STEP_CELSIUS;
     this.#leaveAtOnce();
   }
 
@@ -148,7 +160,7 @@ export class Fusing {
     const isNarrow = span_celsius < NARROWED_SPAN * this.#stepOf.span_celsius;
     if (name !== this.#stepOf.scene || (this.#step_celsius > 0 && isNarrow)) this.#step_celsius = 0;
     this.#stepOf.scene = name;
-    const counts = this.tiles.rawCounts();
+    const counts = this.tiles.rawCounts(this.#asked_celsius);
     if (this.#wantsRaw && counts.raw > 0) {
       this.#step_celsius = counts.step_celsius;
       this.#stepOf.span_celsius = span_celsius;
@@ -158,6 +170,7 @@ export class Fusing {
       else if (this.#wantsRaw) this.#leaveAtOnce();
       return;
     }
+    const isFiner = this.#asksFiner();
     if (!this.#wantsRaw) {
       if (!store.settled || !store.pictureStands) return;
       this.#wantsRaw = true;
@@ -167,6 +180,7 @@ export class Fusing {
       this.events.resubscribe();
       return;
     }
+    if (isFiner) this.events.resubscribe();
     if (store.fusingPlace !== 'coming') return;
     store.rawShare = counts.drawn === 0 ? 0 : counts.raw / counts.drawn;
     if (store.rawShare < 1 || this.#planner === null || this.#facts === null) return;
@@ -219,9 +233,25 @@ export class Fusing {
     if (age?.mode === 'fade') return 'What is old fades by the time when it was seen, which the robot has.';
     const step = this.#step_celsius;
     const { min, max } = range;
-    return step > USUAL_STEP_CELSIUS && min !== null && max !== null && step * STEPS_OF_A_RANGE > max - min
-      ? `Some temperatures come here in steps of ${Number(step.toPrecision(2))} °C, as one of them stands far out: too coarse for this range.`
-      : null;
+    const isNarrow = step > this.#asked_celsius * SAME && min !== null && max !== null && step * STEPS_OF_A_RANGE > max - min;
+    // What stands between two temperatures of such a map does not stand on the right side of each.
+    const hasThreshold =
+      step > USUAL_STEP_CELSIUS * SAME && description?.params.some(({ kind }) => kind === 'temperature') === true;
+    if (!isNarrow && !hasThreshold) return null;
+    const why = `Some temperatures come here in steps of ${Number(step.toPrecision(2))} °C, as those of one place span so much`;
+    return `${why}: too coarse for ${isNarrow ? 'this range' : 'a threshold'}.`;
+  }
+
+  /** Asks for finer steps where the range that is set needs them. Whether it does that now. */
+  #asksFiner(): boolean {
+    const { min = null, max = null } = this.store.fusion?.range ?? {};
+    const span = min === null || max === null ? 0 : max - min;
+    if (span <= 0 || span >= this.#asked_celsius * STEPS_OF_A_RANGE) return false;
+    const least = FINER_STEPS_OF_A_RANGE / span;
+    const decade = 10 ** Math.ceil(Math.log10(least));
+    // Whole parts of a degree, so that round temperatures come as they are.
+    this.#asked_celsius = 1 / [decade / 5, decade / 2, decade].find((per_degree) => per_degree >= least)!;
+    return true;
   }
 
   /** There is a library, and the robot gives what it needs. */
@@ -281,7 +311,7 @@ export class Fusing {
 
   /** The link is lost while the robot made the colours, and all that is drawn could be fused here. */
   #isAllHereWithoutLink(): boolean {
-    const { drawn, raw } = this.tiles.rawCounts();
+    const { drawn, raw } = this.tiles.rawCounts(this.#asked_celsius);
     return !this.store.connected && drawn > 0 && raw === drawn;
   }
 

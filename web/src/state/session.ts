@@ -472,6 +472,7 @@ export class Session {
       error?.position_m === before?.position_m &&
       error?.colour_levels === before?.colour_levels &&
       error?.rounding_levels === before?.rounding_levels &&
+      error?.rounding_celsius === before?.rounding_celsius &&
       error?.temperature_celsius === before?.temperature_celsius;
     if (!isSame) this.store.drawnError = error;
     this.#sayMethods();

@@ -57,7 +57,7 @@ function setUp() {
     progress: { begin: vi.fn() },
     look: { sceneIs: vi.fn() },
     catalogue: { want: vi.fn(), wantNone: vi.fn() },
-    fusing: { greeted: vi.fn(), sceneGone: vi.fn(), channels: ['fused'] },
+    fusing: { greeted: vi.fn(), sceneGone: vi.fn(), channels: ['fused'], step_celsius: undefined as number | undefined },
   };
   const subscription = new Subscription(store, 'ws://robot:8080/ws?hello=brief', concerned, {
     request: (method, params) =>
@@ -168,11 +168,13 @@ describe('a subscription', () => {
     expect(asked[1]!.params['resume']).toMatchObject({ raw: [], temperature_sigma: [0], colours: [[0, 17]] });
     await asked[1]!.answer({ resumed_tiles: 1 });
     while (claims.length < 900) claims.push('0/0/0' as never);
+    concerned.fusing.step_celsius = 0.002;
     subscription.greeted({ ...able, capabilities: ['resume', 'raw_layers'] });
     await later();
     expect(asked[2]!.params['resume']).toMatchObject({ raw: [0] });
+    expect(asked.map(({ params }) => params['temperature_step_celsius'])).toEqual([undefined, undefined, 0.002]);
     expect(concerned.tiles.claims).toHaveBeenLastCalledWith(1500, 9900);
-    expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 9900 - 6 * 900);
+    expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 9900 - 6 * 900, 0.002);
   });
 
   it("asks for nothing before the user's settings are in force again, and not at all when that connection is gone", async () => {

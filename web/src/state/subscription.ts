@@ -26,7 +26,7 @@ export interface Concerned {
   progress: Pick<Progress, 'begin'>;
   look: Pick<FirstLook, 'sceneIs'>;
   catalogue: Pick<CatalogueLoader, 'want' | 'wantNone'>;
-  fusing: Pick<Fusing, 'greeted' | 'channels' | 'sceneGone'>;
+  fusing: Pick<Fusing, 'greeted' | 'channels' | 'step_celsius' | 'sceneGone'>;
 }
 
 /** What the subscription needs of the session it belongs to. */
@@ -129,7 +129,7 @@ export class Subscription {
     if (!settings.busy) this.store.wanted = null;
     const session_id = this.#claimableSession;
     const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED, MOST_VALUES) : [];
-    const layers = tiles.layersOf(claims, MOST_VALUES - CLAIM_VALUES * claims.length);
+    const layers = tiles.layersOf(claims, MOST_VALUES - CLAIM_VALUES * claims.length, this.concerned.fusing.step_celsius);
     if (!greeting.capabilities.includes('raw_layers')) layers.raw = [];
     try {
       this.#isSubscribed = true;
@@ -151,6 +151,8 @@ export class Subscription {
     const isHatched = this.store.hatchAbove_kelvin !== null && capabilities.includes('temperature_sigma');
     return {
       channels: [...this.concerned.fusing.channels, ...(isHatched ? ['temperature_sigma'] : [])],
+      // As usual where it is not said.
+      temperature_step_celsius: this.concerned.fusing.step_celsius,
       ...(capabilities.includes('cache_bytes')
         ? { cache_bytes: cacheBytes((navigator as Navigator & { deviceMemory?: number }).deviceMemory) }
         : {}),

@@ -10,13 +10,13 @@ const colours = (shade: number, vertices = 3) => new Uint8Array(vertices * 4).fi
 class FakeDrawable implements Drawable {
   visible = false;
   disposed = false;
-  raw: RawLayers | null = null;
+  raw: Partial<RawLayers> | null = null;
   constructor(public shade: number) {}
   setColours(rgba: Uint8Array): void {
     this.shade = rgba[0] ?? -1;
   }
-  setRaw(raw: RawLayers): void {
-    this.raw = raw;
+  setRaw(raw: Partial<RawLayers>): void {
+    this.raw = { ...this.raw, ...raw };
   }
   sigma: number[] | null = null;
   setSigma({ codes }: DecodedSigma): void {
@@ -610,6 +610,40 @@ describe('TileSet, raw layers', () => {
     addRaw(root);
     expect(top.raw).toMatchObject({ scale: 0.01, offset: 20 });
     expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+  });
+
+  it('take temperatures in another step alone, and know which will come no finer', () => {
+    const top = add(root);
+    const temperatures = (scale: number, ...codes: number[]) =>
+      tiles.addRaw(rawFrame(root), { kind: 'temperature', codes: Uint16Array.from(codes), scale, offset: 20 });
+    addRaw(root);
+    temperatures(0.01, 0, 65532, 65535);
+    tiles.setHere(true);
+    tiles.updateSelection();
+    expect(top.raw).toMatchObject({ scale: 0.01, rgb: new Uint8Array(9) });
+    const claims = tiles.claims(10);
+    // A span of 655 degrees has no room for others, one of a degree has, as long as floats have.
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+    expect(tiles.layersOf(claims, Infinity, 0.001).raw).toEqual([0]);
+    temperatures(0.01, 0, 100, 65535);
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+    expect(tiles.rawCounts(0.01)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0 });
+    expect(tiles.layersOf(claims, Infinity, 0.001).raw).toEqual([]);
+    expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0.005);
+    temperatures(0.001, 0, 1000, 65535);
+    expect(top.raw).toMatchObject({ scale: 0.001, codes: Uint16Array.of(0, 1000, 65535), rgb: new Uint8Array(9) });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.001 });
+    expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0.0005);
+    temperatures(2 ** -18, 0, 5, 65535);
+    expect(tiles.rawCounts(1e-9)).toMatchObject({ step_celsius: 2 ** -18 });
+    // Where nothing has a temperature there are no steps.
+    temperatures(1, 65535, 65534, 65533);
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0 });
+    tiles.setHere(false);
+    expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0);
+    expect(() => temperatures(0.01, 0, 1)).toThrow(RawMismatch);
+    expect(made.length).toBe(1);
   });
 
   it('of another revision wait for their geometry', () => {

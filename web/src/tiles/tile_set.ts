@@ -5,8 +5,8 @@ import { parentTile, type TileFrame, type TileId, tileKey } from '../protocol/fr
 /** What the drawing side keeps for one tile; the tile set owns it and disposes of it. */
 export interface Drawable {
   setColours(rgba: Uint8Array<ArrayBuffer>): void;
-  /** What the sensors saw, from which colours are made here. */
-  setRaw(raw: RawLayers): void;
+  /** What the sensors saw, from which colours are made here: both layers, or the one that has come anew. */
+  setRaw(raw: Partial<RawLayers>): void;
   /** How sure the temperature of each vertex is. */
   setSigma(sigma: DecodedSigma): void;
   setVisible(visible: boolean): void;
@@ -36,6 +36,8 @@ export interface DrawnError {
   temperature_celsius: number | null;
   /** What rounding adds to the colours as they are drawn: half a step; 0 when they are whole. */
   rounding_levels: number;
+  /** The same of temperatures from which colours are made here. */
+  rounding_celsius: number;
 }
 
 interface Shown {
@@ -49,6 +51,8 @@ interface Shown {
   answer: number;
   /** In which its temperatures came, where the drawing side has both raw layers of this geometry; null: it lacks them. */
   rawStep_celsius: number | null;
+  /** Their span and their size allow for no finer one, or hardly. */
+  finestStep_celsius: number;
   /** The drawing side has how sure its temperatures are. */
   hasSigma: boolean;
   /**
@@ -184,8 +188,11 @@ export class TileSet {
     return claims;
   }
 
-  /** What beside their geometry is here of these claims, of the first ones where it takes more than `mostValues` of a message. */
-  layersOf(claims: readonly TileClaim[], mostValues = Infinity): HeldLayers {
+  /**
+   * What beside their geometry is here of these claims, of the first ones where it takes more than `mostValues` of a message; temperatures
+   * where they are in the step that is asked for.
+   */
+  layersOf(claims: readonly TileClaim[], mostValues = Infinity, asked_celsius = Infinity): HeldLayers {
     const held: HeldLayers = { raw: [], temperature_sigma: [], colours: [] };
     let left = mostValues;
     for (const [place, [level, x, y, z]] of claims.entries()) {
@@ -193,7 +200,7 @@ export class TileSet {
       if (shown === null) continue;
       left -= layerValues(shown);
       if (left < 0) break;
-      if (shown.rawStep_celsius !== null) held.raw.push(place);
+      if (isInStep(shown, asked_celsius)) held.raw.push(place);
       if (shown.hasSigma) held.temperature_sigma.push(place);
       if (shown.colourSequence !== null) held.colours.push([place, shown.colourSequence]);
     }
@@ -207,15 +214,18 @@ export class TileSet {
     return lacking;
   }
 
-  /** How many tiles are drawn, how many of them can be fused here, and the coarsest step in which the temperatures of one came. */
-  rawCounts(): { drawn: number; raw: number; step_celsius: number } {
+  /**
+   * How many tiles are drawn, how many of them can be fused here, and the coarsest step in which the temperatures of one came; those that
+   * will come finer, as they are asked for, aside.
+   */
+  rawCounts(asked_celsius = Infinity): { drawn: number; raw: number; step_celsius: number } {
     const counts = { drawn: 0, raw: 0, step_celsius: 0 };
     for (const { shown } of this.#drawn) {
       if (shown === null) continue;
       counts.drawn += 1;
       if (shown.rawStep_celsius === null) continue;
       counts.raw += 1;
-      counts.step_celsius = Math.max(counts.step_celsius, shown.rawStep_celsius);
+      if (isInStep(shown, asked_celsius)) counts.step_celsius = Math.max(counts.step_celsius, shown.rawStep_celsius);
     }
     return counts;
   }
@@ -310,6 +320,7 @@ export class TileSet {
       colour_levels: frame.colour_error_levels,
       temperature_celsius: Number.isNaN(frame.temperature_error_celsius) ? null : frame.temperature_error_celsius,
       rounding_levels: 0,
+      rounding_celsius: 0,
     };
     node.waitingGeometry = { revision: frame.revision, geometry, error };
     this.#join(node);
@@ -423,10 +434,12 @@ export class TileSet {
     for (const { shown } of this.#drawn) {
       if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
       const { error } = shown;
-      largest ??= { position_m: 0, colour_levels: 0, rounding_levels: 0, temperature_celsius: null };
+      largest ??= { position_m: 0, colour_levels: 0, rounding_levels: 0, rounding_celsius: 0, temperature_celsius: null };
       largest.position_m = Math.max(largest.position_m, error.position_m);
       largest.colour_levels = Math.max(largest.colour_levels, error.colour_levels);
-      largest.rounding_levels = Math.max(largest.rounding_levels, error.rounding_levels);
+      if (this.#isHere && shown.rawStep_celsius !== null)
+        largest.rounding_celsius = Math.max(largest.rounding_celsius, shown.rawStep_celsius / 2);
+      else largest.rounding_levels = Math.max(largest.rounding_levels, error.rounding_levels);
       if (error.temperature_celsius !== null)
         largest.temperature_celsius = Math.max(largest.temperature_celsius ?? 0, error.temperature_celsius);
     }
@@ -552,14 +565,21 @@ export class TileSet {
     const { shown, waitingGeometry, waitingRaw } = node;
     if (waitingRaw === null) return;
     const { revision, temperature, visible } = waitingRaw;
-    if (temperature === null || visible === null) return;
-    const { codes, scale, offset } = temperature;
-    const raw: RawLayers = { codes, scale, offset, rgb: visible.rgb };
-    if (shown !== null && shown.revision === revision && waitingGeometry?.revision !== revision) {
+    const isShown = shown?.revision === revision && waitingGeometry?.revision !== revision;
+    // In another step temperatures come alone.
+    const hasOther =
+      isShown && shown.rawStep_celsius !== null && (!this.#isStale(shown) || (this.#isResumed && shown.isKnownToServer));
+    if ((temperature === null || visible === null) && !hasOther) return;
+    const raw: Partial<RawLayers> = {};
+    if (temperature !== null)
+      Object.assign(raw, { codes: temperature.codes, scale: temperature.scale, offset: temperature.offset });
+    if (visible !== null) raw.rgb = visible.rgb;
+    const steps = temperature === null ? {} : stepsOf(temperature);
+    if (isShown) {
       node.waitingRaw = null;
       checkRaw(node, raw, shown.geometry);
       shown.drawable.setRaw(raw);
-      shown.rawStep_celsius = scale;
+      Object.assign(shown, steps);
       this.#changed(node);
     } else if (this.#isHere && waitingGeometry !== null && waitingGeometry.revision === revision) {
       node.waitingRaw = null;
@@ -578,7 +598,9 @@ export class TileSet {
         error,
         rank,
         answer: rank,
-        rawStep_celsius: scale,
+        rawStep_celsius: null,
+        finestStep_celsius: 0,
+        ...steps,
         hasSigma: false,
         colourSequence: null,
         isKnownToServer: true,
@@ -621,6 +643,7 @@ export class TileSet {
         rank,
         answer,
         rawStep_celsius: null,
+        finestStep_celsius: 0,
         hasSigma: false,
         colourSequence: sequence,
         isKnownToServer: true,
@@ -708,11 +731,34 @@ function checkLength(node: TileNode, rgba: Uint8Array, { vertex_count }: Geometr
   throw new Error(`tile ${node.key}: colours of ${rgba.length / 4} vertices for a geometry of ${vertex_count}`);
 }
 
-function checkRaw(node: TileNode, { codes, rgb }: RawLayers, { vertex_count }: GeometrySummary): void {
-  if (codes.length === vertex_count && rgb.length === 3 * vertex_count) return;
+function checkRaw(node: TileNode, { codes, rgb }: Partial<RawLayers>, { vertex_count }: GeometrySummary): void {
+  const lengths = [codes?.length ?? vertex_count, (rgb?.length ?? 3 * vertex_count) / 3];
+  if (lengths.every((length) => length === vertex_count)) return;
   throw new RawMismatch(
-    `tile ${node.key}: temperatures of ${codes.length} and colours of ${rgb.length / 3} vertices for a geometry of ${vertex_count}`,
+    `tile ${node.key}: temperatures and colours of ${lengths.join(' and ')} vertices for a geometry of ${vertex_count}`,
   );
+}
+
+/** Temperatures are here, and come no finer where steps of `asked_celsius` are asked for. */
+function isInStep({ rawStep_celsius, finestStep_celsius }: Shown, asked_celsius: number): boolean {
+  return rawStep_celsius !== null && rawStep_celsius <= Math.max(asked_celsius * 1.0001, finestStep_celsius);
+}
+
+/** The largest codes stand for no number. */
+const CODES = 65533;
+
+function stepsOf({ codes, scale, offset }: DecodedTemperature): Pick<Shown, 'rawStep_celsius' | 'finestStep_celsius'> {
+  let lowest = CODES;
+  let highest = 0;
+  for (const code of codes) {
+    if (code >= CODES) continue;
+    if (code < lowest) lowest = code;
+    if (code > highest) highest = code;
+  }
+  if (lowest > highest) return { rawStep_celsius: 0, finestStep_celsius: 0 };
+  const farthest = Math.max(Math.abs(lowest * scale + offset), Math.abs(highest * scale + offset));
+  // A span has room for so many steps, and a 32-bit float for such ones.
+  return { rawStep_celsius: scale, finestStep_celsius: Math.max(((highest - lowest + 1) * scale) / 65000, farthest * 2 ** -22) };
 }
 
 function octantOf(id: TileId): number {

@@ -82,19 +82,33 @@ describe('Numbers', () => {
 
   it('say how exact the picture is', () => {
     const words = (position_m: number, colour_levels: number, temperature_celsius: number | null, isSettled: boolean) =>
-      plain(accuracyWords({ position_m, colour_levels, temperature_celsius, rounding_levels: 0 }, isSettled, true));
+      plain(
+        accuracyWords(
+          { position_m, colour_levels, temperature_celsius, rounding_levels: 0, rounding_celsius: 0 },
+          isSettled,
+          true,
+        ),
+      );
     expect(words(0.04, 2.1, 0.395, false)).toBe('coarse: within 4 cm, 3 levels, 0.4 °C');
     expect(words(0.002, 0.2, 0.001, true)).toBe('within 2 mm, 1 level, 0.01 °C');
     expect(words(0.002, 0, 0, true)).toBe('within 2 mm, colours exact');
     expect(words(0.002, 3, null, true)).toBe('within 2 mm, 3 levels');
     expect(words(0.002, Number.NaN, null, true)).toBe('within 2 mm, colours coarse');
     expect(words(3.4, 255, 30.1, false)).toBe('coarse: within 3.4 m, colours coarse, 30.1 °C');
-    const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2 };
+    const rounded = { position_m: 0.002, colour_levels: 0, temperature_celsius: 0, rounding_levels: 2, rounding_celsius: 0 };
     expect(plain(accuracyWords(rounded, true, true))).toBe('within 2 mm, 2 levels, 0 °C');
     expect(plain(accuracyWords(rounded, true, false))).toBe('within 0.002 units, 2 levels, 0 °C');
     // Without a power of ten, and still no less than it is.
     expect(plain(accuracyWords({ ...rounded, position_m: 8.3e-7 }, true, false))).toBe('within 0.000001 units, 2 levels, 0 °C');
     expect(accuracyWords(null, true, true)).toBeNull();
+    // What is made here of temperatures in steps is not exact.
+    const here = (rounding_celsius: number, more = {}) =>
+      plain(accuracyWords({ ...rounded, rounding_levels: 0, rounding_celsius, ...more }, true, true));
+    expect(here(Math.fround(0.01) / 2)).toBe('within 2 mm, colours to 0.005 °C');
+    expect(here(0.00763)).toBe('within 2 mm, colours to 0.0077 °C');
+    expect(here(0.0001)).toBe('within 2 mm, colours to 0.0001 °C');
+    expect(here(0.005, { colour_levels: 2, temperature_celsius: 0.3 })).toBe('within 2 mm, 2 levels, 0.31 °C');
+    expect(here(0.005, { temperature_celsius: null })).toBe('within 2 mm, colours exact');
   });
 });
 

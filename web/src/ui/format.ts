@@ -131,14 +131,19 @@ const LEAST_SAID_M = 1e-6;
 /** How exact the picture is, in words: farthest that it may be off, for all but a twentieth of colours and temperatures. */
 export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMetric: boolean): string | null {
   if (error === null) return null;
-  const { position_m, temperature_celsius } = error;
+  const { position_m, temperature_celsius, rounding_celsius } = error;
   const colour_levels = error.colour_levels + error.rounding_levels;
   const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
   const parts = [`within ${length(Math.max(position_m, LEAST_SAID_M), isMetric)}`];
-  if (!isOff) parts.push('colours exact');
+  if (!isOff && temperature_celsius !== null && rounding_celsius > 0)
+    parts.push(
+      `colours to ${withUnit(figures(roundedUp(rounding_celsius, 1 - Math.floor(Math.log10(rounding_celsius))), 2), 'degC')}`,
+    );
+  else if (!isOff) parts.push('colours exact');
   else if (Number.isNaN(colour_levels) || colour_levels >= ANY_LEVEL) parts.push('colours coarse');
   else parts.push(withUnit(figures(roundedUp(colour_levels, 0), 3), colour_levels > 1 ? 'levels' : 'level'));
-  if (isOff && temperature_celsius !== null) parts.push(withUnit(figures(roundedUp(temperature_celsius, 2), 3), 'degC'));
+  if (isOff && temperature_celsius !== null)
+    parts.push(withUnit(figures(roundedUp(temperature_celsius + rounding_celsius, 2), 3), 'degC'));
   return `${isSettled ? '' : 'coarse: '}${parts.join(', ')}`;
 }
 

@@ -152,7 +152,11 @@ export class Viewport {
       ...(indices === null ? [] : [indices.buffer]),
     ]);
     return {
-      setRaw: (raw) => this.#change({ change: 'raw', tile, raw }, [raw.codes.buffer, raw.rgb.buffer]),
+      setRaw: (raw) =>
+        this.#change(
+          { change: 'raw', tile, raw },
+          [raw.codes, raw.rgb].flatMap((layer) => (layer === undefined ? [] : [layer.buffer])),
+        ),
       setSigma: (sigma) => this.#change({ change: 'sigma', tile, sigma }, [sigma.codes.buffer]),
       setColours: (next) => this.#change({ change: 'colours', tile, rgba: next }, [next.buffer]),
       setVisible: (visible) => {
