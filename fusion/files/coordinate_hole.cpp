@@ -196,6 +196,17 @@ class Finder {
 
 }  // namespace
 
+bool stands_for_none(const base::Vec3d& place, double sizes, bool is_used) {
+  if (!(sizes > 1)) return false;
+  if (!is_used || sizes > kFartherThanAnyForm) return true;
+  const bool is_one_number = place.x == place.y && place.y == place.z;
+  return std::all_of(kAxes.begin(), kAxes.end(), [&](const auto axis) {
+    const double number = place.*axis;
+    const NumberKind kind = kind_of(number);
+    return number == 0 || kind == NumberKind::WrittenForNone || (kind == NumberKind::Round && is_one_number);
+  });
+}
+
 CoordinateHoles find_coordinate_holes(std::span<const SampledVertex> vertices, double metres, const IsUsed& is_used) {
   return Finder(vertices, metres, is_used).find();
 }

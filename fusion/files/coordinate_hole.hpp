@@ -40,6 +40,11 @@ struct CoordinateHoles {
   std::optional<SharedCoordinate> possible;  ///< Only where there is no certain one.
 };
 
+/// Whether a place of very many vertices (in the numbers of the file), that is `sizes` times as far from the others as those are
+/// large, stands for "no position". Not the tip of a cone whose triangles share no vertices: what triangles use must be 0 0 0,
+/// a number that is written for none, or 1000 times as far away as the scene is large.
+bool stands_for_none(const base::Vec3d& place, double sizes, bool is_used);
+
 /// The numbers that stand for "not measured" in one coordinate: a dozen vertices share them exactly, farther from all others
 /// than those are from each other. A true form has such numbers too (both ends of a pipe, a base far below), so that more
 /// must be there:

@@ -192,7 +192,6 @@ base::Result<void> PlyBodyReader::hand_on(PlyRawVertices raw, const PlyElement& 
   return result;
 }
 
-/// Holes are at one place that is far from everything, or at 0 0 0 where no triangle uses it; or have a coordinate that stands for none.
 void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   sample_.conclude(interpretation_.metres_per_unit,
                    [&faces](std::uint64_t vertex) { return faces.is_referenced(vertex); });
@@ -208,14 +207,8 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   facts_.hole = sample_.coordinate_hole();
   const auto& hole = sample_.hole();
   if (!hole) return;
-  const bool is_used = std::any_of(hole->vertices.begin(), hole->vertices.end(),
-                                   [&](std::uint64_t vertex) { return faces.is_referenced(vertex); });
-  // Elsewhere in the scene it is what was measured again and again.
-  if (hole->is_far || (!is_used && hole->place == base::Vec3d{}))
-    facts_.hole = Hole{hole->place};
-  else
-    facts_.crowded_place = hole->place;
-  facts_.is_crowded_place_used = is_used;
+  (hole->is_certain ? facts_.hole.emplace().place : facts_.crowded_place.emplace()) = hole->place;
+  facts_.is_crowded_place_used = hole->is_used;
 }
 
 /// Brings the positions to metres, and finds those that are none.

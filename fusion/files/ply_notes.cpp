@@ -140,7 +140,12 @@ class Notes {
     return "";
   }
   std::string coordinate_text(std::size_t slot, double metres) const {
-    return value_text(metres / options_.scale(), vertices_.properties[*schema_.vertex[slot]].type);
+    const PlyScalar type = vertices_.properties[*schema_.vertex[slot]].type;
+    const double value = metres / options_.scale();
+    if (options_.scale() == 1 || type == PlyScalar::Float32) return value_text(value, type);
+    // Having been to metres and back, a number may differ in the digits behind these.
+    constexpr int kDigits = 15;
+    return short_number(value, kDigits);
   }
   std::string place_text(const base::Vec3d& place) const {
     return coordinate_text(kX, place.x) + ' ' + coordinate_text(kY, place.y) + ' ' + coordinate_text(kZ, place.z);
@@ -301,10 +306,11 @@ class Notes {
       }
     };
     look(vertices_, schema_.vertex);
-    if (const PlyElement* const faces = header_.find("face"); faces != nullptr && faces->count > 0) {
-      look(*faces, schema_.face);
-    }
-    if (text.empty()) text = about_bare_t(names);
+    const PlyElement* const faces = header_.find("face");
+    const bool has_faces = faces != nullptr && faces->count > 0;
+    if (has_faces) look(*faces, schema_.face);
+    if (text.empty()) text = about_bare_t(vertices_, names);
+    if (text.empty() && has_faces) text = about_bare_t(*faces, names);
     if (text.empty() && names.empty()) return;
     if (text.empty()) text = "No property is called a temperature";
     if (!names.empty()) text += "; --temperature-property NAME takes one of: " + joined(names);
@@ -312,27 +318,31 @@ class Notes {
   }
 
   /// Why a bare t is no temperature; puts it before the names where it may be one nevertheless.
-  std::string about_bare_t(std::vector<std::string>& names) const {
+  std::string about_bare_t(const PlyElement& element, std::vector<std::string>& names) const {
     const auto is_bare_t = [](const PlyProperty& one) { return !one.is_list && temperature_name(one.name).is_bare_t; };
     const auto speaks_against = [](const PlyProperty& one) { return temperature_name(one.name).speaks_against_t; };
-    const auto& properties = vertices_.properties;
+    const auto& properties = element.properties;
     const auto t = std::find_if(properties.begin(), properties.end(), is_bare_t);
     if (t == properties.end()) return {};
     const auto other = std::find_if(properties.begin(), properties.end(), speaks_against);
+    const bool is_of_faces = &element != &vertices_;
     std::string reason;
     bool may_be_one = true;
-    if (schema_.is_temperature_doubtful) {
+    if (!is_of_faces && schema_.is_temperature_doubtful) {
       // No sensor of temperatures counts further.
       constexpr double kMostCounts = 65'535;
       may_be_one = survey_.most_doubtful <= kMostCounts;
       reason = "its values (" + number_text(survey_.least_doubtful) + " to " + number_text(survey_.most_doubtful) + ")";
     } else if (other != properties.end()) {
       reason = "'" + printable(other->name) + "' beside it";
+    } else if (is_floating(t->type)) {
+      reason = "its name, which is not enough for one of the faces";
     } else {
       may_be_one = size_bytes(t->type) < 4;
       reason = "its type, " + std::string(to_string(t->type)) + ": whole numbers of that name count time";
     }
-    if (may_be_one) names.insert(names.begin(), t->name);
+    std::erase(names, t->name);
+    if (may_be_one || temperature_name(t->name).is_candidate) names.insert(names.begin(), t->name);
     return "'" + printable(t->name) + "' is not taken for a temperature, because of " + reason;
   }
 
@@ -351,8 +361,8 @@ class Notes {
     add("under_range_temperatures", facts.under_range_count,
         counted(facts.under_range_count, "temperature", "temperatures") +
             " under the range of the sensor (-infinite), shown as the coldest");
-    if (options_.celsius_scale() || facts.finite_count == 0) return;
-    if (const auto doubt = temperature_doubt(facts, *temperature_property())) {
+    if (facts.finite_count == 0) return;
+    if (const auto doubt = temperature_doubt(facts, *temperature_property(), options_.celsius_scale())) {
       add("implausible_temperatures", doubt->count, doubt->message);
     }
   }

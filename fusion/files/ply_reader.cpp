@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_stream.hpp"
 #include "fusion/files/ply_values.hpp"
 #include "fusion/files/scene_origin.hpp"
@@ -223,8 +224,8 @@ base::Result<LoadedScene> read_ply_with_thermal(const std::filesystem::path& pat
       std::count_if(scene.mesh.temperature_celsius().begin(), scene.mesh.temperature_celsius().end(),
                     [](float celsius) { return std::isnan(celsius); }));
   if (missing_count > 0) {
-    scene.notes.push_back(
-        {"missing_temperatures", missing_count, std::to_string(missing_count) + " vertices without a temperature"});
+    scene.notes.push_back({"missing_temperatures", missing_count,
+                           counted(missing_count, "vertex", "vertices") + " without a temperature"});
   }
   for (const Note& note : thermal.notes) {
     // Its faces and colours are not asked for, and the gaps are counted again after the join.

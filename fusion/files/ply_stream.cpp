@@ -115,12 +115,8 @@ base::Result<void> PlyStream::interpret() {
   PlySchema& schema = interpretation_.schema;
   BOOST_OUTCOME_TRY(schema, ply_schema(header_, options_));
   BOOST_OUTCOME_TRY(check_size());
-  if (has_other_byte_order(file_, header_, schema)) {
-    return base::failure(
-        base::ErrorCode::BadValue,
-        std::string("the positions make sense only with their bytes the other way round: give the "
-                    "header's format line ") +
-            (header_.format == PlyFormat::BinaryBigEndian ? "binary_little_endian" : "binary_big_endian"));
+  if (std::string reason = misplaced_positions(file_, header_, schema); !reason.empty()) {
+    return base::failure(base::ErrorCode::BadValue, std::move(reason));
   }
   schema.true_colour_type = true_colour_type(file_, header_, schema);
   if (needs_survey(header_, schema)) {

@@ -3,25 +3,31 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "fusion/files/ply_cursor.hpp"
 #include "fusion/files/ply_face_reader.hpp"
+#include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_vertex_reader.hpp"
 
 namespace spectra::files {
 
 namespace {
 
-/// Looks whether a property that is called no more than "t" is a temperature: nearly all values could be one, they are not
+/// Looks whether a property that is called no more than "t" is a temperature: nearly all values (but those of no data) could be one, they are not
 /// mere shares of 1, and they do not only rise as a clock does.
 class DoubtfulTemperature {
  public:
-  explicit DoubtfulTemperature(const ReadOptions& options) : scale_(options.celsius_scale().value_or(CelsiusScale{})) {}
+  explicit DoubtfulTemperature(const ReadOptions& options)
+      : scale_(options.celsius_scale().value_or(CelsiusScale{})), conversion_(options) {}
 
   void add(std::span<const double> values) {
     for (const double value : values) {
       if (!std::isfinite(value)) continue;
+      least_of_all_ = std::min(least_of_all_, value);
+      most_of_all_ = std::max(most_of_all_, value);
+      if (is_missing(value)) continue;
       ++count_;
       least_ = std::min(least_, value);
       most_ = std::max(most_, value);
@@ -35,19 +41,31 @@ class DoubtfulTemperature {
   }
 
   void conclude(PlySurvey& survey) const {
-    survey.least_doubtful = least_;
-    survey.most_doubtful = most_;
+    survey.least_doubtful = least_of_all_;
+    survey.most_doubtful = most_of_all_;
     constexpr std::uint64_t kFewest = 16;
     const bool is_clock = count_ >= kFewest && fall_count_ == 0 && most_ > least_;
     const bool is_share = count_ >= kFewest && least_ >= 0 && most_ <= 1;
-    survey.is_temperature_plausible = plausible_count_ * 10 >= count_ * 9 && count_ > 0 && !is_clock && !is_share;
+    const bool are_mostly_none = facts_.impossible_count > count_;
+    survey.is_temperature_plausible =
+        plausible_count_ * 10 >= count_ * 9 && count_ > 0 && !are_mostly_none && !is_clock && !is_share;
   }
 
  private:
+  bool is_missing(double value) {
+    float celsius = 0;
+    conversion_.convert({&value, 1}, {&celsius, 1}, facts_);
+    return std::isnan(celsius);
+  }
+
   CelsiusScale scale_;
+  TemperatureConversion conversion_;
+  TemperatureFacts facts_;
   std::uint64_t count_ = 0;
   std::uint64_t plausible_count_ = 0;
   std::uint64_t fall_count_ = 0;
+  double least_of_all_ = std::numeric_limits<double>::infinity();
+  double most_of_all_ = -std::numeric_limits<double>::infinity();
   double least_ = std::numeric_limits<double>::infinity();
   double most_ = -std::numeric_limits<double>::infinity();
   double last_ = -std::numeric_limits<double>::infinity();
@@ -111,10 +129,12 @@ class FaceSums {
     if (schema_.colour_coding == ColourCoding::Packed) {
       ColourConversion unpacking;
       unpacking.is_packed = true;
+      unpacking.is_packed_floating = is_floating(colour_type_);
       base::Rgb8 colour;
-      std::uint64_t ignored = 0;
-      unpacking.convert({std::span<const double>(&channels[0], 1), {}, {}}, {&colour, 1}, ignored);
+      std::uint64_t outside_count = 0;
+      unpacking.convert({std::span<const double>(&channels[0], 1), {}, {}}, {&colour, 1}, outside_count);
       channels = {static_cast<double>(colour.r), static_cast<double>(colour.g), static_cast<double>(colour.b)};
+      if (outside_count > 0) channels.fill(std::numeric_limits<double>::quiet_NaN());
     }
     if (colour_type_ == PlyScalar::Int8) {
       for (double& channel : channels) channel += channel < 0 ? 256 : 0;
@@ -160,7 +180,10 @@ base::Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, co
       } else if (std::find(schema.face.begin(), schema.face.end(), std::optional(p)) == schema.face.end()) {
         BOOST_OUTCOME_TRY(cursor.skip_values(1, property.type));
       } else {
-        BOOST_OUTCOME_TRY(const double value, cursor.read_value(property.type));
+        // The bits of a packed colour, as PlyVertexReader reads them.
+        const bool is_bits = schema.colour_coding == ColourCoding::Packed && schema.face[kRed] == p &&
+                             !cursor.is_text() && property.type == PlyScalar::Float32;
+        BOOST_OUTCOME_TRY(const double value, cursor.read_value(is_bits ? PlyScalar::UInt32 : property.type));
         for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
           if (schema.face[slot] == p) values[slot] = value;
         }
@@ -172,14 +195,24 @@ base::Result<void> survey_faces(PlyCursor& cursor, const PlyElement& element, co
   return base::success();
 }
 
+/// How many bytes of the body, up to 8, are blanks and ends of lines.
+std::size_t leading_blanks(BlockFile& file, const PlyHeader& header) {
+  constexpr std::size_t kMost = 8;
+  file.seek(header.size_bytes);
+  auto bytes = file.ready(kMost);
+  if (bytes.size() > kMost) bytes = bytes.first(kMost);
+  const auto is_blank = [](unsigned char byte) { return byte == ' ' || byte == '\t' || byte == '\n' || byte == '\r'; };
+  return static_cast<std::size_t>(std::find_if_not(bytes.begin(), bytes.end(), is_blank) - bytes.begin());
+}
+
 }  // namespace
 
-bool has_other_byte_order(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {
+std::string misplaced_positions(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {
   const PlyElement& vertices = *header.find("vertex");
   // Behind lists the vertices would not even be found.
-  if (header.format == PlyFormat::Ascii || &vertices != header.elements.data() || !has_no_list(vertices)) return false;
+  if (header.format == PlyFormat::Ascii || &vertices != header.elements.data() || !has_no_list(vertices)) return {};
   for (std::size_t slot = kX; slot <= kZ; ++slot) {
-    if (!is_floating(vertices.properties[*schema.vertex[slot]].type)) return false;
+    if (!is_floating(vertices.properties[*schema.vertex[slot]].type)) return {};
   }
   struct Sense {
     std::size_t all = 0, sensible = 0;
@@ -204,12 +237,28 @@ bool has_other_byte_order(BlockFile& file, const PlyHeader& header, const PlySch
   };
   constexpr std::size_t kFewest = 12;
   const Sense as_told = sense_of(header);
-  if (as_told.all < kFewest || as_told.sensible * 2 > as_told.all) return false;
+  if (as_told.all < kFewest || as_told.sensible * 2 > as_told.all) return {};
+  const auto is_right = [&](const PlyHeader& tried) {
+    const Sense sense = sense_of(tried);
+    return sense.sensible >= kFewest && sense.sensible * 20 > sense.all * 19;
+  };
+  // An empty line, say, which no position begins with. A byte off, those with their bytes the other way round may make sense, too.
+  const std::size_t blank_count = leading_blanks(file, header);
   PlyHeader other = header;
+  for (std::size_t count = 1; count <= blank_count; ++count) {
+    other.size_bytes = header.size_bytes + count;
+    if (!is_right(other)) continue;
+    return counted(count, "byte", "bytes") +
+           " too many between end_header and the first position, a blank or the end of a line: "
+           "take out what stands there";
+  }
+  other = header;
   const bool is_big = header.format == PlyFormat::BinaryBigEndian;
   other.format = is_big ? PlyFormat::BinaryLittleEndian : PlyFormat::BinaryBigEndian;
-  const Sense turned = sense_of(other);
-  return turned.sensible >= kFewest && turned.sensible * 20 > turned.all * 19;
+  if (!is_right(other)) return {};
+  return std::string(
+             "the positions make sense only with their bytes the other way round: give the header's format line ") +
+         (is_big ? "binary_little_endian" : "binary_big_endian");
 }
 
 std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema) {

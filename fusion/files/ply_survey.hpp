@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "fusion/base/error.hpp"
@@ -38,9 +39,9 @@ struct PlySurvey {
 /// floating one, or one of 16 bits; nullopt: they are as declared, or nothing can be told. Moves the file.
 std::optional<PlyScalar> true_colour_type(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
 
-/// The positions of a binary file make sense only with their bytes the other way round, as far as its beginning tells. Moves
-/// the file.
-bool has_other_byte_order(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
+/// Why the positions of a binary file make no sense: they begin some bytes later, or their bytes are the other way round. Empty:
+/// they do, as far as the beginning of the file tells, or no reason is known. Moves the file.
+std::string misplaced_positions(BlockFile& file, const PlyHeader& header, const PlySchema& schema);
 
 /// The file's values must be looked at before they are read.
 bool needs_survey(const PlyHeader& header, const PlySchema& schema);

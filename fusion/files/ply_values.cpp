@@ -58,11 +58,10 @@ std::string number_text(double value) {
   return {text.data(), end};
 }
 
-std::string short_number(double value) {
+std::string short_number(double value, int digits) {
   std::array<char, 32> text;
-  constexpr int kDigits = 6;
   const auto [end, status] =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, kDigits);
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, digits);
   return {text.data(), end};
 }
 

@@ -75,8 +75,8 @@ void load_column(PlyScalar type, const unsigned char* bytes, std::size_t stride,
 
 /// The shortest text that is read back as that number.
 std::string number_text(double value);
-/// At most six digits of it, for people.
-std::string short_number(double value);
+/// At most so many digits of it, for people.
+std::string short_number(double value, int digits = 6);
 /// The shortest text that is read back as a value of that type.
 std::string value_text(double value, PlyScalar type);
 /// A number as text files have it: with a leading '+', with an exponent as Fortran writes it (1.5D+01), "inf", and nan in

@@ -81,7 +81,11 @@ void PositionSample::conclude(double metres, const IsUsed& is_used) {
     return;
   }
   const double size = std::hypot(bulk_->max.x - bulk_->min.x, bulk_->max.y - bulk_->min.y, bulk_->max.z - bulk_->min.z);
-  hole_->is_far = distance(*bulk_, hole_->place) > size;
+  hole_->is_used = std::any_of(hole_->vertices.begin(), hole_->vertices.end(), is_used);
+  const base::Vec3d& place = hole_->place;
+  const base::Vec3d in_file = {place.x / metres, place.y / metres, place.z / metres};
+  hole_->is_certain = (place == base::Vec3d{} && !hole_->is_used) ||
+                      stands_for_none(in_file, distance(*bulk_, place) / size, hole_->is_used);
 }
 
 void PositionSample::find_hole() {
@@ -106,7 +110,7 @@ void PositionSample::find_hole() {
   if (most < kFewestInAHole || most < kMoreThanAnyOther * second || entries_.size() - most < kFewestElsewhere) return;
   const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(most_begin);
   const auto last = first + static_cast<std::ptrdiff_t>(most);
-  hole_ = {first->position, {}, false};
+  hole_ = {first->position, {}, false, false};
   for (auto entry = first; entry != last; ++entry) hole_->vertices.push_back(entry->vertex);
   entries_.erase(first, last);
 }

@@ -21,7 +21,10 @@ struct Bulk {
 struct HolePlace {
   base::Vec3d place;
   std::vector<std::uint64_t> vertices;  ///< Some of those that are there.
-  bool is_far = false;                  ///< Farther from the bulk than that is large.
+  bool is_used = false;                 ///< By triangles.
+  /// It is farther from the bulk than that is large, and more tells that nothing is there (stands_for_none()); or is 0 0 0,
+  /// and no triangle uses it. Elsewhere in the scene it is what was measured again and again.
+  bool is_certain = false;
 };
 
 /// Up to 16,384 positions, evenly spread over a file in a fixed but irregular order (a regular one may meet one column of a

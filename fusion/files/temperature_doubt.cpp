@@ -1,6 +1,7 @@
 #include "fusion/files/temperature_doubt.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_values.hpp"
@@ -20,25 +21,79 @@ const char* named_unit(std::optional<TemperatureUnit> named, bool is_kelvin_like
   return named == TemperatureUnit::Centikelvin ? "centikelvin" : nullptr;
 }
 
+constexpr float kFull = 65'535;
+constexpr std::uint64_t kFewestShared = 12;
+constexpr std::uint64_t kSharedOneIn = 1000;
+constexpr float kFewestCelsius = 5;
+
+bool are_many(std::uint64_t count, const TemperatureFacts& facts) {
+  return count >= kFewestShared && kSharedOneIn * count >= facts.finite_count && count < facts.finite_count;
+}
+
+/// A number at an end of the temperatures that many have exactly.
+struct SharedNumber {
+  std::uint64_t count = 0;
+  float celsius = 0;
+  double in_file = 0;
+  float gap = 0;  ///< To the nearest other.
+};
+
+/// How far away from all others a number is that stands for no data, in ranges of those others: nines (99, -99.99, 999.9) and the
+/// ends of whole numbers are seldom measured, thousands and cold hundreds not often. Anything else may be what a thing has been
+/// given; nullopt: it must be far from what things have.
+std::optional<float> least_distance(double number) {
+  const double size = std::abs(number);
+  const auto is = [size](double other) { return std::abs(size - other) < 1e-6 * other; };
+  constexpr float kOfNines = 0.25F;
+  for (const double power : {1e2, 1e3, 1e4, 1e5, 1e6}) {
+    if (is(power - 1) || is(power - 0.1) || is(power - 0.01)) return kOfNines;
+  }
+  if (is(32'767) || is(32'768) || is(65'535)) return kOfNines;
+  const double step = number < 0 ? 100 : 1000;
+  return size >= step && std::fmod(size, step) == 0 ? std::optional(1.0F) : std::nullopt;
+}
+
+/// The one that keeps away from all others.
+std::optional<SharedNumber> shared_number(const TemperatureFacts& facts, const CelsiusScale& scale) {
+  for (const bool is_high : {true, false}) {
+    const LeastNumber& end = is_high ? facts.high : facts.low;
+    const float gap = end.next - end.value;
+    // Both ends are told as the least, one of negatives.
+    const float range_of_others = -(is_high ? facts.low : facts.high).value - end.next;
+    if (!are_many(end.count, facts) || !are_many(facts.finite_count - end.count, facts)) continue;
+    const float celsius = is_high ? -end.value : end.value;
+    const double in_file = std::stod(short_number((static_cast<double>(celsius) - scale.offset) / scale.factor));
+    const std::optional<float> distance = least_distance(in_file);
+    constexpr float kOfAny = 8, kFewestCelsiusOfAny = 100;
+    if (gap < (distance ? kFewestCelsius : kFewestCelsiusOfAny)) continue;
+    if (gap > distance.value_or(kOfAny) * range_of_others) return SharedNumber{end.count, celsius, in_file, gap};
+  }
+  return std::nullopt;
+}
+
 /// Many are exactly 0, and all others keep away from it as measured ones do not.
 bool zero_stands_alone(const TemperatureFacts& facts) {
-  constexpr std::uint64_t kFewest = 12;
-  constexpr std::uint64_t kOneIn = 1000;
-  constexpr float kFewestCelsius = 5;
-  if (facts.zero_count < kFewest || kOneIn * facts.zero_count < facts.finite_count) return false;
-  if (facts.zero_count == facts.finite_count || facts.nearest_zero < kFewestCelsius) return false;
-  const float lowest = facts.lowest < 0 ? facts.lowest : facts.nearest_zero;
-  const float highest = facts.highest > 0 ? facts.highest : -facts.nearest_zero;
+  if (!are_many(facts.zero_count, facts) || facts.nearest_zero < kFewestCelsius) return false;
+  const float lowest = facts.low.value < 0 ? facts.low.value : facts.nearest_zero;
+  const float highest = facts.high.value < 0 ? -facts.high.value : -facts.nearest_zero;
   return 4 * facts.nearest_zero >= highest - lowest;
 }
 
 class Doubt {
  public:
   Doubt(const TemperatureFacts& facts, const PlyProperty& property)
-      : facts_(facts), property_(property), measured_count_(facts.finite_count - facts.zero_count - facts.full_count) {}
+      : facts_(facts), property_(property), shared_(shared_number(facts, {})) {
+    measured_count_ = facts.finite_count - facts.zero_count - facts.full_count;
+    hot_count_ = facts.too_hot_count - facts.full_count;
+    large_count_ = facts.large_count;
+    if (!shared_ || shared_->celsius == 0 || shared_->celsius == kFull) return;
+    measured_count_ -= shared_->count;
+    if (shared_->celsius > kHottest) hot_count_ -= shared_->count;
+    if (is_large(shared_->celsius)) large_count_ -= shared_->count;
+  }
 
   std::optional<TemperatureDoubt> find() const {
-    const bool is_kelvin = are_most(facts_.kelvin_like_count);
+    const bool is_kelvin = are_most(facts_.kelvin_like_count) || is_kelvin_with_fire();
     const bool is_tenth_kelvin = are_most(facts_.tenth_kelvin_like_count);
     const bool is_centikelvin = are_most(facts_.centikelvin_like_count);
     const std::optional<TemperatureUnit> named = temperature_name(property_.name).unit;
@@ -52,7 +107,7 @@ class Doubt {
     }
     // The same numbers may be several things: what they would be tells.
     if (has_cold_hundredths() || (has_hot_hundredths() && !is_tenth_kelvin)) {
-      const bool may_be_counts = facts_.too_hot_count - facts_.full_count > measured_count_ / 2;
+      const bool may_be_counts = hot_count_ > measured_count_ / 2;
       return of_all(
           "look like " + reading("hundredths of a degree", 0.01) +
           (may_be_counts ? ", or like counts of a sensor or another quantity: " + std::string(kOwnScale) : "") +
@@ -73,7 +128,7 @@ class Doubt {
       return of_all("are of type " + std::string(to_string(property_.type)) +
                     " and look like grey values: --temperature-scale A --temperature-offset B (degC = A value + B)");
     }
-    if (facts_.too_hot_count - facts_.full_count > measured_count_ / 2) {
+    if (hot_count_ > measured_count_ / 2) {
       return of_all(std::string("look like counts of a sensor or another quantity: ") + kOwnScale + no_data());
     }
     if (are_whole() && facts_.too_hot_count == 0 && are_mostly_large()) {
@@ -92,13 +147,19 @@ class Doubt {
       return {count,
               range() + counted(count, "is", "are") + what + ": if " + text + " stands for no data, --no-data " + text};
     };
-    if (facts_.too_hot_count > 0) return asked(facts_.too_hot_count, " above 3000", facts_.highest);
-    if (facts_.too_cold_count > 0) return asked(facts_.too_cold_count, " below -100", facts_.lowest);
+    if (facts_.too_hot_count > 0) return asked(facts_.too_hot_count, " above 3000", highest());
+    if (facts_.too_cold_count > 0) return asked(facts_.too_cold_count, " below -100", lowest());
     if (zero_stands_alone(facts_)) {
       const std::string nearest = short_number(static_cast<double>(facts_.nearest_zero));
       return asked(facts_.zero_count, " exactly 0 and no other is nearer to it than " + nearest, 0);
     }
-    if (facts_.lowest >= 0 && facts_.highest <= 1 && facts_.highest > facts_.lowest) {
+    if (shared_) {
+      const std::string exactly = value_text(static_cast<double>(shared_->celsius), PlyScalar::Float32);
+      const std::string nearest = short_number(static_cast<double>(shared_->gap));
+      return asked(shared_->count, " exactly " + exactly + " and no other is nearer to it than " + nearest,
+                   shared_->celsius);
+    }
+    if (lowest() >= 0 && highest() <= 1 && highest() > lowest()) {
       return of_all(std::string("look like shares of a range: ") + kOwnScale);
     }
     return std::nullopt;
@@ -117,21 +178,42 @@ class Doubt {
   /// either; one value alone may stand for no data.
   bool has_cold_hundredths() const { return facts_.cold_low < facts_.cold_high && are_mostly_large(); }
   bool has_hot_hundredths() const { return facts_.hot_low < facts_.hot_high && are_mostly_large(); }
-  bool are_mostly_large() const { return 2 * facts_.large_count > measured_count_; }
+  bool are_mostly_large() const { return 2 * large_count_ > measured_count_; }
+
+  float lowest() const { return facts_.low.value; }
+  float highest() const { return -facts_.high.value; }
+  /// Without those that many share.
+  float lowest_measured() const { return shared_ && shared_->celsius == lowest() ? facts_.low.next : lowest(); }
+  float highest_measured() const {
+    if (shared_ && shared_->celsius == highest()) return -facts_.high.next;
+    const bool has_others = facts_.full_count > 0 && facts_.highest_but_full >= lowest();
+    return has_others ? facts_.highest_but_full : highest();
+  }
+  /// Nothing is colder than air can be in kelvin, and much is like air.
+  bool is_kelvin_with_fire() const {
+    constexpr float kColdest = 200, kWarm = 320;
+    constexpr std::uint64_t kAirOneIn = 4;
+    const float least = lowest_measured() == 0 ? facts_.nearest_zero : lowest_measured();
+    return lowest() >= 0 && least >= kColdest && least < kWarm && hot_count_ == 0 &&
+           kAirOneIn * facts_.kelvin_like_count >= measured_count_;
+  }
 
   std::string range() const {
-    return "Temperatures from " + short_number(static_cast<double>(facts_.lowest)) + " to " +
-           short_number(static_cast<double>(facts_.highest)) + ", taken as degC, ";
+    return "Temperatures from " + short_number(static_cast<double>(lowest())) + " to " +
+           short_number(static_cast<double>(highest())) + ", taken as degC, ";
   }
-  std::string no_data() const { return facts_.full_count > 0 ? "; if 65535 stands for no data, --no-data 65535" : ""; }
+  std::string no_data() const {
+    if (facts_.full_count > 0) return "; if 65535 stands for no data, --no-data 65535";
+    if (!shared_ || shared_->celsius == 0) return "";
+    const std::string number = value_text(static_cast<double>(shared_->celsius), PlyScalar::Float32);
+    return "; if " + number + " stands for no data, --no-data " + number;
+  }
   /// What they would be, without 65535. Those below absolute zero count where they tell that these are hundredths.
   std::string celsius(double scale, double offset) const {
     const auto one = [&](float value) { return short_number(scale * static_cast<double>(value) + offset); };
     const bool has_cold = offset == 0 && has_cold_hundredths();
-    return one(has_cold ? std::min(facts_.lowest, facts_.cold_low) : facts_.lowest) + " to " +
-           one(facts_.full_count > 0 && facts_.highest_but_full >= facts_.lowest ? facts_.highest_but_full
-                                                                                 : facts_.highest) +
-           " degC";
+    return one(has_cold ? std::min(lowest_measured(), facts_.cold_low) : lowest_measured()) + " to " +
+           one(highest_measured()) + " degC";
   }
   std::string reading(const std::string& name, double scale) const {
     const std::string none = value_text(static_cast<double>(facts_.coldest_none), PlyScalar::Float32);
@@ -143,13 +225,24 @@ class Doubt {
 
   const TemperatureFacts& facts_;
   const PlyProperty& property_;
-  const std::uint64_t measured_count_;  ///< Those that are neither 0 nor 65535.
+  const std::optional<SharedNumber> shared_;
+  std::uint64_t measured_count_ = 0;               ///< Those that are neither 0 nor 65535 nor shared.
+  std::uint64_t hot_count_ = 0, large_count_ = 0;  ///< Of these.
 };
 
 }  // namespace
 
-std::optional<TemperatureDoubt> temperature_doubt(const TemperatureFacts& facts, const PlyProperty& property) {
-  return Doubt(facts, property).find();
+std::optional<TemperatureDoubt> temperature_doubt(const TemperatureFacts& facts, const PlyProperty& property,
+                                                  const std::optional<CelsiusScale>& told) {
+  if (!told) return Doubt(facts, property).find();
+  const std::optional<SharedNumber> shared = shared_number(facts, *told);
+  if (!shared) return std::nullopt;
+  const std::string number = short_number(shared->in_file);
+  return TemperatureDoubt{shared->count, counted(shared->count, "temperature is", "temperatures are") + " exactly " +
+                                             number +
+                                             " in the file, far from all others: if that stands for no data, "
+                                             "--no-data " +
+                                             number};
 }
 
 }  // namespace spectra::files

@@ -15,7 +15,9 @@ struct TemperatureDoubt {
   std::string message;
 };
 
-/// For temperatures whose unit nobody has said, taken as degC from `property`; some of them are finite. nullopt: nothing to say.
-std::optional<TemperatureDoubt> temperature_doubt(const TemperatureFacts& facts, const PlyProperty& property);
+/// For temperatures of which some are finite. `told`: how the property's numbers were scaled; nullopt: nobody has said so, and they
+/// are taken as degC. nullopt: nothing to say.
+std::optional<TemperatureDoubt> temperature_doubt(const TemperatureFacts& facts, const PlyProperty& property,
+                                                  const std::optional<CelsiusScale>& told);
 
 }  // namespace spectra::files

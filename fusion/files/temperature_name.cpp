@@ -68,6 +68,19 @@ const Unit* find_unit(std::string_view word) {
   return found == kUnits.end() ? nullptr : &*found;
 }
 
+/// "mK" and "cK" are one word, though the change of case has cut them in two: also of "tempmK".
+void join_units(std::vector<std::string>& words) {
+  for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (words[i + 1] != "k" || (!word.ends_with('m') && !word.ends_with('c'))) continue;
+    const std::string_view rest = std::string_view(word).substr(0, word.size() - 1);
+    const bool is_key = std::any_of(kKeys.begin(), kKeys.end(), [rest](const Key& key) { return key.word == rest; });
+    if (!rest.empty() && !is_key) continue;
+    words[i] += 'k';
+    words.erase(words.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  }
+}
+
 /// A word such as "tempc" or "temperaturekelvin" cut in two.
 void cut_units_off(std::vector<std::string>& words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -86,10 +99,12 @@ void cut_units_off(std::vector<std::string>& words) {
 
 TemperatureName temperature_name(std::string_view name) {
   std::vector<std::string> words = name_words(name);
+  join_units(words);
   cut_units_off(words);
   TemperatureName result;
   bool is_plain = true;
   bool has_t = false;
+  bool has_unit = false;
   int rank = 0;
   for (const std::string& word : words) {
     const auto key = std::find_if(kKeys.begin(), kKeys.end(), [&word](const Key& one) { return one.word == word; });
@@ -97,6 +112,7 @@ TemperatureName temperature_name(std::string_view name) {
     if (key != kKeys.end()) {
       rank = std::max(rank, key->rank);
     } else if (unit != nullptr) {
+      has_unit = true;
       if (unit->unit) result.unit = unit->unit;
     } else if (word == "t") {
       has_t = true;
@@ -114,9 +130,10 @@ TemperatureName temperature_name(std::string_view name) {
   }
   result.rank = is_plain && rank > 0 ? rank - (words.size() > 1 ? kFurtherWordsCost : 0) : 0;
   result.is_bare_t = is_plain && rank == 0 && has_t;
-  // A word that says temperature makes up for any that says something else.
+  // A word that says temperature makes up for any that says something else, and so does a unit behind a t.
   result.is_candidate =
-      rank > 0 || std::none_of(words.begin(), words.end(), [](const std::string& word) { return has(kOthers, word); });
+      rank > 0 || (result.is_bare_t && has_unit) ||
+      std::none_of(words.begin(), words.end(), [](const std::string& word) { return has(kOthers, word); });
   if (result.rank == 0 && !result.is_bare_t) result.unit.reset();
   return result;
 }

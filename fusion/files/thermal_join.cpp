@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "fusion/base/distance_text.hpp"
+#include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_values.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
 #include "fusion/mesh/stray_points.hpp"
@@ -445,8 +446,8 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
   }
   if (joined_count < count) {
     scene.notes.push_back({"thermal_not_reached", count - joined_count,
-                           std::to_string(count - joined_count) + " vertices have no thermal place within " +
-                               base::distance_text(reach) + ": their temperature is missing"});
+                           counted(count - joined_count, "vertex has", "vertices have") + " no thermal place within " +
+                               base::distance_text(reach) + ": temperature missing"});
   }
   return base::success();
 }

@@ -17,8 +17,12 @@ bool is_whole_unit(const std::vector<std::string>& words, std::size_t at) {
          (at + 1 == words.size() || words[at + 1] == ",");
 }
 
+/// "Not in metres", and "1000 units per metre" or "points per square metre".
 bool is_denied(const std::vector<std::string>& words, std::size_t at) {
-  return (at > 0 && words[at - 1] == "not") || (at > 1 && words[at - 1] == "in" && words[at - 2] == "not");
+  const std::string_view before = at > 0 ? words[at - 1] : "";
+  const std::string_view second = at > 1 ? words[at - 2] : "";
+  return before == "not" || before == "per" || (before == "in" && second == "not") ||
+         ((before == "square" || before == "cubic") && second == "per");
 }
 
 bool speaks_of_metres(std::span<const std::string> comments) {

@@ -76,6 +76,9 @@ std::vector<base::UpAxis> told_by(const std::string& line) {
       };
       while (next < words.size() && is_filler(words[next])) ++next;
       if (next == words.size()) continue;
+      // "y up to 3 m" is a size.
+      const bool is_size = next + 1 < words.size() && is_one_of(words[next + 1], {"to", "till", "until", "from"});
+      if (is_size) continue;
       if (is_one_of(words[next], {"up", "upward", "upwards"})) told.push_back(*axis);
       if (is_one_of(words[next], {"down", "downward", "downwards"})) told.push_back(opposite(*axis));
       const bool is_named = next > i + 1;

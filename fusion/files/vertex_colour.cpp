@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "fusion/files/ply_values.hpp"
 
@@ -21,14 +22,20 @@ constexpr double kSixteenToEight = 1.0 / 257;
 /// In levels of 255.
 constexpr double kHair = 8;
 
-std::uint32_t packed_bits(double value) {
+/// nullopt: no colour. A float with alpha in it is often NaN; as text that says "nan", and its colour is lost.
+std::optional<std::uint32_t> packed_bits(double value, bool is_floating) {
   constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
   if (value == std::floor(value) && value >= 0 && value <= kMost) return static_cast<std::uint32_t>(value);
   constexpr double kLeast = std::numeric_limits<std::int32_t>::min();
   if (value == std::floor(value) && value < 0 && value >= kLeast) {
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
   }
-  return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  constexpr double kFloatMax = std::numeric_limits<float>::max();
+  if (!is_floating || std::abs(value) > kFloatMax) return std::nullopt;
+  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  constexpr std::uint32_t kSign = 0x8000'0000;
+  constexpr std::uint32_t kNanOfAText = 0x7FC0'0000;
+  return (bits & ~kSign) == kNanOfAText ? std::nullopt : std::optional(bits);
 }
 
 bool are_shares(PlyScalar type, const ColourRange& range) {
@@ -60,11 +67,14 @@ void ColourRange::add(std::span<const double> values) {
 
 void ColourConversion::convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,
                                std::uint64_t& outside_count) const {
+  constexpr std::uint8_t kMidGrey = 128;
   if (is_packed) {
     for (std::size_t i = 0; i < colours.size(); ++i) {
-      const std::uint32_t bits = packed_bits(values[0][i]);
-      colours[i] = {static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
-                    static_cast<std::uint8_t>(bits)};
+      const std::optional<std::uint32_t> bits = packed_bits(values[0][i], is_packed_floating);
+      outside_count += bits ? 0U : 1U;
+      colours[i] = bits ? base::Rgb8{static_cast<std::uint8_t>(*bits >> 16), static_cast<std::uint8_t>(*bits >> 8),
+                                     static_cast<std::uint8_t>(*bits)}
+                        : base::Rgb8{kMidGrey, kMidGrey, kMidGrey};
     }
     return;
   }
@@ -77,7 +87,6 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
     }
     return;
   }
-  constexpr std::uint8_t kMidGrey = 128;
   for (std::size_t i = 0; i < colours.size(); ++i) {
     bool is_outside = false;
     for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -97,6 +106,7 @@ base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar 
   conversion.is_wrapped = coding == ColourCoding::Channels && type == PlyScalar::Int8;
   if (coding == ColourCoding::Packed) {
     conversion.is_packed = true;
+    conversion.is_packed_floating = is_floating(type);
   } else if (coding == ColourCoding::Splat) {
     conversion.factor = 255 * kSplatFactor;
     conversion.offset = 255 * 0.5;

@@ -26,13 +26,15 @@ struct ColourRange {
 /// Turns the numbers of a file into visible colours: byte = round(factor * value + offset), or a packed one unpacked.
 struct ColourConversion {
   bool is_packed = false;
-  bool is_bytes = false;    ///< They are whole numbers from 0 to 255 already.
-  bool is_wrapped = false;  ///< Bytes that were declared as char: negative ones are 128 to 255.
+  bool is_packed_floating = false;  ///< Packed into the bits of a float, not into a whole number.
+  bool is_bytes = false;            ///< They are whole numbers from 0 to 255 already.
+  bool is_wrapped = false;          ///< Bytes that were declared as char: negative ones are 128 to 255.
   double factor = 1;
   double offset = 0;
 
   /// `values` are as long as `colours` (packed ones: the first alone). Below black and above white are taken as those, NaN
-  /// as mid grey: how many vertices that concerns is added to `outside_count`; a hair outside does not count.
+  /// as mid grey, and so are packed ones that are no colour: how many vertices that concerns is added to `outside_count`; a
+  /// hair outside does not count.
   void convert(std::array<std::span<const double>, 3> values, std::span<base::Rgb8> colours,
                std::uint64_t& outside_count) const;
 };

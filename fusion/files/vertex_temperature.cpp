@@ -13,7 +13,6 @@ constexpr double kFloatMax = static_cast<double>(std::numeric_limits<float>::max
 /// Compared as a float, because that is how files have it: the nearest float lies above the real number.
 constexpr float kAbsoluteZeroCelsius = -273.15F;
 /// Hundredths of a degree are hardly ever outside of these.
-constexpr float kMostHundredths = 12'000;
 constexpr float kLeastHundredths = -9'990;
 constexpr float kLeastNone = -10'000;
 
@@ -22,15 +21,12 @@ float rounded(double celsius) {
   return static_cast<float>(celsius) + 0.0F;
 }
 
-constexpr float kSeldomDegrees = 150;
-
 /// Takes note of what only numbers have that may be hundredths or tenths.
 void describe_large(std::span<const float> celsius, TemperatureFacts& facts) {
   for (const float c : celsius) {
-    const float size = std::abs(c);
-    facts.large_count += size >= kSeldomDegrees && size <= kMostHundredths ? 1U : 0U;
+    facts.large_count += is_large(c) ? 1U : 0U;
     if (c != 65'535.0F) facts.highest_but_full = std::max(facts.highest_but_full, c);
-    if (c > 3000.0F && c <= kMostHundredths) {
+    if (c > kHottest && c <= kMostHundredths) {
       facts.hot_low = std::min(facts.hot_low, c);
       facts.hot_high = std::max(facts.hot_high, c);
     }
@@ -39,6 +35,19 @@ void describe_large(std::span<const float> celsius, TemperatureFacts& facts) {
 
 bool is_fraction(float celsius) {
   return celsius >= kLeastHundredths && celsius <= kMostHundredths && celsius != std::floor(celsius);
+}
+
+/// Adds `sign` times each number, of which `least` is the least.
+void add_least(std::span<const float> celsius, float least, float sign, LeastNumber& sum) {
+  LeastNumber own{least};
+  if (least <= sum.value) {
+    for (const float c : celsius) {
+      const float number = sign * c;
+      own.count += number == least ? 1U : 0U;
+      own.next = number != least && number < own.next ? number : own.next;
+    }
+  }
+  sum.add(own);
 }
 
 /// Takes note of finite temperatures.
@@ -63,12 +72,12 @@ void describe(std::span<const float> celsius, TemperatureFacts& facts) {
     kelvin += static_cast<std::uint32_t>(c >= 200.0F) & static_cast<std::uint32_t>(c < 400.0F);
     tenths += static_cast<std::uint32_t>(c >= 2000.0F) & static_cast<std::uint32_t>(c < 4000.0F);
     hundredths += static_cast<std::uint32_t>(c >= 20'000.0F) & static_cast<std::uint32_t>(c < 40'000.0F);
-    hot += static_cast<std::uint32_t>(c > 3000.0F);
+    hot += static_cast<std::uint32_t>(c > kHottest);
     cold += static_cast<std::uint32_t>(c < -100.0F);
   }
+  add_least(celsius, lowest, 1, facts.low);
+  add_least(celsius, -highest, -1, facts.high);
   facts.finite_count += celsius.size();
-  facts.lowest = std::min(facts.lowest, lowest);
-  facts.highest = std::max(facts.highest, highest);
   facts.nearest_zero = nearest_zero;
   facts.zero_count += zero;
   facts.full_count += full;

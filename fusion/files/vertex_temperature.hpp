@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -9,6 +10,35 @@
 #include "fusion/files/read_options.hpp"
 
 namespace spectra::files {
+
+/// Degrees Celsius above which there are hardly any.
+constexpr float kHottest = 3000;
+constexpr float kSeldomDegrees = 150;
+/// Hundredths of a degree are hardly ever more.
+constexpr float kMostHundredths = 12'000;
+/// Hundredths of a degree, and tenths, are mostly; degrees hardly.
+inline bool is_large(float celsius) {
+  return std::abs(celsius) >= kSeldomDegrees && std::abs(celsius) <= kMostHundredths;
+}
+
+/// The least of many numbers, how many are exactly that, and the least of the others; none: infinity.
+struct LeastNumber {
+  float value = std::numeric_limits<float>::infinity();
+  std::uint64_t count = 0;
+  float next = std::numeric_limits<float>::infinity();
+
+  /// Those of other numbers.
+  void add(const LeastNumber& other) {
+    if (other.value < value) {
+      *this = {other.value, other.count, other.next < value ? other.next : value};
+    } else if (other.value == value) {
+      count += other.count;
+      next = other.next < next ? other.next : next;
+    } else if (other.value < next) {
+      next = other.value;
+    }
+  }
+};
 
 /// What was found among the temperatures of a file.
 struct TemperatureFacts {
@@ -21,8 +51,8 @@ struct TemperatureFacts {
 
   // Of the finite ones, which may be in another unit than degC.
   std::uint64_t finite_count = 0;
-  float lowest = std::numeric_limits<float>::infinity();
-  float highest = -std::numeric_limits<float>::infinity();
+  LeastNumber low;
+  LeastNumber high;                                             ///< Of their negatives.
   std::uint64_t zero_count = 0;                                 ///< Exactly 0, which often stands for nothing.
   float nearest_zero = std::numeric_limits<float>::infinity();  ///< The smallest magnitude of the others.
   std::uint64_t full_count = 0;  ///< Exactly 65535, all bits of a sensor's count, which often stands for nothing.

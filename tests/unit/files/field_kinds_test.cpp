@@ -224,6 +224,21 @@ TEST(FieldKinds, HeightsWrittenAsANumberForNoneAreHoles) {
       << note_text(kept, "shared_coordinate");
 }
 
+TEST(FieldKinds, NumbersOfTheFileAreSaidAsItHasThem) {
+  std::vector<std::string> lines;
+  for (int i = 0; i < 400; ++i) {
+    const std::string z = i % 4 == 0 ? "65535" : std::to_string(900 + 300 * std::sin(i));
+    lines.push_back(std::to_string(i % 20 * 150) + ' ' + std::to_string(i / 20 * 150) + ' ' + z);
+  }
+  ReadOptions millimetres;
+  millimetres.metres_per_unit = 0.001;
+  std::string text = text_file("", lines);
+  EXPECT_NE(note_text(loaded(text, millimetres), "hole_vertices").find("whose z is 65535,"), std::string::npos);
+  text.replace(text.find("float z"), 7, "double z");
+  EXPECT_NE(note_text(loaded(text, millimetres), "hole_vertices").find("whose z is 65535,"), std::string::npos)
+      << note_text(loaded(text, millimetres), "hole_vertices");
+}
+
 TEST(FieldKinds, AFloorFarBelowIsNoHole) {
   // A floor of 5 m at z = 0 and a lamp or a table above it.
   for (const bool is_flat : {false, true}) {
@@ -300,6 +315,17 @@ TEST(FieldKinds, ManyVerticesInOnePlaceNeedNotBeAHole) {
   EXPECT_EQ(cone.mesh.vertex_count(), 120U);
   EXPECT_EQ(cone.mesh.triangle_count(), 40U);
 
+  for (const auto& [tip, is_hole] :
+       {std::pair("0 0 3.5", false), std::pair("0 0 40", false), std::pair("-1 -1 -20", false),
+        std::pair("-1 -1 -9999", true), std::pair("-1000 -1000 -1000", true), std::pair("0 0 -9999.9", true)}) {
+    for (std::size_t i = 2; i < lines.size(); i += 3) lines[i] = tip;
+    const LoadedScene far = loaded(text_file("", lines, "element face 40\n" + std::string(kFaces), faces));
+    EXPECT_EQ(far.mesh.vertex_count(), is_hole ? 80U : 120U) << tip;
+    EXPECT_EQ(far.mesh.triangle_count(), is_hole ? 0U : 40U) << tip;
+    EXPECT_EQ(note_count(far, "crowded_place"), is_hole ? 0U : 1U) << tip;
+    EXPECT_EQ(loaded(text_file("", lines)).mesh.vertex_count(), 80U) << "as a cloud: " << tip;
+  }
+
   lines.clear();
   for (int i = 0; i < 400; ++i) lines.push_back(std::to_string(i % 10) + " 0 0");
   EXPECT_EQ(loaded(text_file("", lines)).mesh.vertex_count(), 400U);
@@ -361,6 +387,40 @@ TEST(FieldKinds, PackedColoursAreUnpacked) {
   }
   EXPECT_EQ(loaded(text_file("property float rgba\n", {"0 0 0 5.5461155e-39"})).mesh.visible()[0],
             (base::Rgb8{60, 100, 80}));
+}
+
+TEST(FieldKinds, PackedNumbersThatAreNoColourAreGreyAndSaid) {
+  const base::Rgb8 grey{128, 128, 128};
+  for (const auto& [type, value] : {std::pair("float", "nan"), std::pair("float", "-nan"), std::pair("float", "inf"),
+                                    std::pair("float", "1e39"), std::pair("uint", "nan"), std::pair("uint", "3.5"),
+                                    std::pair("uint", "5000000000"), std::pair("int", "-inf")}) {
+    const std::string property = std::string("property ") + type + " rgb\n";
+    const LoadedScene scene = loaded(text_file(property, {std::string("0 0 0 ") + value, "1 0 0 3957840"}));
+    EXPECT_EQ(scene.mesh.visible()[0], grey) << value;
+    EXPECT_EQ(scene.mesh.visible()[1], (base::Rgb8{60, 100, 80})) << value;
+    EXPECT_EQ(note_count(scene, "clamped_colours"), 1U) << value;
+    const LoadedScene faces =
+        loaded(text_file("", {"0 0 0", "1 0 0", "0 1 0"}, "element face 1\n" + std::string(kFaces) + property,
+                         std::string("3 0 1 2 ") + value + "\n"));
+    EXPECT_EQ(faces.mesh.visible()[0], grey) << value;
+    EXPECT_EQ(note_count(faces, "clamped_colours"), 3U) << value;
+  }
+  // With its bits, NaN is a colour, and so is a large float: opaque black.
+  EXPECT_EQ(loaded(text_file("property float rgb\n", {"0 0 0 -1.7014118e+38"})).mesh.visible()[0],
+            (base::Rgb8{0, 0, 0}));
+  for (const std::uint32_t bits : {0x7FC00000U, 0xFFC00000U, 0xFF800000U, 0xFFBC6450U}) {
+    PlyBytes file;
+    file.text("ply\nformat binary_little_endian 1.0\nelement vertex 3\n" + std::string(kXyz) + "element face 1\n" +
+              std::string(kFaces) + "property float rgb\nend_header\n");
+    for (const float value : {0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}) file.le(value);
+    file.le(std::uint8_t{3}).le(0).le(1).le(2).le(bits);
+    const LoadedScene scene = loaded(file.bytes());
+    EXPECT_EQ(scene.mesh.visible()[0],
+              (base::Rgb8{static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
+                          static_cast<std::uint8_t>(bits)}))
+        << bits;
+    EXPECT_EQ(note_count(scene, "clamped_colours"), 0U) << bits;
+  }
 }
 
 TEST(FieldKinds, FacesLendColoursAndTemperatureToTheirCorners) {
@@ -444,6 +504,19 @@ std::vector<std::string> lines_of(double first, double step, int count, const st
   return lines;
 }
 
+TEST(FieldKinds, UnitsOfTwoLettersAreOneWord) {
+  for (const char* name : {"temperature_mK", "temp_mK", "tempmK", "temp_MK", "temperature_mk", "scalar_Temp_mK"}) {
+    EXPECT_TRUE(
+        loaded(text_file(std::string("property float ") + name + "\n", lines_of(293'150, 10, 40))).mesh.has_temperature)
+        << name;
+  }
+  for (const char* name : {"temp_cK", "tempcK", "temperature_ck"}) {
+    const LoadedScene scene = loaded(text_file(std::string("property float ") + name + "\n", lines_of(15, 1, 40)));
+    EXPECT_NE(note_text(scene, "implausible_temperatures").find("--temperature-unit centikelvin"), std::string::npos)
+        << name;
+  }
+}
+
 TEST(FieldKinds, ABareTMustLookLikeATemperature) {
   const LoadedScene good = loaded(text_file("property float t\n", lines_of(15, 1, 40)));
   EXPECT_TRUE(good.mesh.has_temperature);
@@ -506,6 +579,60 @@ TEST(FieldKinds, WhatIsNotTakenForATemperatureIsSaidWithTheTrueReason) {
   EXPECT_EQ(said("property uint t\nproperty float quality\n", "20 1"),
             "'t' is not taken for a temperature, because of its type, uint: whole numbers of that name count time; "
             "--temperature-property NAME takes one of: quality");
+}
+
+TEST(FieldKinds, ABareTOfTheFacesOrInMillikelvinIsNamed) {
+  const auto said = [](const std::string& of_vertices, const std::string& value, const std::string& of_faces) {
+    const LoadedScene scene = loaded(text_file(of_vertices, {"0 0 0" + value, "1 0 0" + value, "0 1 0" + value},
+                                               "element face 1\n" + std::string(kFaces) + of_faces,
+                                               "3 0 1 2" + std::string(of_faces.empty() ? "\n" : " 20\n")));
+    EXPECT_FALSE(scene.mesh.has_temperature);
+    return note_text(scene, "no_temperature");
+  };
+  for (const char* name : {"t", "T", "T_C", "scalar_T"}) {
+    for (const char* type : {"float ", "double "}) {
+      EXPECT_EQ(said("", "", std::string("property ") + type + name + "\n"),
+                "'" + std::string(name) +
+                    "' is not taken for a temperature, because of its name, which is not enough for one of the faces; "
+                    "--temperature-property NAME takes one of: " +
+                    name);
+    }
+  }
+  EXPECT_NE(said("", "", "property int t\n").find("because of its type, int"), std::string::npos);
+  for (const char* name : {"T_mK", "t_mK", "tMK"}) {
+    EXPECT_EQ(said(std::string("property float ") + name + "\n", " 293150", ""),
+              "'" + std::string(name) +
+                  "' is not taken for a temperature, because of its values (293150 to 293150); --temperature-property "
+                  "NAME takes one of: " +
+                  name);
+  }
+}
+
+TEST(FieldKinds, ABareTMayHaveANumberForNoData) {
+  ReadOptions named;
+  named.no_data = {-9999};
+  ReadOptions positive;
+  positive.no_data = {9999};
+  for (const auto& [none, options] : {std::pair("-9999", ReadOptions{}), std::pair("-9999", named),
+                                      std::pair("9999", positive), std::pair("-300", ReadOptions{})}) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 40; ++i)
+      lines.push_back(std::to_string(i) + " 0 0 " + (i % 5 == 0 ? none : std::to_string(15 + i % 7)));
+    const LoadedScene scene = loaded(text_file("property float t\n", lines), options);
+    EXPECT_TRUE(scene.mesh.has_temperature) << none;
+    EXPECT_EQ(note_count(scene, "missing_temperatures"), 8U) << none;
+  }
+  // What is left must look like temperatures, and be most of them.
+  for (const auto& [none, other] : {std::pair("-9999", 0.01), std::pair("-9999", 1e6)}) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 40; ++i)
+      lines.push_back(std::to_string(i) + " 0 0 " + (i % 5 == 0 ? none : std::to_string(other * (1 + i % 7))));
+    EXPECT_FALSE(loaded(text_file("property float t\n", lines)).mesh.has_temperature) << other;
+  }
+  std::vector<std::string> lines;
+  for (int i = 0; i < 40; ++i)
+    lines.push_back(std::to_string(i) + " 0 0 " + (i % 5 != 0 ? "-9999" : std::to_string(15 + i % 7)));
+  EXPECT_FALSE(loaded(text_file("property float t\n", lines)).mesh.has_temperature);
 }
 
 TEST(FieldKinds, ANameThatTheValuesContradictIsNotCalledTheirLook) {
@@ -883,6 +1010,33 @@ TEST(FieldKinds, TheWrongByteOrderOfACloudIsSeen) {
           << wrong.error().message;
     }
     EXPECT_TRUE(cloud("binary_little_endian", type, 1e-30)) << "small, but no better the other way round: " << type;
+  }
+}
+
+/// One byte off, the positions make sense only the other way round, by chance.
+TEST(FieldKinds, BytesBetweenHeaderAndPositionsAreCounted) {
+  for (const bool is_big : {false, true}) {
+    for (const auto& [between, count] :
+         {std::pair("\n", 1), std::pair("\r\n", 2), std::pair(" \n", 2), std::pair("\n\n\n", 3)}) {
+      for (const bool has_faces : {false, true}) {
+        PlyBytes bytes;
+        bytes.text(std::string("ply\nformat ") + (is_big ? "binary_big_endian" : "binary_little_endian") +
+                   " 1.0\nelement vertex 200\n" + std::string(kXyz) +
+                   (has_faces ? "element face 1\n" + std::string(kFaces) : "") + "end_header\n" + between);
+        for (int i = 0; i < 200; ++i) {
+          for (const double value : {3 * std::sin(i), 3 * std::cos(i), 1 + 0.1 * std::sin(2 * i)}) {
+            bytes.ordered(is_big, static_cast<float>(value));
+          }
+        }
+        if (has_faces) bytes.ordered(is_big, std::uint8_t{3}).ordered(is_big, 0).ordered(is_big, 1).ordered(is_big, 2);
+        const auto scene = test::read_bytes(bytes.bytes());
+        ASSERT_FALSE(scene);
+        EXPECT_NE(scene.error().message.find(std::to_string(count) + (count == 1 ? " byte" : " bytes") +
+                                             " too many between end_header and the first position"),
+                  std::string::npos)
+            << scene.error().message;
+      }
+    }
   }
 }
 

@@ -96,7 +96,10 @@ TEST(UpSearch, ReadsNothingIntoOtherWords) {
                            "comment backed up = y",
                            "comment set up: x 3, y 2",
                            "comment warm-up: y",
-                           "comment axis up to y"}) {
+                           "comment axis up to y",
+                           "comment area covered y up to 3 m",
+                           "comment building: y up to 12.5",
+                           "comment z is 0, y up from there"}) {
     EXPECT_EQ(told({line}), "nothing") << line;
   }
   EXPECT_EQ(told({"comment y up", "comment z up"}), "nothing") << "they do not agree";
@@ -203,6 +206,10 @@ TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
   EXPECT_TRUE(is_metric({"comment units: m"}));
   EXPECT_TRUE(is_metric({"obj_info unit=M, z up"}));
   EXPECT_FALSE(is_metric({"comment not in metres"}));
+  for (const char* line :
+       {"comment units per meter 1000", "comment 1000 units per metre", "comment points per square metre 80"}) {
+    EXPECT_FALSE(is_metric({line})) << line;
+  }
   EXPECT_FALSE(is_metric({"comment m"})) << "a letter, unless it is said to be the unit";
   EXPECT_FALSE(is_metric({"comment units: m of a map"}));
   EXPECT_TRUE(is_metric({}, 0.001));

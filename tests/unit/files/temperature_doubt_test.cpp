@@ -1,6 +1,7 @@
 // Which unit temperatures may be in that are hard to believe as degrees Celsius.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,7 @@ namespace {
 
 using test::kXyz;
 using test::loaded;
+using test::note_count;
 using test::note_text;
 
 /// What is said of `count` values from `low` on in even steps, then of the others.
@@ -91,6 +93,78 @@ TEST(TemperatureDoubt, TenthsAreNamedBesideKelvin) {
   // No fractions of a kelvin are known to have tenths of a degree; and degrees are degrees.
   EXPECT_EQ(said("float", 290.05, 0.1, 60).find("tenths"), std::string::npos);
   EXPECT_EQ(said("short", 18, 3, 60), "");
+}
+
+/// 600 values from 15 to 27 degC as they are measured, every third of which is this.
+LoadedScene third_of(double number, double low = 15, double range = 12, const ReadOptions& options = {},
+                     bool is_whole = false) {
+  std::string body;
+  for (int i = 0; i < 600; ++i) {
+    const double own = low + range * std::fmod(i * 0.618, 1);
+    body += std::to_string(i) + " 0 0 " + std::to_string(i % 3 == 0 ? number : is_whole ? std::round(own) : own) + "\n";
+  }
+  return loaded("ply\nformat ascii 1.0\nelement vertex 600\n" + std::string(kXyz) +
+                    "property float temperature\nend_header\n" + body,
+                options);
+}
+
+TEST(TemperatureDoubt, ANumberThatManyShareFarFromAllOthersIsAskedAbout) {
+  for (const char* text : {"999", "1000", "2000", "3000", "-99", "-99.99", "-100", "500", "99.9", "327.67"}) {
+    const double number = std::stod(text);
+    const LoadedScene scene = third_of(number);
+    EXPECT_EQ(note_count(scene, "implausible_temperatures"), 200U) << text;
+    expect_in("200 are exactly " + std::string(text), note_text(scene, "implausible_temperatures"));
+    expect_in("if " + std::string(text) + " stands for no data, --no-data " + text,
+              note_text(scene, "implausible_temperatures"));
+    EXPECT_EQ(scene.mesh.temperature_celsius()[0], static_cast<float>(number)) << "kept";
+    ReadOptions named;
+    named.no_data = {number};
+    EXPECT_EQ(note_text(third_of(number, 15, 12, named), "implausible_temperatures"), "") << text;
+  }
+  for (const double number : {999.0, 1000.0, -99.0, -100.0, 400.0}) {
+    expect_in("200 are exactly", note_text(third_of(number, 15, 14, {}, true), "implausible_temperatures"));
+  }
+  // Beside another unit, which is asked about first.
+  expect_in("look like kelvin: --temperature-unit kelvin; if 999 stands for no data, --no-data 999",
+            note_text(third_of(999, 288.5, 12), "implausible_temperatures"));
+  ReadOptions kelvin;
+  kelvin.temperature_unit = TemperatureUnit::Kelvin;
+  expect_in(
+      "200 temperatures are exactly 999 in the file, far from all others: if that stands for no data, --no-data 999",
+      note_text(third_of(999, 288.5, 12, kelvin), "implausible_temperatures"));
+  EXPECT_EQ(note_text(third_of(300, 288.5, 12, kelvin), "implausible_temperatures"), "");
+}
+
+TEST(TemperatureDoubt, PlateausAreNoQuestion) {
+  EXPECT_EQ(note_text(third_of(40), "implausible_temperatures"), "") << "a warm thing";
+  EXPECT_EQ(note_text(third_of(27.5), "implausible_temperatures"), "") << "the end of a range";
+  EXPECT_EQ(note_text(third_of(150, 15, 134), "implausible_temperatures"), "") << "a sensor that is full";
+  EXPECT_EQ(note_text(third_of(60, 15, 1), "implausible_temperatures"), "")
+      << "one that has been given its temperature";
+  EXPECT_EQ(note_text(third_of(-40, 15, 1), "implausible_temperatures"), "");
+  // Things that have been given one temperature each.
+  std::string body;
+  for (int i = 0; i < 600; ++i)
+    body += std::to_string(i) + " 0 0 " + (i % 9 == 0 ? "80\n" : i % 2 == 0 ? "19\n" : "21\n");
+  EXPECT_EQ(note_text(loaded("ply\nformat ascii 1.0\nelement vertex 600\n" + std::string(kXyz) +
+                             "property float temperature\nend_header\n" + body),
+                      "implausible_temperatures"),
+            "");
+  // Eleven of a number may be by chance.
+  EXPECT_EQ(said("float", 15.01, 0.01, 600, std::vector<std::string>(11, "999")), "");
+  expect_in("12 are exactly 999", said("float", 15.01, 0.01, 600, std::vector<std::string>(12, "999")));
+}
+
+TEST(TemperatureDoubt, KelvinMayHaveAFire) {
+  for (const int fire : {20, 200, 400}) {
+    std::vector<std::string> hot;
+    for (int i = 0; i < fire; ++i) hot.push_back(std::to_string(401.3 + i));
+    expect_in("look like kelvin: --temperature-unit kelvin", said("float", 288.1, 0.05, 300, hot));
+  }
+  // A fire in degrees has cooler things about.
+  std::vector<std::string> hot;
+  for (int i = 0; i < 400; ++i) hot.push_back(std::to_string(250.3 + i));
+  EXPECT_EQ(said("float", 15.1, 0.05, 300, hot), "");
 }
 
 }  // namespace
