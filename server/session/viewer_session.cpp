@@ -558,8 +558,8 @@ void ViewerSession::set_plan(fusion::FusionPlan plan) {
 void ViewerSession::tell_method_limits() {
   const auto& settings = plan_->settings();
   const fusion::Method* method = fusion::find_method(settings.method);
-  const bool lacks_temperature =
-      scene_ && method->needs_temperature && !scene_->temperature().summary.has_temperature();
+  const bool lacks_temperature = scene_ && scene_->vertex_count() > 0 && method->needs_temperature &&
+                                 !scene_->temperature().summary.has_temperature();
   statuses_.set("no_temperature", protocol::StatusLevel::Warning,
                 lacks_temperature
                     ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")

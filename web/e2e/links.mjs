@@ -142,6 +142,42 @@ export function addLinkTests(browser) {
     await server.stop();
   });
 
+  test('Another view that is chosen while the first picture loads is said to be still to come, also when the link is cut then', async () => {
+    const server = await startServer(['--demo']);
+    await ready(server);
+    const link = await startLink(server.port);
+    link.rate = 300_000;
+    const { page } = await openClient(browser, link.url);
+    await page.waitForFunction(() => globalThis.spectra?.store.methods.length > 0 && globalThis.spectra.store.pictureStands);
+    // Nothing of the other view comes for now.
+    link.rate = 1_000;
+    await page.keyboard.press('1');
+    const state = () =>
+      page.evaluate(() => {
+        const { complete, pictureMethod, shownMethods } = globalThis.spectra.store;
+        return { complete, pictureMethod, shown: shownMethods.length, isThermal: shownMethods.includes('thermal_only') };
+      });
+    const sign = page.locator('[data-pending-method]');
+    await sign.waitFor({ timeout: 2500 });
+    assert.deepEqual(await state(), { complete: null, pictureMethod: null, shown: 1, isThermal: false });
+    assert.match(await sign.innerText(), /^Thermal.*not yet in the picture[^]*0 % of it is; the rest still shows \w/);
+    await screenshot(page, 'view-while-loading');
+    link.down();
+    await page.getByText(/^This picture is \d+\ss old and shows \w/).waitFor();
+    await screenshot(page, 'view-while-loading-cut');
+    link.rate = 1_000;
+    link.up();
+    await page.waitForFunction(() => globalThis.spectra.store.connected, null, { timeout: 30_000 });
+    await sign.waitFor();
+    link.rate = Infinity;
+    await settled(page);
+    await sign.waitFor({ state: 'detached' });
+    assert.match((await state()).pictureMethod, /^thermal_only$/);
+    await page.close();
+    await link.stop();
+    await server.stop();
+  });
+
   test('The client is small: over a thin link it leaves the line to the scene, and the first picture stands within 5 s', async () => {
     const server = await startServer(['--demo']);
     // What it takes to make the scene is not counted.

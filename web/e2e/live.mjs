@@ -148,8 +148,31 @@ export function addLiveTests(browser) {
     await page.getByText('The map is empty yet').waitFor();
     await card.waitFor({ state: 'detached', timeout: 10_000 });
     await page.locator('.hover').waitFor({ state: 'detached', timeout: 10_000 });
+    assert.equal(await page.getByText('has no temperatures').count(), 0, 'what is not there has nothing');
     assert.deepEqual(problems, []);
     await page.close();
+    await server.stop();
+  });
+
+  test('How exact the picture is, is not said while the map is another one by now', async () => {
+    const server = await startServer(['--live']);
+    const link = await startLink(server.port);
+    let revision = 0;
+    for (let i = 0; i < 4; i += 1) revision = await put(server, i % 2, i >> 1);
+    const { page } = await openClient(browser, link.url, { width: 1280, height: 800 });
+    await shows(page, revision);
+    const said = page.locator('[data-status="accuracy"]');
+    assert.match(await said.innerText(), /^within .*colours exact$/);
+    link.rate = 1_500;
+    revision = await put(server, 0, 0, { celsius: 35, height: 3 });
+    await page.waitForFunction((wanted) => globalThis.spectra.store.scene.revision >= wanted, revision);
+    await said.waitFor({ state: 'detached', timeout: 1000 });
+    await page.locator('[data-status="age"]').filter({ hasText: 'behind' }).waitFor();
+    link.rate = Infinity;
+    await shows(page, revision);
+    await said.filter({ hasText: /^within .*colours exact$/ }).waitFor();
+    await page.close();
+    await link.stop();
     await server.stop();
   });
 
@@ -248,6 +271,8 @@ export function addLiveTests(browser) {
 
     await shows(page, await put(server, 0, 0, { age_s: 250 }));
     assert.equal(await page.getByText('The map is empty yet').count(), 0);
+    const isNamed = () => String(globalThis.spectra.store.shownMethods) === globalThis.spectra.store.fusion.method;
+    assert.ok(await page.evaluate(isNamed), 'with the first temperatures the picture shows another method, by itself');
     assert.match((await live.innerText()).replaceAll('\u202f', ' '), /^live, newest 4 min$/);
     const small = await page.evaluate(() => globalThis.spectra.viewport.pose.eye);
 

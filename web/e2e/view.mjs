@@ -548,6 +548,9 @@ export function addViewTests(browser, scratch) {
     await page.evaluate(() => {
       globalThis.waits = [];
       globalThis.notches = [];
+      globalThis.said = [];
+      const { store, viewport } = globalThis.spectra;
+      setInterval(() => globalThis.said.push([viewport.gpuObjects.triangles, store.drawnError.position_m]), 10);
       addEventListener('pointermove', (event) => {
         globalThis.waits.push(performance.now() - event.timeStamp);
         globalThis.notches.push(globalThis.spectra.viewport.notch);
@@ -577,6 +580,15 @@ export function addViewTests(browser, scratch) {
     );
     assert.ok(used.at(-1).resolution < 1, 'drawing by software is a slow machine');
     await drawn(page);
+    const said = await page.evaluate(() => globalThis.said);
+    const atRest_m = said.at(-1)[1];
+    const coarse = said.filter(([drawn]) => drawn < triangles / 2);
+    assert.ok(used.at(-1).levels === 0 || coarse.length > 0);
+    assert.deepEqual(
+      coarse.filter(([, error_m]) => error_m <= atRest_m),
+      [],
+      'said to be as exact as at rest while what was drawn last is not',
+    );
     const picture_ms = await page.evaluate(() => globalThis.spectra.viewport.picture_ms);
     console.log(`        at rest: ${picture_ms.toFixed(0)} ms a picture`);
     // Both grow with whatever else the machine has to do.

@@ -29,8 +29,12 @@ describe('the progress of a picture', () => {
     progress.begin();
     expect(store.behindSince).toBe(1000);
     progress.received(5000);
+    progress.completed(complete(4), 3);
+    // It is still being drawn.
+    progress.drawn(2);
+    expect([store.behindSince, store.complete, store.pictureMethod]).toEqual([1000, null, null]);
     clock.now = 1250;
-    progress.completed(complete(4));
+    progress.drawn(3);
     expect(store.behindSince).toBeNull();
     expect(store.progress).toBe(1);
     expect(store.lastUpdate).toEqual({ bytes: 5000, ms: 250 });
@@ -41,16 +45,64 @@ describe('the progress of a picture', () => {
     const { store, clock, progress } = setUp();
     store.generation = 4;
     progress.begin();
-    progress.completed(complete(3));
+    progress.completed(complete(3), 1);
+    progress.drawn(1);
     expect(store.behindSince).toBe(1000);
     expect(store.complete).toEqual(complete(3));
     clock.isBusy = true;
-    progress.completed(complete(4));
+    progress.completed(complete(4), 1);
+    progress.drawn(1);
     expect(store.behindSince).toBe(1000);
     expect(store.pictureMethod).toBeNull();
     clock.isBusy = false;
-    progress.completed(complete(4));
+    progress.completed(complete(4), 1);
+    progress.drawn(1);
     expect(store.behindSince).toBeNull();
+  });
+
+  it('is not at its end while the scene is another one than that of the picture', () => {
+    const { store, progress } = setUp();
+    store.link = { phase: 'open' };
+    store.scene = { revision: 3 } as Scene;
+    store.drawnError = { position_m: 0.001, colour_levels: 0, rounding_levels: 0, rounding_celsius: 0, temperature_celsius: 0 };
+    [store.pictureRevision, store.now] = [2, 1100];
+    progress.begin();
+    // For a moment nobody says so.
+    expect(store.accuracy).toBe(store.drawnError);
+    store.now = 1200;
+    expect(store.accuracy).toBeNull();
+    progress.completed({ generation: 0, scene_revision: 2 } as StreamComplete, 1);
+    progress.drawn(1);
+    expect([store.behindSince, store.accuracy]).toEqual([1000, null]);
+    progress.completed({ generation: 0, scene_revision: 3 } as StreamComplete, 2);
+    progress.drawn(2);
+    expect([store.behindSince, store.accuracy]).toEqual([null, store.drawnError]);
+    // What a connection of before has said counts no more.
+    progress.begin();
+    progress.completed({ generation: 0, scene_revision: 3 } as StreamComplete, 3);
+    progress.disconnected();
+    store.complete = null;
+    progress.drawn(3);
+    expect(store.complete).toBeNull();
+  });
+
+  it('is that of the method that is named before the first picture is complete, too', () => {
+    const { store, tiles, progress } = setUp();
+    store.link = { phase: 'open' };
+    store.scene = { tile_count: 8 } as Scene;
+    store.shownMethods = ['visible'];
+    [tiles.size, tiles.current, tiles.total] = [8, 1, 4];
+    progress.begin();
+    store.now = 2000;
+    progress.tick();
+    expect([store.methodIsPending, store.progress]).toEqual([true, 0.25]);
+    store.shownMethods = ['blend'];
+    progress.tick();
+    expect([store.methodIsPending, store.progress]).toEqual([false, 1]);
+    // Without a link, too.
+    store.shownMethods = ['visible'];
+    store.link = { phase: 'connecting', attempt: 2 };
+    expect(store.methodIsPending).toBe(true);
   });
 
   it('is not behind of settings that were refused', () => {
@@ -89,7 +141,8 @@ describe('the progress of a picture', () => {
     tiles.size = 12;
     progress.tick();
     expect(store.progress).toBe(1);
-    progress.completed(complete(0));
+    progress.completed(complete(0), 1);
+    progress.drawn(1);
     progress.begin();
     [tiles.current, tiles.total] = [3, 4];
     progress.tick();
@@ -139,7 +192,7 @@ describe('the progress of a picture', () => {
     store.fusionInForce = { method: 'threshold' } as Fusion;
     progress.beginHere('other', 7);
     progress.beginHere('threshold', 7);
-    progress.drawnHere(6);
+    progress.drawn(6);
     progress.tick();
     expect([store.hereSince, store.lateSince, store.progress, store.pictureMethod]).toEqual([1000, 1000, 0, 'blend']);
     store.now = 1100;
@@ -147,13 +200,14 @@ describe('the progress of a picture', () => {
     store.now = 1600;
     expect([store.behind, store.settled, store.methodIsPending]).toEqual([true, false, true]);
     // That the robot has sent all says nothing of what is drawn here.
-    progress.completed(complete(1));
+    progress.completed(complete(1), 1);
+    progress.drawn(1);
     expect(store.pictureMethod).toBe('blend');
     clock.now = 1600;
     progress.beginHere('threshold', 9);
-    progress.drawnHere(8);
+    progress.drawn(8);
     expect([store.pictureMethod, store.hereSince]).toEqual(['threshold', 1600]);
-    progress.drawnHere(9);
+    progress.drawn(9);
     progress.tick();
     expect([store.hereSince, store.progress, store.settled]).toEqual([null, 1, true]);
   });
@@ -163,10 +217,11 @@ describe('the progress of a picture', () => {
     progress.beginHere('threshold', 7);
     progress.leftHere();
     expect(store.hereSince).toBeNull();
-    progress.completed(complete(1));
+    progress.completed(complete(1), 1);
+    progress.drawn(1);
     expect(store.pictureMethod).toBe('blend');
     // Of a picture of before nothing is said any more.
-    progress.drawnHere(8);
+    progress.drawn(8);
     expect(store.pictureMethod).toBe('blend');
   });
 

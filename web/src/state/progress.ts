@@ -17,6 +17,8 @@ export class Progress {
   #window: { at: number; bytes: number }[] = [];
   /** Settings that are shown here and are in no picture yet, by the number of the picture that they will be in. */
   #here: { picture: number; method: string; at: number }[] = [];
+  /** Pictures that are complete once they have been drawn. */
+  #complete: { picture: number; message: StreamComplete }[] = [];
   /** What the picture is behind of are settings alone. */
   #mayBeRefused = false;
 
@@ -44,11 +46,16 @@ export class Progress {
     this.#window.push({ at: this.now(), bytes });
   }
 
-  /** All that was asked for is in the picture. */
-  completed(message: StreamComplete): void {
+  /** All that was asked for is in the picture of this number. */
+  completed(message: StreamComplete, picture: number): void {
+    this.#complete.push({ picture, message });
+  }
+
+  #completed(message: StreamComplete): void {
     const { store } = this;
     store.complete = message;
-    if (message.generation < store.generation || this.isBusy()) return;
+    store.pictureRevision = message.scene_revision;
+    if (message.generation < store.generation || store.isOfOldScene || this.isBusy()) return;
     this.#caughtUp();
   }
 
@@ -61,7 +68,9 @@ export class Progress {
   }
 
   /** The pictures up to this number have been drawn. */
-  drawnHere(picture: number): void {
+  drawn(picture: number): void {
+    for (const { message } of this.#complete.filter((one) => one.picture <= picture)) this.#completed(message);
+    this.#complete = this.#complete.filter((one) => one.picture > picture);
     const drawn = this.#here.filter((one) => one.picture <= picture).at(-1);
     if (drawn === undefined) return;
     this.#here = this.#here.filter((one) => one.picture > picture);
@@ -78,6 +87,7 @@ export class Progress {
 
   /** Nothing comes any more: there is nothing to be behind of. */
   disconnected(): void {
+    this.#complete = [];
     this.#notBehind();
     this.store.rate_bytes_per_s = 0;
   }
@@ -115,7 +125,8 @@ export class Progress {
     // The server has not said yet which generation shows the method that is named.
     if (store.fusion?.method !== store.fusionInForce?.method) return 0;
     // Before the first picture is complete nobody can say which tiles it takes; at most it is all of them.
-    if (store.complete === null) return this.tiles.size / Math.max(1, this.tiles.size, store.scene?.tile_count ?? 0);
+    if (store.complete === null && store.otherMethods.length === 0)
+      return this.tiles.size / Math.max(1, this.tiles.size, store.scene?.tile_count ?? 0);
     const { current, total } = this.tiles.progress(store.generation);
     return total === 0 ? 0 : current / total;
   }

@@ -227,6 +227,67 @@ describe('Readings of a scene that changes', () => {
     expect(all()).toHaveLength(2);
   });
 
+  it('are asked for again where the pointer rests once the camera does, and are none on its way', async () => {
+    const { store, readings, asked, picture } = setUp();
+    const all = () => probes(asked) as typeof asked;
+    readings.hover({ x: 7, y: 8 });
+    await later();
+    await all()[0]!.answer({ ...PROBE, temperature: 57 });
+    expect(store.hover?.probe.temperature).toBe(57);
+    picture.under = [4, 5, 6];
+    for (let i = 0; i < 20; i += 1) {
+      readings.cameraMoved();
+      expect(store.hover).toBeNull();
+      await vi.advanceTimersByTimeAsync(100);
+    }
+    expect(all()).toHaveLength(1);
+    await vi.advanceTimersByTimeAsync(200);
+    expect(all()[1]!.params).toEqual({ position: [4, 5, 6] });
+    // The camera has gone on before the answer.
+    readings.cameraMoved();
+    await all()[1]!.answer({ ...PROBE, temperature: 40 });
+    expect(store.hover).toBeNull();
+    await vi.advanceTimersByTimeAsync(300);
+    await all()[2]!.answer({ ...PROBE, temperature: 19 });
+    expect(store.hover).toEqual({ x: 7, y: 8, probe: { ...PROBE, temperature: 19 } });
+    readings.hover(null);
+    readings.cameraMoved();
+    await vi.advanceTimersByTimeAsync(300);
+    expect(all()).toHaveLength(3);
+  });
+
+  it('have the colours of the settings in force', async () => {
+    const { store, readings, asked, picture } = setUp();
+    const all = () => probes(asked) as typeof asked;
+    const next = async () => {
+      readings.drawn(1);
+      readings.drawn(1);
+      await vi.advanceTimersByTimeAsync(1500);
+      return all().length;
+    };
+    expect(await next()).toBe(0);
+    void readings.pin({ x: 5, y: 6 });
+    await later();
+    await all()[0]!.answer({ ...PROBE, fused: [1, 1, 1], distance: 0.01 });
+    expect(await next()).toBe(1);
+    store.fusionInForce = { ...FUSION, range: { mode: 'manual', min: 0, max: 9 } };
+    expect(await next()).toBe(2);
+    await all()[1]!.answer({ ...PROBE, fused: [2, 2, 2], distance: 0.01 });
+    expect(store.pinned?.reading.probe.fused).toEqual([2, 2, 2]);
+    // The robot has been told of what is set here.
+    store.generation += 1;
+    expect(await next()).toBe(3);
+    await all()[2]!.answer({ ...PROBE, temperature: 21, fused: [3, 3, 3], distance: 0.01 });
+    expect(await next()).toBe(3);
+    // Without a link the colours are those of here, and the temperature is what the robot has said.
+    store.link = { phase: 'connecting', attempt: 2 };
+    store.fusingPlace = 'here';
+    picture.vertex = { position: [1, 2, 4], temperature: 20, visible: [1, 2, 3], fused: [4, 5, 6], distance: 1 };
+    store.fusionInForce = FUSION;
+    expect(await next()).toBe(3);
+    expect(store.pinned?.reading.probe).toMatchObject({ temperature: 21, fused: [4, 5, 6] });
+  });
+
   it('are asked for again of the same revision of another server', async () => {
     const { readings, asked } = setUp();
     const picture = (number: number) => {

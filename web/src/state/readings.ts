@@ -22,6 +22,8 @@ const HOVER_INTERVAL_MS = 120;
 const AGAIN_INTERVAL_MS = 1000;
 /** RpcError.code where there is nothing to read. */
 const NO_SCENE = -32004;
+/** A camera that has not moved for so long rests. */
+const REST_MS = 200;
 /** What is read again may be so far from where it was pinned, in distances of the vertex that was read first, and in diagonals of the scene. */
 const REACH_OF_DISTANCE = 3;
 const REACH_OF_SCENE = 0.01;
@@ -58,6 +60,11 @@ export class Readings {
   #hovered: Place | null = null;
   /** Where in the scene the pinned reading was asked for, and from how far a vertex may answer for it. */
   #pinnedAt: { point: Vec3; reach: number } | null = null;
+  /** Settings in which the colours of the pinned reading are. */
+  #pinnedWith = '';
+  /** Counts from where the scene has been looked at. */
+  #views = 0;
+  #rest: ReturnType<typeof setTimeout> | undefined;
   #shownRevision: number | null = null;
   /** Number of the picture in which something else may be under the pointer. */
   #newPicture = Infinity;
@@ -144,10 +151,12 @@ export class Readings {
     this.#newPicture = picture;
   }
 
-  /** The pictures up to this number have been drawn: something else may be under the pointer. */
+  /** The pictures up to this number have been drawn: something else may be under the pointer. What is pinned has the colours of now. */
   drawn(picture: number): void {
-    if (picture < this.#newPicture) return;
-    this.#newPicture = Infinity;
+    const settings = this.#settings;
+    if (picture < this.#newPicture && (this.store.pinned === null || settings === this.#pinnedWith)) return;
+    if (picture >= this.#newPicture) this.#newPicture = Infinity;
+    this.#pinnedWith = settings;
     this.#againAsker.push(true);
   }
 
@@ -170,8 +179,10 @@ export class Readings {
         this.store.pinned = null;
         return;
       }
+      const settings = this.#settings;
       const answer = await this.#probe(point);
       if (answer === null) return;
+      this.#pinnedWith = settings;
       this.#pinnedAt = { point, reach: this.#reach(answer) };
       this.store.pinned = { reading: { ...place, probe: answer }, place: this.picture.project(answer.position) };
     } catch (error) {
@@ -198,10 +209,18 @@ export class Readings {
     this.store.pinned = null;
   }
 
-  /** What is pinned stays at its place in the scene. */
+  /** What is pinned stays at its place in the scene; what is under the pointer is something else, and read once the camera rests. */
   cameraMoved(): void {
     const { pinned } = this.store;
     if (pinned !== null) this.store.pinned = { ...pinned, place: this.picture.project(pinned.reading.probe.position) };
+    this.#views += 1;
+    this.store.hover = null;
+    clearTimeout(this.#rest);
+    this.#rest = setTimeout(() => this.hover(this.#hovered), REST_MS);
+  }
+
+  get #settings(): string {
+    return JSON.stringify([this.store.generation, this.store.fusionInForce]);
   }
 
   async #askHistogram(): Promise<void> {
@@ -240,18 +259,19 @@ export class Readings {
   /** The scene is another one: what is said of a place is of now, and of a place with nothing nothing is said. */
   async #readAgain(): Promise<void> {
     const { store } = this;
-    if (!store.connected) return;
+    if (!store.connected && store.fusingPlace !== 'here') return;
     if (this.#hovered !== null) this.#hoverAsker.push(this.#hovered);
     const at = this.#pinnedAt;
     if (at === null || store.pinned === null) return;
     let answer: Probe | null = null;
     try {
-      answer = probe(await this.session.request('scene.probe', { position: at.point }), 'scene.probe');
+      answer = await this.#probe(at.point);
     } catch (error) {
       if (error instanceof RpcError && error.code === BUSY) return this.#againAsker.push(true);
       if (!(error instanceof RpcError && error.code === NO_SCENE)) return this.session.onProblem(error);
     }
     if (at !== this.#pinnedAt || store.pinned === null) return;
+    if (!store.connected && answer !== null) answer = { ...store.pinned.reading.probe, fused: answer.fused };
     store.pinned =
       answer === null || answer.distance > at.reach
         ? null
@@ -273,11 +293,13 @@ export class Readings {
   }
 
   async #askHover(place: Place): Promise<void> {
+    const view = this.#views;
     try {
       const point = await this.picture.pick(place.x, place.y);
       if (point !== null) this.picture.aimAt(point);
       const answer = point && (await this.#probe(point));
-      this.store.hover = answer === null || this.#hovered === null ? null : { ...place, probe: answer };
+      const isOfNow = view === this.#views && this.#hovered !== null;
+      this.store.hover = answer === null || !isOfNow ? null : { ...place, probe: answer };
     } catch {
       this.store.hover = null;
     }

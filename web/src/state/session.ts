@@ -11,6 +11,7 @@ import {
   type StreamComplete,
   streamComplete,
   streamStats,
+  type Vec3,
 } from '../protocol/messages';
 import type { Insets, UpAxis, View } from '../view/first_view';
 import { FrameIntake } from '../tiles/frame_intake';
@@ -32,6 +33,7 @@ import { Progress } from './progress';
 import { QualityWish } from './quality_wish';
 import { Readings } from './readings';
 import { robotAfter } from './robot';
+import { ScreenWords } from './screen_words';
 import { Settings } from './settings';
 import type { OutlineWish, Store } from './store.svelte';
 import { Subscription } from './subscription';
@@ -61,6 +63,7 @@ export class Session {
   readonly #look: FirstLook;
   readonly #markers: Markers;
   readonly #share: HighlightedShare;
+  readonly #words = new ScreenWords();
   #nextPicture: ReturnType<typeof setTimeout> | undefined;
   /** Colours of all of the scene in its first picture, which does not wait for what is said of them. */
   #firstColours: Uint8Array | null = null;
@@ -78,6 +81,7 @@ export class Session {
       onResize: () => this.#look.pictureIs(null),
       onUserMove: () => this.#userMoved(),
       beforeRender: () => this.#bringIn(),
+      onDrawn: () => this.#drawn(),
       onDetail: (levels) => this.tiles.leaveOut(levels),
       onContext: (isLost) => {
         store.graphicsLostAt = isLost ? performance.now() : null;
@@ -148,6 +152,7 @@ export class Session {
       {
         onHello: (message) => {
           store.robot = null;
+          this.#progress.disconnected();
           this.#subscription.greeted(message);
         },
         onNotification: (method, params) => this.#notified(method, params),
@@ -370,7 +375,8 @@ export class Session {
       case 'fusion.changed': {
         const { generation, fusion } = fusionState(params, method);
         // Nobody has asked for it: the scene has changed by itself.
-        if (store.wanted === null && !this.settings.busy) this.tiles.isVersion(generation);
+        const isVersion = store.wanted === null && !this.settings.busy && fusion.method === store.fusionInForce?.method;
+        if (isVersion) this.tiles.isVersion(generation);
         this.fusing.factsChanged();
         // What is fused here is what is set here.
         if (this.fusing.isHere) store.generation = Math.max(store.generation, generation);
@@ -441,7 +447,14 @@ export class Session {
     this.readings.pictureIsOf(message.scene_revision, this.viewport.nextPicture);
     // What is not made here any more is not waited for.
     this.fusing.completed();
-    this.#progress.completed(message);
+    this.#progress.completed(message, this.viewport.nextPicture);
+  }
+
+  /** What is said of the screen follows what is on it. */
+  #drawn(): void {
+    this.#progress.drawn(this.viewport.pictures);
+    this.readings.drawn(this.viewport.pictures);
+    this.#sayError();
   }
 
   #cameraMoved(pose: CameraPose): void {
@@ -457,38 +470,29 @@ export class Session {
   #tick(): void {
     this.store.now = performance.now();
     this.store.heardAt = this.store.connected ? this.#connection.lastMessageAt : null;
-    this.#progress.drawnHere(this.viewport.pictures);
-    this.readings.drawn(this.viewport.pictures);
+    this.#drawn();
     this.#progress.tick();
-    this.#sayError();
     this.fusing.consider();
   }
 
-  /** What the status says of the picture, as soon as the picture is another one. */
+  /** What the status says of the picture. */
   #sayError(): void {
-    const error = this.tiles.drawnError(this.viewport.visibility());
-    const before = this.store.drawnError;
-    const isSame =
-      error?.position_m === before?.position_m &&
-      error?.colour_levels === before?.colour_levels &&
-      error?.rounding_levels === before?.rounding_levels &&
-      error?.rounding_celsius === before?.rounding_celsius &&
-      error?.temperature_celsius === before?.temperature_celsius;
-    if (!isSame) this.store.drawnError = error;
-    this.#sayMethods();
+    const { store, viewport } = this;
+    const isVisible = viewport.visibility();
+    this.#words.pictureIs(viewport.nextPicture, { error: this.tiles.drawnError(isVisible), methods: this.#methods(isVisible) });
+    const { error, methods } = this.#words.afterPicture(viewport.pictures);
+    if (String(Object.values(error ?? {})) !== String(Object.values(store.drawnError ?? {}))) store.drawnError = error;
+    if (String(methods) !== String(store.shownMethods)) store.shownMethods = methods;
   }
 
   /** Which methods the picture shows; a tile of which that is not known shows what all of it showed when it was last complete. */
-  #sayMethods(): void {
-    const { store } = this;
-    const methods = new Set<string>();
-    for (const generation of this.tiles.drawnGenerations(this.viewport.visibility())) {
-      const method = generation === null ? store.pictureMethod : (this.settings.methodOf(generation) ?? store.pictureMethod);
-      if (method !== null) methods.add(method);
-    }
-    if (this.fusing.isHere && store.pictureMethod !== null) methods.add(store.pictureMethod);
-    const isSame = methods.size === store.shownMethods.length && store.shownMethods.every((method) => methods.has(method));
-    if (!isSame) store.shownMethods = [...methods];
+  #methods(isVisible: (centre: Vec3, radius: number) => boolean): string[] {
+    const { pictureMethod } = this.store;
+    const methods = [...this.tiles.drawnGenerations(isVisible)].map(
+      (generation) => (generation === null ? null : this.settings.methodOf(generation)) ?? pictureMethod,
+    );
+    if (this.fusing.isHere) methods.push(pictureMethod);
+    return methods.filter((method) => method !== null);
   }
 
   #say(error: unknown): void {

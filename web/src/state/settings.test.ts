@@ -127,6 +127,14 @@ describe('Settings', () => {
     expect(events.inForce).toBe(1);
   });
 
+  it('knows the method of a generation of which nothing was said by the one before', () => {
+    const { settings } = setUp();
+    expect(settings.methodOf(1)).toBe('blend');
+    settings.inForce(5, fusionWith(0.5, 'other'));
+    settings.inForce(3, fusionWith(0.5, 'late'));
+    expect([0, 2, 3, 4, 5, 7].map((one) => settings.methodOf(one))).toEqual(['blend', 'blend', 'late', 'late', 'other', 'other']);
+  });
+
   it('counts generations anew with each connection', () => {
     const { store, settings } = setUp();
     settings.inForce(7, fusionWith(0.9));

@@ -85,9 +85,10 @@ export class Settings {
     return this.#sender.busy || this.#teller.busy;
   }
 
-  /** The method of a generation of this connection, where that is known. */
+  /** The method of a generation of this connection: generations of which nothing was said have that of the one before. */
   methodOf(generation: number): string | undefined {
-    return this.#methodOf.get(generation);
+    const last = (): number => Math.max(...[...this.#methodOf.keys()].filter((known) => known < generation));
+    return this.#methodOf.get(generation) ?? this.#methodOf.get(last());
   }
 
   // Actions of the interface

@@ -132,6 +132,8 @@ export class Store {
   hereSince = $state<number | null>(null);
   /** Share of the tiles that show the newest settings. */
   progress = $state(1);
+  /** Of the scene that the tiles of the picture are known to be of; -1: of none. */
+  pictureRevision = $state(-1);
   /** Method that all of the picture showed when it was last complete; null before the first time. */
   pictureMethod = $state<string | null>(null);
   /** Methods that parts of the picture show now. */
@@ -215,6 +217,8 @@ export class Store {
   readonly behind = $derived(this.lateSince !== null && this.now - this.lateSince > 150);
   /** All that was asked for has come, and is drawn or will be in a moment. */
   readonly settled = $derived(this.complete !== null && this.behindSince === null && !this.behind);
+  /** Something of the picture may have gone from the scene, or be still to come. */
+  readonly isOfOldScene = $derived(this.pictureRevision < (this.scene?.revision ?? -1));
   /** What is on its way for longer than a moment, or waits for a connection. */
   readonly unconfirmed = $derived<FusionChange | null>(
     this.wanted !== null && (!this.connected || (this.behindSince !== null && this.now - this.behindSince > PENDING_AFTER_MS))
@@ -225,17 +229,18 @@ export class Store {
   readonly otherMethods = $derived(this.shownMethods.filter((method) => method !== this.fusion?.method));
   /** The picture does not show the method that is named, or not everywhere, and that for longer than a moment. */
   readonly methodIsPending = $derived(
-    this.pictureMethod !== null &&
-      this.otherMethods.length > 0 &&
+    this.otherMethods.length > 0 &&
       ((!this.connected && this.hereSince === null) || (this.lateSince !== null && this.now - this.lateSince > PENDING_AFTER_MS)),
   );
   /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual. */
   readonly silentFor_s = $derived(
     this.connected && this.heardAt !== null && this.now - this.heardAt > QUIET_MS ? (this.now - this.heardAt) / 1000 : null,
   );
-  /** How exact the picture is; nobody can say that of the picture of a link that is lost or silent, or where there is none. */
+  /** How exact the picture is; nobody can say that of a picture of a link that is lost or silent, or of a scene that is another one by now. */
   readonly accuracy = $derived(
-    this.connected && this.silentFor_s === null && this.graphicsLostAt === null ? this.drawnError : null,
+    this.connected && this.silentFor_s === null && this.graphicsLostAt === null && !(this.isOfOldScene && this.behind)
+      ? this.drawnError
+      : null,
   );
   readonly graphicsLostFor_s = $derived(this.graphicsLostAt === null ? 0 : Math.max(0, (this.now - this.graphicsLostAt) / 1000));
   readonly lostFor_s = $derived(this.lostAt === null ? 0 : Math.max(0, (this.now - this.lostAt) / 1000));

@@ -35,7 +35,7 @@ function setUp() {
   let settle: () => void = () => undefined;
   const sent = { wait: false };
   const concerned = {
-    tiles: { clear: note('tiles cleared', undefined), layersOf, claims: vi.fn(() => claims), resume: vi.fn() },
+    tiles: { size: 0, clear: note('tiles cleared', undefined), layersOf, claims: vi.fn(() => claims), resume: vi.fn() },
     intake: { beginConnection: note('intake begins', undefined) },
     settings: {
       greeted: () => before.fusion as never,
@@ -95,6 +95,34 @@ describe('a subscription', () => {
     expect(store.methods.length).toBeGreaterThan(0);
     expect(concerned.look.sceneIs).toHaveBeenCalledWith(HELLO.scene);
     expect(concerned.progress.begin).toHaveBeenCalled();
+  });
+
+  it('knows of which scene a picture is that begins, and of none that an earlier connection has left', () => {
+    const { store, subscription, concerned } = setUp();
+    const { revision } = HELLO.scene!;
+    subscription.greeted(HELLO);
+    expect([store.isOfOldScene, store.pictureRevision]).toEqual([false, revision]);
+    concerned.tiles.size = 3;
+    subscription.sceneChanged({ ...HELLO.scene!, revision: revision + 1 });
+    expect(store.isOfOldScene).toBe(true);
+    store.pictureRevision = revision + 1;
+    expect(store.isOfOldScene).toBe(false);
+    subscription.greeted(HELLO);
+    expect(store.isOfOldScene).toBe(true);
+  });
+
+  it('knows by what is on the screen which method an earlier connection has left there', () => {
+    const { store, subscription } = setUp();
+    subscription.greeted(HELLO);
+    expect(store.pictureMethod).toBeNull();
+    store.shownMethods = [HELLO.fusion.method];
+    subscription.greeted(HELLO);
+    expect(store.pictureMethod).toBe(HELLO.fusion.method);
+    store.pictureMethod = null;
+    store.fusionInForce = HELLO.fusion;
+    store.shownMethods = [HELLO.fusion.method, 'other'];
+    subscription.greeted(HELLO);
+    expect(store.pictureMethod).toBe('other');
   });
 
   it('asks how sure temperatures are while that is hatched, of a server that knows', async () => {

@@ -18,7 +18,7 @@ const MOST_VALUES = 9900;
 
 /** What a connection's beginning concerns. */
 export interface Concerned {
-  tiles: Pick<TileSet, 'clear' | 'claims' | 'layersOf' | 'resume'>;
+  tiles: Pick<TileSet, 'size' | 'clear' | 'claims' | 'layersOf' | 'resume'>;
   intake: Pick<FrameIntake, 'beginConnection'>;
   settings: Pick<Settings, 'greeted' | 'send' | 'busy' | 'reconsiderMissing'>;
   quality: Pick<QualityWish, 'greeted' | 'send' | 'askMarks' | 'sceneHasStep'>;
@@ -62,6 +62,7 @@ export class Subscription {
     const { store } = this;
     const { settings, quality, readings, intake, progress, catalogue } = this.concerned;
     const returning = store.scene !== undefined;
+    store.pictureMethod ??= store.otherMethods[0] ?? store.shownMethods[0] ?? null;
     this.#connectionNumber += 1;
     this.#isSubscribed = false;
     readings.beginConnection();
@@ -179,6 +180,8 @@ export class Subscription {
       fusing.sceneGone();
       tiles.clear();
     }
+    if (tiles.size === 0) store.pictureRevision = next.revision;
+    else if (fresh) store.pictureRevision = -1;
     look.sceneIs(next);
     quality.sceneHasStep(next.position_step_m);
     if (!same) {

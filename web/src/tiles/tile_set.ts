@@ -40,6 +40,19 @@ export interface DrawnError {
   rounding_celsius: number;
 }
 
+/** The larger ones of two errors; null: of nothing. */
+export function worse(a: DrawnError | null, b: DrawnError | null): DrawnError | null {
+  if (a === null || b === null) return a ?? b;
+  const degrees = Math.max(a.temperature_celsius ?? -1, b.temperature_celsius ?? -1);
+  return {
+    position_m: Math.max(a.position_m, b.position_m),
+    colour_levels: Math.max(a.colour_levels, b.colour_levels),
+    temperature_celsius: degrees < 0 ? null : degrees,
+    rounding_levels: Math.max(a.rounding_levels, b.rounding_levels),
+    rounding_celsius: Math.max(a.rounding_celsius, b.rounding_celsius),
+  };
+}
+
 interface Shown {
   drawable: Drawable;
   geometry: GeometrySummary;
@@ -433,15 +446,9 @@ export class TileSet {
     let largest: DrawnError | null = null;
     for (const { shown } of this.#drawn) {
       if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
-      const { error } = shown;
-      largest ??= { position_m: 0, colour_levels: 0, rounding_levels: 0, rounding_celsius: 0, temperature_celsius: null };
-      largest.position_m = Math.max(largest.position_m, error.position_m);
-      largest.colour_levels = Math.max(largest.colour_levels, error.colour_levels);
-      if (this.#isHere && shown.rawStep_celsius !== null)
-        largest.rounding_celsius = Math.max(largest.rounding_celsius, shown.rawStep_celsius / 2);
-      else largest.rounding_levels = Math.max(largest.rounding_levels, error.rounding_levels);
-      if (error.temperature_celsius !== null)
-        largest.temperature_celsius = Math.max(largest.temperature_celsius ?? 0, error.temperature_celsius);
+      const step = this.#isHere ? shown.rawStep_celsius : null;
+      const rounding = step === null ? {} : { rounding_levels: 0, rounding_celsius: step / 2 };
+      largest = worse(largest, { ...shown.error, ...rounding });
     }
     return largest;
   }

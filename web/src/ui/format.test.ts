@@ -92,6 +92,8 @@ describe('Numbers', () => {
     expect(words(0.04, 2.1, 0.395, false)).toBe('coarse: within 4 cm, 3 levels, 0.4 °C');
     expect(words(0.002, 0.2, 0.001, true)).toBe('within 2 mm, 1 level, 0.01 °C');
     expect(words(0.002, 0, 0, true)).toBe('within 2 mm, colours exact');
+    // Of settings that are still to come.
+    expect(words(0.002, 0, 0, false)).toBe('coarse: within 2 mm');
     expect(words(0.002, 3, null, true)).toBe('within 2 mm, 3 levels');
     expect(words(0.002, Number.NaN, null, true)).toBe('within 2 mm, colours coarse');
     expect(words(3.4, 255, 30.1, false)).toBe('coarse: within 3.4 m, colours coarse, 30.1 °C');

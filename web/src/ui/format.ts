@@ -135,6 +135,8 @@ export function accuracyWords(error: DrawnError | null, isSettled: boolean, isMe
   const colour_levels = error.colour_levels + error.rounding_levels;
   const isOff = colour_levels !== 0 || (temperature_celsius ?? 0) > 0;
   const parts = [`within ${length(Math.max(position_m, LEAST_SAID_M), isMetric)}`];
+  // The colours of settings that are in force are still to come.
+  if (!isOff && !isSettled) return `coarse: ${parts[0]}`;
   if (!isOff && temperature_celsius !== null && rounding_celsius > 0)
     parts.push(
       `colours to ${withUnit(figures(roundedUp(rounding_celsius, 1 - Math.floor(Math.log10(rounding_celsius))), 2), 'degC')}`,

@@ -26,6 +26,8 @@ export interface ViewportEvents {
   onUserMove: () => void;
   /** Called before each picture, to bring in what has been decoded. Returns true when more waits for the next picture. */
   beforeRender: () => boolean;
+  /** More pictures have been drawn. */
+  onDrawn: () => void;
   /** So many of the finest levels are to be left out, while the camera moves on a slow machine; 0: none. */
   onDetail: (levels: number) => void;
   /** The browser has taken the GPU away, or given it back and the picture is drawn again. */
@@ -530,6 +532,7 @@ export class Viewport {
           // Now as sharp as the screen is.
           this.invalidate();
         }
+        this.events.onDrawn();
         if (!this.#isHeldUp) break;
         this.#isHeldUp = false;
         this.invalidate();
