@@ -205,13 +205,8 @@ int encoding_method(bool is_point_cloud, DracoKeeping keeping) {
   return keeping == DracoKeeping::Shape ? draco::MESH_EDGEBREAKER_ENCODING : draco::MESH_SEQUENTIAL_ENCODING;
 }
 
-}  // namespace
-
-Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping wanted, int speed) {
-  BOOST_OUTCOME_TRYV(check(input, wanted, speed));
-  DracoKeeping keeping = wanted;
-  if (keeping == DracoKeeping::Shape && is_crowded(input.positions_m.size(), input.triangles))
-    keeping = DracoKeeping::Order;
+/// `keeping` is what was wanted, or more.
+Result<DracoFile> file_keeping(DracoKeeping keeping, const DracoFileInput& input, DracoKeeping wanted, int speed) {
   const bool is_point_cloud = input.triangles.empty();
   const bool is_exact = keeping == DracoKeeping::Everything;
   const bool is_shape = !is_point_cloud && keeping == DracoKeeping::Shape;
@@ -283,6 +278,20 @@ Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping wanted, i
   }
   file.bytes = bytes_of(buffer);
   return file;
+}
+
+}  // namespace
+
+Result<DracoFile> draco_file(const DracoFileInput& input, DracoKeeping wanted, int speed) {
+  BOOST_OUTCOME_TRYV(check(input, wanted, speed));
+  const bool is_shape = wanted == DracoKeeping::Shape;
+  if (is_shape && is_crowded(input.positions_m.size(), input.triangles))
+    return file_keeping(DracoKeeping::Order, input, wanted, speed);
+  BOOST_OUTCOME_TRY(DracoFile file, file_keeping(wanted, input, wanted, speed));
+  if (!is_shape || file.kept != DracoKeeping::Shape || !input.triangles.empty()) return file;
+  // Points in the order of a scanner differ little from one to the next.
+  BOOST_OUTCOME_TRY(DracoFile ordered, file_keeping(DracoKeeping::Order, input, wanted, speed));
+  return ordered.bytes.size() <= file.bytes.size() ? std::move(ordered) : std::move(file);
 }
 
 }  // namespace spectra::protocol::codec

@@ -31,7 +31,8 @@ struct DracoFileInput {
 /// One Draco stream and what it has lost.
 struct DracoFile {
   std::vector<std::byte> bytes;
-  /// What was asked for, or Order for a Shape with very many triangles round a vertex or an edge, and for one of points without a lattice.
+  /// What was asked for, or Order for a Shape with very many triangles round a vertex or an edge, and for one of points without a lattice
+  /// or that is smaller so.
   DracoKeeping kept = DracoKeeping::Shape;
   /// Of the lattice; 0: positions are as they were, also where Order is kept for a Shape and all vertices are too far apart for its step.
   float position_step_m = 0;

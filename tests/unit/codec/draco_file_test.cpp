@@ -11,6 +11,7 @@
 #include <random>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace spectra::protocol::codec {
@@ -189,6 +190,32 @@ TEST(DracoFile, OfAPointCloudIsWithinHalfAStep) {
   expect_within_half_a_step(scene, seen, 0.003F, kDracoTemperatureStepCelsius);
   EXPECT_EQ(std::set(seen.colours.begin(), seen.colours.end()), std::set(scene.colours.begin(), scene.colours.end()));
   EXPECT_EQ(seen.positions.size(), scene.positions.size());
+}
+
+TEST(DracoFile, OfAPointCloudIsTheSmallerOfAnyOrderAndTheScans) {
+  constexpr std::uint32_t kCount = 20'000;
+  std::vector<std::array<float, 3>> positions;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const float angle = 0.003F * static_cast<float>(i);
+    positions.push_back({3 * std::cos(angle), 3 * std::sin(angle), 0.0001F * static_cast<float>(i)});
+  }
+  Scene scan = numbered(positions, {});
+  for (std::uint32_t i = 0; i < kCount; ++i) scan.temperatures[i] = 20 + 0.0005F * static_cast<float>(i);
+  Scene mixed = scan;
+  std::mt19937 random(5);
+  for (std::uint32_t i = kCount - 1; i > 0; --i) {
+    const std::size_t other = random() % (i + 1);
+    std::swap(mixed.positions[i], mixed.positions[other]);
+    std::swap(mixed.colours[i], mixed.colours[other]);
+    std::swap(mixed.temperatures[i], mixed.temperatures[other]);
+  }
+  for (const auto& [scene, kept] : {std::pair(scan, DracoKeeping::Order), std::pair(mixed, DracoKeeping::Shape)}) {
+    const auto small = draco_file(scene.input(0.001F), DracoKeeping::Shape, 7);
+    const auto ordered = draco_file(scene.input(0.001F), DracoKeeping::Order, 7);
+    ASSERT_TRUE(small.has_value() && ordered.has_value());
+    EXPECT_EQ(small.value().kept, kept);
+    EXPECT_LE(small.value().bytes.size(), ordered.value().bytes.size());
+  }
 }
 
 TEST(DracoFile, ThatKeepsOrderHasEveryVertexAndTriangleInItsPlace) {
