@@ -558,8 +558,12 @@ void ViewerSession::set_plan(fusion::FusionPlan plan) {
 void ViewerSession::tell_method_limits() {
   const auto& settings = plan_->settings();
   const fusion::Method* method = fusion::find_method(settings.method);
-  const bool lacks_temperature = scene_ && scene_->vertex_count() > 0 && method->needs_temperature &&
-                                 !scene_->temperature().summary.has_temperature();
+  // Beyond the sensor's range is no number, and not missing either.
+  const auto has_readings = [](const fusion::TemperatureSummary& summary) {
+    return summary.has_temperature() || summary.over_range_count + summary.under_range_count > 0;
+  };
+  const bool lacks_temperature =
+      scene_ && scene_->vertex_count() > 0 && method->needs_temperature && !has_readings(scene_->temperature().summary);
   statuses_.set("no_temperature", protocol::StatusLevel::Warning,
                 lacks_temperature
                     ? std::optional("This scene has no temperatures: " + method->label + " shows the visible colours.")

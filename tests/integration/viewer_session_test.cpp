@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -730,6 +731,21 @@ TEST_F(ViewerSessionTest, WarnsWhenAMethodCannotShowWhatItShould) {
   const auto unsafe = viewer.wait_for("status");
   ASSERT_TRUE(unsafe);
   EXPECT_EQ((*unsafe)["id"], "palette_not_fusion_safe");
+}
+
+TEST_F(ViewerSessionTest, WhatIsBeyondTheSensorEverywhereIsShownAndNotSaidToBeWithoutTemperatures) {
+  auto fire = sheet(40);
+  std::ranges::fill(fire.temperature_celsius(), std::numeric_limits<float>::infinity());
+  serve(std::move(fire));
+  Viewer viewer(server_->port());
+  viewer.request("fusion.set", {{"method", "thermal_only"}});
+  viewer.request("fusion.set", {{"method", "intensity_hue"}, {"palette", "white_hot"}});
+  for (json id; id != "palette_not_fusion_safe";) {
+    const auto status = viewer.wait_for("status");
+    ASSERT_TRUE(status);
+    id = (*status)["id"];
+    EXPECT_NE(id, "no_temperature");
+  }
 }
 
 TEST_F(ViewerSessionTest, TellsWhatWasNoticedInTheSceneAndTakesItBack) {

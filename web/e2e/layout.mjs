@@ -127,6 +127,18 @@ function boxes(page) {
         if (width > 0.5 && height > emptyAbove)
           problems.push(`${a.of} and ${b.of} of the axis lie over each other: ${width.toFixed(1)} x ${height.toFixed(1)}`);
       }
+    for (const line of axis?.querySelectorAll('line.level') ?? []) {
+      const { left, right, top } = line.getBoundingClientRect();
+      for (const { of, box } of labels)
+        if (left < box.right - 1 && right > box.left + 1 && top > box.top + 2 && top < box.bottom - 2)
+          problems.push(`a line runs through ${of} of the axis`);
+    }
+    const inFront = document.querySelector('.card')?.getBoundingClientRect();
+    for (const label of inFront === undefined ? [] : document.querySelectorAll('main > .label')) {
+      const { left, right, top, bottom } = label.getBoundingClientRect();
+      if (seen(label) && left < inFront.right && right > inFront.left && top < inFront.bottom && bottom > inFront.top)
+        problems.push(`the card covers ${name(label)}`);
+    }
     const parts = [
       ...document.querySelectorAll(
         '.axis, .panel, footer, [aria-label="Orientation"], .list > .banner, .strong, .card, .show, [title^="Go along"]',
@@ -366,12 +378,58 @@ export function addLayoutTests(browser, scratch) {
     const server = await startServer(['--demo']);
     const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
     const { page } = await openClient(context, server.url, null);
-    await settled(page);
+    await settled(page, 180_000);
     // The hottest place is beside the orientation, and nothing stands in front of it.
     await page.locator('[data-mark="hottest"][data-of="scene"]:not(.hidden)').waitFor();
     // Marks of what is in view come once the camera has rested.
     await page.waitForTimeout(1000);
     assert.equal(await page.locator('[data-mark="hottest"]').count(), 1);
+
+    // What is found, how hot it is, and the scene beside the balls of the orientation: all without scrolling, on the smallest phone.
+    await page.setViewportSize({ width: 360, height: 740 });
+    await page.waitForFunction(() => globalThis.spectra.viewport.size[0] === 360);
+    await drawn(page);
+    const { max } = await page.evaluate(() => globalThis.spectra.store.scene.temperature);
+    assert.ok((await page.locator('.axis svg text').allTextContents()).includes(max.toFixed(1)), 'the axis says how hot it is');
+    const facts = await page.locator('footer .facts').boundingBox();
+    const high = page.locator('footer .item', { hasText: `high ${max.toFixed(1)}` });
+    const item = await high.boundingBox();
+    assert.ok(item.y >= facts.y - 1 && item.y + item.height <= facts.y + facts.height + 1, 'and the bar');
+    for (const place of [page.locator('.found b'), page.locator('[data-highlight]')]) {
+      assert.ok(
+        await place.evaluate((one) => {
+          const { left, top, right, bottom } = one.getBoundingClientRect();
+          return document.elementFromPoint((left + right) / 2, (top + bottom) / 2)?.closest('.found') !== null && bottom > top;
+        }),
+        'what is found is out of sight',
+      );
+    }
+    const hit = await page.locator('[aria-label="Orientation"]').evaluate((gizmo) => {
+      const { left, top, right, bottom } = gizmo.getBoundingClientRect();
+      const counts = { CANVAS: 0, circle: 0, text: 0, all: 0 };
+      for (let y = top + 2; y < bottom; y += 4)
+        for (let x = left + 2; x < right; x += 4) {
+          const { tagName } = document.elementFromPoint(x, y);
+          counts.all += 1;
+          counts[tagName] = (counts[tagName] ?? 0) + 1;
+        }
+      return counts;
+    });
+    assert.ok(hit.CANVAS > hit.all / 3 && hit.CANVAS + hit.circle + hit.text === hit.all, JSON.stringify(hit));
+
+    // A card takes the place of the label: it goes beside, or away.
+    const mark = await page.evaluate(() => globalThis.spectra.store.marks.find(({ kind }) => kind === 'coldest'));
+    for (const [x, y] of [
+      [12, 36],
+      [60, 60],
+      [-12, 20],
+    ]) {
+      await page.touchscreen.tap(mark.x + x, mark.y + y);
+      await page.locator('.card').waitFor();
+      await drawn(page);
+      assert.deepEqual((await boxes(page)).problems, [], `a card at ${x}, ${y}`);
+    }
+    await screenshot(page, 'phone-card');
     await context.close();
     await server.stop();
   });
@@ -508,6 +566,10 @@ export function addLayoutTests(browser, scratch) {
       return found;
     });
     assert.deepEqual(faults, []);
+    const fills = await page.evaluate(() =>
+      ['.silhouette:not(.bright)', '.silhouette.bright'].map((part) => getComputedStyle(document.querySelector(part)).fill),
+    );
+    assert.notEqual(fills[0], fills[1], 'what is highlighted of the histogram is seen');
     const image = await screenshot(page, 'forced-colours');
     const slider = await page.locator('.panel input[type=range]').first().boundingBox();
     const column = [];

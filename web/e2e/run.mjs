@@ -227,6 +227,35 @@ test('A threshold handle on the axis turns the hot place from palette to visible
     assert.equal(Math.fround((await state()).fusion.params.threshold), Math.fround(celsius), key);
   }
 
+  // Beyond the data the handle stays at the end of the axis, with its value and the focus, and comes back.
+  await handle.press('End');
+  await settled(page);
+  for (const [key, isBeyond] of [
+    ['Shift+ArrowUp', true],
+    ['PageUp', true],
+    ['ArrowDown', false],
+  ]) {
+    await page.keyboard.press(key);
+    await settled(page);
+    const { threshold } = (await state()).fusion.params;
+    const [focused, said, value, lowest, highest] = await page.evaluate(() =>
+      ['data-handle', 'aria-valuetext', 'aria-valuenow', 'aria-valuemin', 'aria-valuemax'].map((name) =>
+        document.activeElement.getAttribute(name),
+      ),
+    );
+    assert.equal(focused, 'params.threshold', key);
+    assert.match(said, new RegExp(`^${threshold.toFixed(1)}`), key);
+    assert.ok(Number(lowest) <= Number(value) && Number(value) <= Number(highest), `${value} of ${lowest} to ${highest}`);
+    assert.equal(threshold > scene.temperature.max + 4, isBeyond, `${key}: ${threshold}`);
+    const { top, bottom, ends } = await page.evaluate(() => {
+      const [at, axis] = [document.activeElement, document.querySelector('.axis .scale')].map((one) =>
+        one.getBoundingClientRect(),
+      );
+      return { top: at.top, bottom: at.bottom, ends: [axis.top, axis.bottom] };
+    });
+    assert.ok(bottom > ends[0] && top < ends[1], `${key}: the handle is out of sight`);
+  }
+
   // By keyboard to the very top: nothing is.
   await page.locator('[data-parameter="threshold"] input[type=number]').fill(String(scene.temperature.max + 1));
   await page.keyboard.press('Enter');

@@ -207,7 +207,14 @@ export function addViewTests(browser, scratch) {
       `${header(4, 2)}${temperatures.map((t, i) => `${i % 2} ${i >> 1} 0 200 180 140 ${t}`).join('\n')}\n3 0 1 2\n3 1 3 2\n`;
     const scenes = {
       'one temperature': { text: sheet([21.5, 21.5, 21.5, 21.5]), says: /low 21\.5.*high 21\.5/, axis: /all 21\.5/ },
-      'all missing': { text: sheet(['nan', 'nan', 'nan', 'nan']), says: /no thermal data/ },
+      'a hundredth of a degree': {
+        text: sheet([20, 20.004, 20.006, 20.01]),
+        says: /low 20\.000.*high 20\.010/,
+        axis: /hottest 20\.010/,
+        threshold: /^20\.0\d\d$/,
+      },
+      'all missing': { text: sheet(['nan', 'nan', 'nan', 'nan']), says: /no thermal data/, views: ['visible', 'visible'] },
+      'all over range': { text: sheet(['inf', 'inf', 'inf', 'inf']), says: /4 over range/, views: ['thermal', 'fused'] },
       'fill values': { text: sheet([20, '1e36', 'inf', 25]), says: /low 20\.0.*high 1e36/, axis: /hottest 1e36.*1 over/ },
       'some missing': { text: sheet([20, 'nan', 30, 'nan']), says: /low 20\.0.*high 30\.0/, axis: /hottest 30\.0/, isGrey: true },
       'one vertex': { text: `${header(1, 0)}1 2 3 200 180 140 25\n`, says: /1 of 1 vertices/, axis: /all 25\.0/ },
@@ -218,7 +225,7 @@ export function addViewTests(browser, scratch) {
       },
     };
     const context = await browser.newContext({ viewport: { width: 1440, height: 720 } });
-    for (const [name, { text, says, axis, isGrey }] of Object.entries(scenes)) {
+    for (const [name, { text, says, axis, isGrey, threshold, views }] of Object.entries(scenes)) {
       const file = join(scratch, 'odd.ply');
       writeFileSync(file, text);
       const server = await startServer([file]);
@@ -243,6 +250,18 @@ export function addViewTests(browser, scratch) {
       if (axis === undefined) assert.equal(await page.locator('.axis').count(), 0, name);
       else assert.match((await page.locator('.axis').innerText()).replaceAll(/\s+/g, ' '), axis, name);
       await look('as it opens');
+      // Keys do what the panel offers, and no more.
+      for (const [i, key] of views === undefined ? [] : ['1', '3'].entries()) {
+        await page.locator('canvas').press(key);
+        await settled(page);
+        const { method, checked } = await page.evaluate(() => ({
+          method: globalThis.spectra.store.fusionInForce.method,
+          checked: document.querySelector('[data-view]:has(:checked:enabled)').dataset.view,
+        }));
+        const shown = { thermal_only: 'thermal', visible_only: 'visible' }[method] ?? 'fused';
+        assert.deepEqual([shown, checked], [views[i], views[i]], `${name}, ${key}`);
+        await look(`after ${key}`);
+      }
       if (axis !== undefined) {
         // Every method, every view, and the ways there.
         for (const key of ['1', '2', '3', 'f', 'e', 'l', 'p', 'r']) {
@@ -260,6 +279,11 @@ export function addViewTests(browser, scratch) {
           await settled(page);
           await look(method);
         }
+      }
+      if (threshold !== undefined) {
+        await page.evaluate(() => globalThis.spectra.settings.setMethod('colour_mapped_threshold'));
+        await settled(page);
+        assert.match(await page.locator('[data-parameter="threshold"] input[type=number]').inputValue(), threshold);
       }
       await page.setViewportSize({ width: 200, height: 150 });
       await page.getByText('The controls need a larger window.').waitFor();

@@ -22,6 +22,7 @@ import type { PartFailure } from '../transport/part_loader';
 import { type LinkState, QUIET_MS } from '../transport/connection';
 import { type HighlightContrast, needsOutline } from '../view/highlight_contrast';
 import type { Mark } from '../view/markers';
+import { decimalsOf } from './decimals';
 import { highlightKey, withChange } from './fusion_change';
 import { MapAge } from './map_age';
 import { type Note, notesOf } from './notes';
@@ -176,7 +177,14 @@ export class Store {
   readonly isShareKnown = $derived(this.fusion !== null && this.shareOf === highlightKey(this.fusion));
   readonly method = $derived(this.methods.find((method) => method.id === this.fusion?.method) ?? null);
   readonly palette = $derived(this.palettes.find((palette) => palette.id === this.fusion?.palette) ?? null);
-  readonly hasThermal = $derived(this.scene?.temperature.min != null);
+  /** There are temperatures that are numbers: an axis has something to stand on. */
+  readonly hasScale = $derived(this.scene?.temperature.min != null);
+  /** There are temperatures: those beyond the sensor's range are no numbers, and not missing either. */
+  readonly hasThermal = $derived(
+    this.hasScale || (this.scene?.temperature.over_range_count ?? 0) + (this.scene?.temperature.under_range_count ?? 0) > 0,
+  );
+  /** With how many decimals temperatures are written: the scene's, or those of the range that is looked at, are told apart. */
+  readonly decimals = $derived(decimalsOf(this.scene?.temperature, this.fusion?.range));
   /** Somebody has said that the scene is in metres; otherwise its lengths are shown in units. */
   readonly isMetric = $derived(this.scene?.metric === true);
   /** Without thermal data every method shows the visible colours. */

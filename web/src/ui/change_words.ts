@@ -36,6 +36,6 @@ export function sinceWords(probe: Probe, now_s: number): string[] {
 }
 
 /** What was read at a place: "38.1 °C, 4 min ago, +2.3 since 14:02". */
-export function probeWords(probe: Probe, now_s: number): string {
-  return [reading(probe), ...sinceWords(probe, now_s)].join(', ');
+export function probeWords(probe: Probe, now_s: number, decimals = 1): string {
+  return [reading(probe, decimals), ...sinceWords(probe, now_s)].join(', ');
 }

@@ -1,5 +1,17 @@
 import { describe, expect, it } from 'vitest';
-import { accuracyWords, bytes, celsius, count, duration, extent, figures, length, liveWords, reading } from './format';
+import {
+  accuracyWords,
+  beyondWords,
+  bytes,
+  celsius,
+  count,
+  duration,
+  extent,
+  figures,
+  length,
+  liveWords,
+  reading,
+} from './format';
 
 const plain = (text: string | null) => text?.replaceAll('\u202f', ' ') ?? null;
 
@@ -42,6 +54,12 @@ describe('Numbers', () => {
     expect([celsius(Infinity), celsius(-Infinity)]).toEqual(['over range', 'under range']);
   });
 
+  it('says what there is where no temperature is a number', () => {
+    expect(plain(beyondWords({ over_range_count: 3600 }))).toBe('3.60 k over range');
+    expect(beyondWords({ under_range_count: 5 })).toBe('5 under range');
+    expect(plain(beyondWords({ over_range_count: 3600, under_range_count: 12 }))).toBe('3.60 k over, 12 under range');
+  });
+
   it('have a power of ten where a fill value would be 37 digits wide', () => {
     expect([1e36, 9.96e35, 3.3e30, -1e9, 1_250_000, 999_999].map((t) => plain(celsius(t)))).toEqual([
       '1e36 °C',
@@ -56,6 +74,8 @@ describe('Numbers', () => {
 
   it('say what a sensor could not', () => {
     expect(plain(reading({ temperature: 21.5 }))).toBe('21.5 °C');
+    expect(plain(reading({ temperature: 21.5004 }, 3))).toBe('21.500 °C');
+    expect(plain(reading({ temperature: 21.5, temperature_sigma: 0.002 }, 3))).toBe('21.500 ± 0.002 °C');
     expect(reading({ temperature: null })).toBe('no temperature');
     expect(plain(reading({ temperature: 34.61, temperature_sigma: 0.32 }))).toBe('34.6 ± 0.3 °C');
     expect(plain(reading({ temperature: 34.61, temperature_sigma: 0.02 }))).toBe('34.6 ± 0.1 °C');

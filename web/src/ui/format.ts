@@ -35,19 +35,25 @@ export function unitSymbol(unit: string): string {
 }
 
 /** Infinite: beyond what the sensor could tell. */
-export function celsius(value: number | null | undefined): string {
+export function celsius(value: number | null | undefined, decimals = 1): string {
   if (value === Infinity || value === -Infinity) return value > 0 ? 'over range' : 'under range';
-  return value == null ? 'none' : withUnit(fixed(value, 1), 'degC');
+  return value == null ? 'none' : withUnit(fixed(value, decimals), 'degC');
+}
+
+/** What there is where the sensor could tell no temperature: "3.60 k over, 12 under range". */
+export function beyondWords({ over_range_count: over = 0, under_range_count: under = 0 }: Partial<Scene['temperature']>): string {
+  const parts = [...(over > 0 ? [`${count(over)} over`] : []), ...(under > 0 ? [`${count(under)} under`] : [])];
+  return `${parts.join(', ')} range`;
 }
 
 /** What was read at a place, in words; of how sure it is no less than the last decimal that is shown. */
-export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range' | 'temperature_sigma'>): string {
+export function reading(probe: Pick<Probe, 'temperature' | 'temperature_range' | 'temperature_sigma'>, decimals = 1): string {
   const { temperature, temperature_range, temperature_sigma } = probe;
   if (temperature_range != null) return celsius(temperature_range === 'over' ? Infinity : -Infinity);
   if (temperature === null) return 'no temperature';
   return temperature_sigma === undefined
-    ? celsius(temperature)
-    : `${fixed(temperature, 1)} ± ${celsius(Math.max(0.1, temperature_sigma))}`;
+    ? celsius(temperature, decimals)
+    : `${fixed(temperature, decimals)} ± ${celsius(Math.max(10 ** -decimals, temperature_sigma), decimals)}`;
 }
 
 /** Three figures and an SI prefix: 990 k, 1.97 M. */

@@ -23,7 +23,7 @@ const method: Method = {
   wants_fusion_safe_palette: false,
   params: [{ name: 'limit', label: 'Limit', help: '', kind: 'temperature', default: null }],
 };
-const scene = { lowest: 10, highest: 60, isPointCloud: false };
+const scene = { lowest: 10, highest: 60, isPointCloud: false, decimals: 1 };
 const words = (found: Histogram | null, inForce = {}) => plain(highlightWords(found, scene, method, inForce));
 
 describe('What is highlighted', () => {
@@ -49,6 +49,11 @@ describe('What is highlighted', () => {
     expect(words(histogram([[10, 60]], 1), { limit: -5 })).toBe(
       '100 % of the surface, at every temperature. Limit −5.0 °C is below the coldest, 10.0 °C.',
     );
+  });
+
+  it('writes the decimals that tell the temperatures apart', () => {
+    const found = highlightWords(histogram([[20.0004, 60]], 0.1), { ...scene, decimals: 4 }, method, { limit: 99 });
+    expect(plain(found)).toMatch(/above 20\.0004 °C\. .*99\.0000 °C is above the hottest, 60\.0000 °C/);
   });
 
   it('is not said of a method that shows all temperatures alike, nor of a scene without any', () => {

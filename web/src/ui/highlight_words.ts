@@ -14,13 +14,18 @@ export function percent(share: number): string {
 }
 
 /** Where the highlighted temperatures lie, within the lowest and highest of the scene. */
-function places(highlighted: readonly (readonly [number, number])[], lowest: number, highest: number): string {
+function places(
+  highlighted: readonly (readonly [number, number])[],
+  lowest: number,
+  highest: number,
+  said: (value: number) => string,
+): string {
   if (highlighted.length > 2) return `in ${highlighted.length} bands of temperature`;
   return highlighted
     .map(([from, to]) => {
       if (from <= lowest && to >= highest) return 'at every temperature';
-      if (to >= highest) return `above ${celsius(from)}`;
-      return from <= lowest ? `below ${celsius(to)}` : `from ${celsius(from)} to ${celsius(to)}`;
+      if (to >= highest) return `above ${said(from)}`;
+      return from <= lowest ? `below ${said(to)}` : `from ${said(from)} to ${said(to)}`;
     })
     .join(' or ');
 }
@@ -34,23 +39,24 @@ export const NOT_KNOWN_YET = '…';
  */
 export function highlightWords(
   histogram: Histogram | null,
-  scene: { lowest: number | null; highest: number | null; isPointCloud: boolean },
+  scene: { lowest: number | null; highest: number | null; isPointCloud: boolean; decimals: number },
   method: Method | null,
   inForce: Record<string, ParameterValue>,
 ): string | null {
   const share = histogram?.highlighted_share;
   const { lowest, highest } = scene;
   if (histogram === null || share === undefined || lowest === null || highest === null) return null;
+  const said = (value: number) => celsius(value, scene.decimals);
   const beyond = (method?.params ?? []).flatMap(({ kind, name, label }) => {
     const value = inForce[name];
     if (kind !== 'temperature' || typeof value !== 'number' || (value >= lowest && value <= highest)) return [];
-    const where = value > highest ? `above the hottest, ${celsius(highest)}` : `below the coldest, ${celsius(lowest)}`;
-    return [`${label} ${celsius(value)} is ${where}.`];
+    const where = value > highest ? `above the hottest, ${said(highest)}` : `below the coldest, ${said(lowest)}`;
+    return [`${label} ${said(value)} is ${where}.`];
   });
   const of = scene.isPointCloud ? 'points' : 'surface';
   const found =
     share === 0
       ? 'Nothing is highlighted.'
-      : `${percent(share)} of the ${of}${histogram.highlighted.length > 0 ? `, ${places(histogram.highlighted, lowest, highest)}` : ''}.`;
+      : `${percent(share)} of the ${of}${histogram.highlighted.length > 0 ? `, ${places(histogram.highlighted, lowest, highest, said)}` : ''}.`;
   return [found, ...beyond].join(' ');
 }

@@ -49,6 +49,8 @@ export function handleKey(event: KeyboardEvent, session: Session, actions: KeyAc
   if (store.helpOpen) return;
   if (!preferences.letterKeys && event.key.length === 1 && !actions.onScene) return;
   const view = VIEWS[event.key];
+  // What the panel does not offer.
+  if (view !== undefined && view !== 'visible' && !store.hasThermal) return;
   if (view !== undefined) session.settings.setViewMode(view);
   else if (event.key === '?') store.helpOpen = true;
   else if (event.key === 'Escape') session.unpin();

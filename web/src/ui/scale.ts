@@ -15,7 +15,7 @@ export function roundTicks(lo: number, hi: number, wanted: number): { values: nu
 }
 
 /** About as wide as a text is on the axis, in pixels, in the widest of the usual fonts. */
-function textWidth(text: string, isBold: boolean): number {
+export function textWidth(text: string, isBold: boolean): number {
   const points = text.length - text.replaceAll('.', '').length;
   return (text.length - points) * (isBold ? 8 : 7.3) + points * 4.4;
 }

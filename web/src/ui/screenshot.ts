@@ -47,8 +47,8 @@ function composed(session: Session, picture: ImageBitmap): HTMLCanvasElement {
       context.fillRect(20, top + 4 + row, 14, 1.5);
     }
     context.fillStyle = '#e8e8e5';
-    context.fillText(celsius(fusion.range.max), 42, top + 12);
-    context.fillText(celsius(fusion.range.min), 42, top + scaleHeight + 4);
+    context.fillText(celsius(fusion.range.max, store.decimals), 42, top + 12);
+    context.fillText(celsius(fusion.range.min, store.decimals), 42, top + scaleHeight + 4);
   }
   lines.forEach((line, index) => context.fillText(line, 20, height - 16 - (lines.length - 1 - index) * 18));
   return canvas;
