@@ -22,8 +22,8 @@ const HOVER_INTERVAL_MS = 120;
 const AGAIN_INTERVAL_MS = 1000;
 /** RpcError.code where there is nothing to read. */
 const NO_SCENE = -32004;
-/** A camera that has not moved for so long rests. */
-const REST_MS = 200;
+/** A camera that has not moved for so long rests, and all detail is drawn again. */
+const REST_MS = 300;
 /** What is read again may be so far from where it was pinned, in distances of the vertex that was read first, and in diagonals of the scene. */
 const REACH_OF_DISTANCE = 3;
 const REACH_OF_SCENE = 0.01;
