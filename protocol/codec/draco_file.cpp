@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "protocol/codec/draco_attributes.hpp"
@@ -115,6 +116,10 @@ Quantised<float> quantised_temperatures(std::span<const float> temperature_celsi
   return lattice;
 }
 
+bool is_degenerate(const TileTriangle& t) {
+  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
+
 void add_metadata(draco::Mesh& mesh, const DracoFileInput& input, const DracoFile& file, int temperature_attribute) {
   auto whole = std::make_unique<draco::GeometryMetadata>();
   whole->AddEntryDoubleArray("origin_m", {input.origin_m.begin(), input.origin_m.end()});
@@ -133,18 +138,56 @@ void add_metadata(draco::Mesh& mesh, const DracoFileInput& input, const DracoFil
   mesh.AddAttributeMetadata(temperature_attribute, std::move(temperature));
 }
 
-/// Where the vertices of a shape are; those that are of no triangle, which are left out, lie where another one is: they make the lattice no
-/// larger. Counts what is left out.
-std::vector<std::array<float, 3>> positions_of_shape(const DracoFileInput& input, DracoFile& file) {
-  std::vector<bool> is_used(input.positions_m.size());
-  for (const auto& [a, b, c] : input.triangles) {
-    if (a == b || b == c || c == a) {
-      ++file.left_out_triangle_count;
-    } else {
-      is_used[a] = is_used[b] = is_used[c] = true;
-    }
+/// The corners of a shape, each the first of those vertices that have the same place and values: triangles that share no vertices take
+/// several times the bytes. A triangle that would name a vertex twice then keeps its own. Counts what is left out and what is merged.
+std::vector<TileTriangle> triangles_of_shape(const DracoFileInput& input,
+                                             std::span<const std::array<float, 3>> positions_m,
+                                             std::span<const float> temperatures, DracoFile& file) {
+  using Content = std::tuple<std::array<float, 3>, ColourBytes, float>;
+  const auto count = static_cast<std::uint32_t>(positions_m.size());
+  std::vector<std::pair<Content, std::uint32_t>> sorted;
+  sorted.reserve(count);
+  for (std::uint32_t v = 0; v < count; ++v) {
+    const float temperature = temperatures.empty() ? 0.0F : temperatures[v];
+    sorted.emplace_back(Content(positions_m[v], input.colours[v], temperature), v);
   }
-  file.left_out_vertex_count = static_cast<std::uint64_t>(std::count(is_used.begin(), is_used.end(), false));
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<std::uint32_t> first_of(count);
+  std::uint32_t first = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (sorted[i].first != sorted[first].first) first = i;
+    first_of[sorted[i].second] = sorted[first].second;
+  }
+  std::vector<bool> was_used(count), is_used(count);
+  std::vector<TileTriangle> triangles;
+  triangles.reserve(input.triangles.size());
+  for (const TileTriangle& t : input.triangles) {
+    if (is_degenerate(t)) {
+      ++file.left_out_triangle_count;
+      triangles.push_back(t);
+      continue;
+    }
+    const TileTriangle merged{first_of[t[0]], first_of[t[1]], first_of[t[2]]};
+    triangles.push_back(is_degenerate(merged) ? t : merged);
+    for (const std::uint32_t v : t) was_used[v] = true;
+    for (const std::uint32_t v : triangles.back()) is_used[v] = true;
+  }
+  const auto number_of = [](const std::vector<bool>& flags) {
+    return static_cast<std::uint64_t>(std::count(flags.begin(), flags.end(), true));
+  };
+  // A first one that was of no triangle stands for others now.
+  file.left_out_vertex_count = count - number_of(was_used);
+  file.merged_vertex_count = number_of(was_used) - number_of(is_used);
+  return triangles;
+}
+
+/// Where the vertices of a shape are; those that are of no triangle, which are left out, lie where another one is: they make the lattice no
+/// larger.
+std::vector<std::array<float, 3>> positions_of_shape(const DracoFileInput& input) {
+  std::vector<bool> is_used(input.positions_m.size());
+  for (const TileTriangle& t : input.triangles) {
+    if (!is_degenerate(t)) is_used[t[0]] = is_used[t[1]] = is_used[t[2]] = true;
+  }
   std::vector<std::array<float, 3>> positions(input.positions_m.begin(), input.positions_m.end());
   const auto used = std::find(is_used.begin(), is_used.end(), true);
   if (used == is_used.end()) return positions;
@@ -212,7 +255,7 @@ Result<DracoFile> file_keeping(DracoKeeping keeping, const DracoFileInput& input
   const bool is_shape = !is_point_cloud && keeping == DracoKeeping::Shape;
   DracoFile file;
   std::vector<std::array<float, 3>> of_shape;
-  if (is_shape) of_shape = positions_of_shape(input, file);
+  if (is_shape) of_shape = positions_of_shape(input);
   const std::span<const std::array<float, 3>> positions_m = is_shape ? of_shape : input.positions_m;
   std::optional<Quantised<std::array<float, 3>>> lattice;
   if (!is_exact && input.position_step_m > 0) {
@@ -243,10 +286,11 @@ Result<DracoFile> file_keeping(DracoKeeping keeping, const DracoFileInput& input
   }
   add_attribute<ColourBytes>(mesh, draco::GeometryAttribute::COLOR, draco::DT_UINT8, 3, true, input.colours);
   int temperature_attribute = -1;
+  Quantised<float> steps;
   if (!input.temperature_celsius.empty() && is_exact) {
     temperature_attribute = add_temperatures(input.temperature_celsius);
   } else if (!input.temperature_celsius.empty()) {
-    const auto steps = quantised_temperatures(input.temperature_celsius, file);
+    steps = quantised_temperatures(input.temperature_celsius, file);
     temperature_attribute = add_temperatures(steps.values);
     options.SetAttributeOptions(temperature_attribute,
                                 quantisation_options({&steps.origin, 1}, steps.largest, steps.step));
@@ -255,10 +299,18 @@ Result<DracoFile> file_keeping(DracoKeeping keeping, const DracoFileInput& input
     const std::uint64_t fewest = (input.positions_m.size() + 2) / 3;
     file.added_triangle_count = std::max<std::uint64_t>(fewest, input.triangles.size()) - input.triangles.size();
   }
-  mesh.SetNumFaces(input.triangles.size() +
-                   file.added_triangle_count);  // Those beyond the scene's are all of vertex 0.
-  for (std::uint32_t i = 0; i < input.triangles.size(); ++i) {
-    const TileTriangle& t = input.triangles[i];
+  std::vector<TileTriangle> of_merged;
+  if (is_shape) {
+    of_merged = triangles_of_shape(input, lattice ? lattice->values : positions_m, steps.values, file);
+    if (file.merged_vertex_count > 0 && is_crowded(input.positions_m.size(), of_merged)) {
+      file.merged_vertex_count = 0;
+      of_merged.assign(input.triangles.begin(), input.triangles.end());
+    }
+  }
+  const std::span<const TileTriangle> triangles = is_shape ? of_merged : input.triangles;
+  mesh.SetNumFaces(triangles.size() + file.added_triangle_count);  // Those beyond the scene's are all of vertex 0.
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    const TileTriangle& t = triangles[i];
     mesh.SetFace(draco::FaceIndex(i), {draco::PointIndex(t[0]), draco::PointIndex(t[1]), draco::PointIndex(t[2])});
   }
   add_metadata(mesh, input, file, temperature_attribute);
@@ -274,7 +326,8 @@ Result<DracoFile> file_keeping(DracoKeeping keeping, const DracoFileInput& input
   if (is_shape) {
     if (encoder.num_encoded_faces() + file.left_out_triangle_count != input.triangles.size())
       return internal("triangles were lost");
-    file.split_vertex_count = encoder.num_encoded_points() + file.left_out_vertex_count - input.positions_m.size();
+    file.split_vertex_count =
+        encoder.num_encoded_points() + file.left_out_vertex_count + file.merged_vertex_count - input.positions_m.size();
   }
   file.bytes = bytes_of(buffer);
   return file;

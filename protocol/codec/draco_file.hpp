@@ -38,10 +38,11 @@ struct DracoFile {
   float position_step_m = 0;
   float temperature_step_celsius = 0;         ///< 0: exact, or none.
   std::uint64_t left_out_vertex_count = 0;    ///< Of no triangle.
+  std::uint64_t merged_vertex_count = 0;      ///< Of a shape: one with another that has the same place and values.
   std::uint64_t left_out_triangle_count = 0;  ///< That name a vertex twice.
   std::uint64_t added_triangle_count = 0;     ///< Of one vertex each, after the others; see draco_file().
-  std::uint64_t split_vertex_count = 0;       ///< Vertices more than went in: non-manifold ones, one for every fan.
-  std::uint64_t over_range_count = 0;         ///< Temperatures of infinity, written as the values below.
+  std::uint64_t split_vertex_count = 0;  ///< Vertices more than the shape has: non-manifold ones, one for every fan.
+  std::uint64_t over_range_count = 0;    ///< Temperatures of infinity, written as the values below.
   std::uint64_t under_range_count = 0;
   float over_range_celsius = 0;
   float under_range_celsius = 0;

@@ -55,6 +55,9 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
   add("left_out_vertices", file.left_out_vertex_count,
       counted(file.left_out_vertex_count, "vertex", "vertices") + " of no triangle left out; --keep-order keeps them");
+  add("merged_vertices", file.merged_vertex_count,
+      counted(file.merged_vertex_count, "vertex", "vertices") +
+          " merged with others of the same place and values, which triangles share; --keep-order keeps them");
   add("left_out_triangles", file.left_out_triangle_count,
       counted(file.left_out_triangle_count, "triangle", "triangles") +
           " with the same vertex twice left out; --keep-order keeps them");

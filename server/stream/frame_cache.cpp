@@ -102,7 +102,9 @@ std::shared_ptr<const EncodedTile> FrameCache::State::store_geometry(const Geome
     // Forgetting is safe: a geometry that comes back is then sent again under a new revision.
     if (issued_.size() >= kMostIssuedRevisions) issued_.clear();
     const auto [issued, is_new] = issued_.try_emplace(key);
-    if (is_new || issued->second.digest != digest) issued->second = {++last_revision_, digest};
+    if (is_new || issued->second.digest != digest) {
+      issued->second = {++last_revision_, digest, static_cast<std::uint32_t>(value->input_of_decoded.size())};
+    }
     value->revision = issued->second.revision;
     waiters = geometry_.store(key, value, size_bytes);
     evict_surplus();
@@ -163,10 +165,10 @@ std::shared_ptr<const PlanIdentity> FrameCache::State::plan_identity(
   return identity;
 }
 
-std::optional<std::uint32_t> FrameCache::State::issued_revision(const GeometryKey& key) const {
+std::optional<FrameCache::State::Issued> FrameCache::State::issued(const GeometryKey& key) const {
   const std::lock_guard lock(mutex_);
-  const auto issued = issued_.find(key);
-  return issued == issued_.end() ? std::nullopt : std::optional(issued->second.revision);
+  const auto found = issued_.find(key);
+  return found == issued_.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::uint32_t FrameCache::State::unused_revision() {

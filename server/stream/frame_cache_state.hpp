@@ -94,9 +94,14 @@ struct FrameCache::State {
   std::shared_ptr<const PlanIdentity> plan_identity(
       const fusion::FusionPlan& plan, const std::shared_ptr<const fusion::SceneTemperature>& prepared_with);
 
-  /// The revision of the newest encoding under that key, whether it is still kept or not; nothing when there was none,
-  /// or when it is too long ago.
-  std::optional<std::uint32_t> issued_revision(const GeometryKey& key) const;
+  /// An encoding that was given out.
+  struct Issued {
+    std::uint32_t revision = 0;
+    std::uint64_t digest = 0;
+    std::uint32_t vertex_count = 0;  ///< As decoded.
+  };
+  /// The newest one under that key, whether it is still kept or not; nothing when there was none, or when it is too long ago.
+  std::optional<Issued> issued(const GeometryKey& key) const;
 
   /// A number that names no encoding and never will: for a viewer to whom an encoding must go under another name.
   std::uint32_t unused_revision();
@@ -111,11 +116,6 @@ struct FrameCache::State {
   EncodingTimes times;
 
  private:
-  struct Issued {
-    std::uint32_t revision;
-    std::uint64_t digest;
-  };
-
   void evict_surplus();
   /// A tile that is part of no version of a map any more is not asked for again.
   void forget_what_is_gone();

@@ -23,7 +23,8 @@ struct EncodedTile {
   std::uint32_t revision = 0;  ///< Names this encoding and no other; the tile revision of the wire. From 1.
   float position_step_m = 0;   ///< The coarsest that a vertex of the tile has.
   std::array<float, 3> origin_m{};
-  std::vector<std::uint32_t> input_of_decoded;  ///< Vertex of the Tile for each decoded vertex.
+  /// Vertex of the Tile for each decoded vertex; of those that nothing tells apart, where triangles have them as corners, one.
+  std::vector<std::uint32_t> input_of_decoded;
   Payload payload;
 };
 

@@ -241,9 +241,10 @@ bool ViewerTiles::hold_resumed(TileSlot& slot, const ResumedTile& claim, const R
   slot.held.earlier_colour_epoch = colour_epoch;
   slot.held.had_raw_layers = claim.has_raw_layers;
   const std::uint32_t revision = before.revision != 0 ? before.revision : claim.revision;
-  if (cache.issued_revision(demand.geometry_key(slot.tile)) != revision) return false;
+  const auto issued = cache.issued(demand.geometry_key(slot.tile));
+  if (!issued || issued->revision != revision) return false;
   slot.held.revision = revision;
-  slot.held.vertex_count = static_cast<std::uint32_t>(slot.tile->positions.size());
+  slot.held.vertex_count = issued->vertex_count;
   slot.held.child_mask = slot.tile->child_mask;
   slot.held.bytes = decoded_bytes(*slot.tile);
   slot.held.geometry_epoch = demand.geometry_epoch;

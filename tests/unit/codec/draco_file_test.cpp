@@ -181,6 +181,51 @@ TEST(DracoFile, OfTheShapeIsWithinHalfAStepAndHasEveryTriangleOnce) {
   }
 }
 
+TEST(DracoFile, OfTheShapeIsAsSmallForTrianglesThatShareNoVertices) {
+  const Scene scene = crooked_scene();
+  Scene soup;
+  for (const TileTriangle& triangle : scene.triangles) {
+    const auto first = static_cast<std::uint32_t>(soup.positions.size());
+    soup.triangles.push_back({first, first + 1, first + 2});
+    for (const std::uint32_t v : triangle) {
+      soup.positions.push_back(scene.positions[v]);
+      soup.colours.push_back(scene.colours[v]);
+      soup.temperatures.push_back(scene.temperatures[v]);
+    }
+  }
+  const auto shared = draco_file(scene.input(0.0015625F), DracoKeeping::Shape, 7);
+  const auto file = draco_file(soup.input(0.0015625F), DracoKeeping::Shape, 7);
+  ASSERT_TRUE(shared.has_value() && file.has_value());
+  EXPECT_LT(static_cast<double>(file.value().bytes.size()), 1.1 * static_cast<double>(shared.value().bytes.size()));
+  const Decoded seen = decoded(file.value().bytes);
+  expect_within_half_a_step(scene, seen, 0.0015625F, kDracoTemperatureStepCelsius);
+  EXPECT_EQ(triangles_by_number(seen.colours, seen.triangles), triangles_by_number(scene.colours, scene.triangles));
+  const std::uint64_t drawn = scene.positions.size() - shared.value().left_out_vertex_count;
+  EXPECT_EQ(file.value().merged_vertex_count, soup.positions.size() - drawn);
+  EXPECT_EQ(seen.positions.size(), drawn + file.value().split_vertex_count);
+  EXPECT_EQ(shared.value().merged_vertex_count, 0U);
+  EXPECT_EQ(file.value().left_out_vertex_count + file.value().left_out_triangle_count, 0U);
+  EXPECT_EQ(decoded(draco_file(soup.input(0.01F), DracoKeeping::Order, 7).value().bytes).positions.size(),
+            soup.positions.size());
+}
+
+TEST(DracoFile, OfTheShapeKeepsATriangleWhoseCornersAreAlike) {
+  // Of the second triangle two corners are the same but for their numbers.
+  Scene scene;
+  scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 5, 5}};
+  scene.triangles = {{0, 1, 2}, {3, 4, 5}};
+  scene.colours.assign(7, {1, 2, 3});
+  scene.temperatures.assign(7, 20);
+  const auto file = draco_file(scene.input(0.01F), DracoKeeping::Shape, 7);
+  ASSERT_TRUE(file.has_value()) << file.error().message;
+  EXPECT_EQ(decoded(file.value().bytes).triangles.size(), 2U);
+  EXPECT_EQ(file.value().left_out_triangle_count, 0U);
+  EXPECT_EQ(file.value().left_out_vertex_count, 1U);
+  EXPECT_EQ(decoded(file.value().bytes).positions.size(), scene.positions.size() + file.value().split_vertex_count -
+                                                              file.value().left_out_vertex_count -
+                                                              file.value().merged_vertex_count);
+}
+
 TEST(DracoFile, OfAPointCloudIsWithinHalfAStep) {
   Scene scene = crooked_scene();
   scene.triangles.clear();

@@ -128,11 +128,12 @@ TEST(FrameCache, AGeometryThatComesBackTheSameKeepsItsRevision) {
   EXPECT_NE(made(key, 2), first);
   const auto second = made(key, 2);
   const GeometryKey finer{Identity(tile), 0.25F, 7};
-  EXPECT_EQ(state.issued_revision(finer), std::nullopt);
+  EXPECT_FALSE(state.issued(finer));
   const auto other = made(finer, 1);
   EXPECT_NE(other, first);
-  EXPECT_EQ(state.issued_revision(key), second);
-  EXPECT_EQ(state.issued_revision(finer), other);
+  ASSERT_TRUE(state.issued(key) && state.issued(finer));
+  EXPECT_EQ(state.issued(key)->revision, second);
+  EXPECT_EQ(state.issued(finer)->revision, other);
   EXPECT_EQ(cache.size_bytes(), 0U);
 }
 
