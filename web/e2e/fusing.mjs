@@ -106,6 +106,18 @@ export function addFusingTests(browser, scratch) {
     assert.ok(counts.message_bytes < 20_000, `${counts.message_bytes} bytes of messages`);
     console.log(`        100 settings: ${counts.frame_bytes} bytes of frames, ${counts.message_bytes} of messages`);
     assert.ok(apart(sample(await screenshot(page, 'alpha-1')), before) > 0.2, 'the picture has followed');
+    counts.message_bytes = 0;
+    counts.isOn = true;
+    const methods = ['thermal_only', 'visible_only', 'histogram_distribution', 'intensity_hue'];
+    for (let i = 0; i < 100; i += 1) {
+      await setMethod(page, methods[i % 4]);
+      await page.waitForTimeout(30);
+    }
+    await page.waitForTimeout(2500);
+    counts.isOn = false;
+    assert.equal(counts.frames, 0, `${counts.frame_bytes} bytes of frames`);
+    assert.ok(counts.message_bytes < 20_000, `${counts.message_bytes} bytes of messages for a hundred methods`);
+    console.log(`        100 methods: ${counts.message_bytes} bytes of messages`);
     // The robot knows what is set here.
     const said = await page.evaluate(() => globalThis.spectra.store.generation);
     assert.ok(said >= 2);
@@ -428,6 +440,11 @@ export function addFusingTests(browser, scratch) {
       return globalThis.spectra.store.pinned?.reading.probe ?? null;
     });
     assert.ok(reading !== null && Number.isFinite(reading.temperature) && reading.visible.length === 3, JSON.stringify(reading));
+    // What fades by its age only the robot can make: until then it is said whose colours these are.
+    await page.evaluate(() => globalThis.spectra.settings.setAge({ mode: 'fade', half_life_s: 60 }, true));
+    await page.locator('p[data-fusing]', { hasText: /^Here until the robot has made it: What is old fades/ }).waitFor();
+    await page.evaluate(() => globalThis.spectra.settings.setAge({ mode: 'off' }, true));
+    await page.locator('p[data-fusing]', { hasText: 'Here: a setting needs no link.' }).waitFor();
     // And turned.
     await page.keyboard.press('ArrowLeft');
     await page.waitForTimeout(500);
@@ -444,16 +461,19 @@ export function addFusingTests(browser, scratch) {
 
   test('What is made here is said to be behind until it has been drawn', async () => {
     const server = await startServer(['--demo']);
-    const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
+    const link = await startLink(server.port);
+    const { page, problems } = await openClient(browser, link.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
     await isHere(page);
     await drawn(page);
     // A machine that does not come to draw.
-    await page.evaluate(() => {
-      const { viewport } = globalThis.spectra;
-      const { pictures } = viewport;
-      Object.defineProperty(viewport, 'pictures', { get: () => pictures, configurable: true });
-    });
+    const drawNothing = () =>
+      page.evaluate(() => {
+        const { viewport } = globalThis.spectra;
+        const { pictures } = viewport;
+        Object.defineProperty(viewport, 'pictures', { get: () => pictures, configurable: true });
+      });
+    await drawNothing();
     await page.keyboard.press('2');
     const sign = page.locator('[data-pending-method]');
     await sign.waitFor({ timeout: 10_000 });
@@ -465,7 +485,17 @@ export function addFusingTests(browser, scratch) {
     await sign.waitFor({ state: 'detached', timeout: 10_000 });
     await page.locator('footer', { hasText: 'up to date' }).waitFor({ timeout: 10_000 });
     assert.deepEqual(problems, []);
+    // And without a link.
+    link.down();
+    await page.waitForFunction(() => !globalThis.spectra.store.connected);
+    await drawNothing();
+    await page.keyboard.press('1');
+    await sign.waitFor({ timeout: 10_000 });
+    assert.match(await sign.innerText(), /Thermal only: not yet in the picture/);
+    await page.evaluate(() => delete globalThis.spectra.viewport.pictures);
+    await sign.waitFor({ state: 'detached', timeout: 10_000 });
     await page.close();
+    await link.stop();
     await server.stop();
   });
 
@@ -553,6 +583,33 @@ export function addFusingTests(browser, scratch) {
     const grown = (await heap()) - before;
     assert.ok(grown < 3e6, `${grown} bytes more after 500 settings`);
     assert.deepEqual(problems, []);
+    await page.close();
+    await server.stop();
+  });
+
+  test('It is here once what draws is ready, and not before; what fails there is said, and can be tried again', async () => {
+    const server = await startServer(['--demo']);
+    const { page } = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
+    const held = [];
+    const part = /\/tile_fuser-[^/]*\.js$/;
+    await page.context().route(part, (route) => void held.push(route));
+    await page.goto(server.url);
+    await settled(page, 180_000);
+    await page.locator('[data-fusing="coming"]', { hasText: 'until the library' }).waitFor({ timeout: 60_000 });
+    const before = sample(await screenshot(page, 'drawer-before'));
+    await setMethod(page, 'thermal_only');
+    await settled(page);
+    await drawn(page);
+    assert.ok(apart(sample(await screenshot(page, 'drawer-late')), before) > 0.2, 'a setting comes into the picture meanwhile');
+    for (const route of held.splice(0)) await route.fulfill({ status: 404, body: '' });
+    await page.locator('[data-fusing="robot"]', { hasText: 'Fusing here has failed' }).waitFor({ timeout: 30_000 });
+    await page.context().unroute(part);
+    await page.evaluate(() => globalThis.spectra.setFusing('here'));
+    await isHere(page);
+    const thermal = sample(await screenshot(page, 'drawer-again'));
+    await setMethod(page, 'visible_only');
+    await drawn(page);
+    assert.ok(apart(sample(await screenshot(page, 'drawer-here')), thermal) > 0.2, 'a setting is made here');
     await page.close();
     await server.stop();
   });

@@ -107,7 +107,6 @@ export class PictureRenderer {
   #pointDiameter: number | null = null;
   #fuser: TileFuser | null = null;
   #facts: SceneFacts | null = null;
-  #settings: FusionChange | null = null;
   /** Of the settings that tiles are fused with here; 0: none. */
   #fusing = 0;
   #settingsCount = 0;
@@ -222,10 +221,9 @@ export class PictureRenderer {
           this.#stopFusing();
           break;
         }
-        this.#settings = settings;
         // What came before is of other settings.
         for (const tile of this.#tiles.values()) tile.arrived = null;
-        this.#orSay(() => this.#useSettings());
+        this.#orSay(() => this.#useSettings(settings));
         break;
       }
       case 'visible': {
@@ -264,17 +262,14 @@ export class PictureRenderer {
       .then(({ TileFuser }) => {
         this.#fuser = new TileFuser(module);
         if (this.#facts !== null) this.#fuser.setFacts(this.#facts);
-        this.#useSettings();
-        this.#fuseTiles(({ isShown }) => isShown);
-        this.#drawSoon();
+        this.reply({ kind: 'can_fuse' });
       })
       .catch((error: unknown) => this.#cannotFuse(error));
   }
 
-  /** As soon as the library is there. */
-  #useSettings(): void {
-    if (this.#settings === null || this.#fuser === null) return;
-    this.#fuser.setSettings(this.#settings);
+  #useSettings(settings: FusionChange): void {
+    if (this.#fuser === null) throw new Error('the library is not there');
+    this.#fuser.setSettings(settings);
     this.#settingsCount += 1;
     this.#fusing = this.#settingsCount;
   }
@@ -310,7 +305,6 @@ export class PictureRenderer {
 
   #stopFusing(): void {
     this.#fusing = 0;
-    this.#settings = null;
     for (const tile of this.#tiles.values()) if (tile.arrived !== null) showColours(tile, tile.arrived);
   }
 

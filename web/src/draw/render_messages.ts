@@ -101,6 +101,8 @@ export type RenderReply =
   /** Null where not all is fused here. */
   | { kind: 'highlighting'; id: number; found: Highlighting | null }
   | { kind: 'probed'; id: number; vertex: ProbedVertex | null }
+  /** The library that fuses is ready. */
+  | { kind: 'can_fuse' }
   /** Fusing here has failed; what was fused so far stands. */
   | { kind: 'not_fused'; message: string }
   | { kind: 'sighted'; id: number; eye: Vec3 | null }

@@ -13,6 +13,8 @@ export interface TileId {
 
 /** Its kind is one of FrameKind, or a number this client does not know and ignores. */
 export interface TileFrame extends Omit<TileFrameHeader, 'payload_size_bytes'> {
+  /** Of the whole message. */
+  bytes: number;
   /** A view into the message, not a copy. */
   payload: Uint8Array<ArrayBuffer>;
 }
@@ -54,5 +56,5 @@ export function decodeTileFrame(message: ArrayBuffer): TileFrame {
   if (payload_size_bytes !== message.byteLength - size) {
     throw new Error(`tile frame: payload of ${message.byteLength - size} bytes, the header says ${payload_size_bytes}`);
   }
-  return { ...header, payload: new Uint8Array(message, size, payload_size_bytes) };
+  return { ...header, bytes: message.byteLength, payload: new Uint8Array(message, size, payload_size_bytes) };
 }

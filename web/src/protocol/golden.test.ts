@@ -133,7 +133,7 @@ describe('Golden frames', () => {
       offset?: number;
       codes?: number[];
     };
-    const { payload, tile, ...fields } = frame;
+    const { payload, tile, bytes: _bytes, ...fields } = frame;
     const nullIfNone = (value: number) => (Number.isNaN(value) ? null : value);
     expect({
       ...fields,

@@ -1,8 +1,10 @@
 import { existsSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
-import { beforeEach, describe, expect, it, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { Fusion } from '../protocol/messages';
-import { Fusing } from './fusing';
+import { FusionRefusal } from '../fusion/fusion_refusal';
+import { BUSY, RpcError } from '../transport/connection';
+import { Fusing, LONGEST_PAUSE_MS } from './fusing';
 import { Store } from './store.svelte';
 
 const MODULE = fileURLToPath(new URL('../../../build/wasm/bin/fusion.wasm', import.meta.url));
@@ -31,7 +33,15 @@ const later = () => new Promise<void>((resolve) => setTimeout(resolve, 5));
 function setUp({
   capabilities = ['raw_layers'],
   load,
-}: { capabilities?: string[]; load?: () => Promise<WebAssembly.Module> } = {}) {
+  answer = () => Promise.resolve({}),
+  isDrawerQuick = true,
+}: {
+  capabilities?: string[];
+  load?: () => Promise<WebAssembly.Module>;
+  /** What the robot says other than usual, or rejects with. */
+  answer?: (params: { bins?: number }) => Promise<object>;
+  isDrawerQuick?: boolean;
+} = {}) {
   const store = new Store();
   store.link = { phase: 'open' };
   store.scene = { name: 'a', temperature: { min: 10, max: 700 }, live: false } as never;
@@ -44,13 +54,16 @@ function setUp({
   store.pictureStands = true;
   store.fusionInForce = FUSION;
   store.stats = { throughput_bytes_per_s: 1e6 } as never;
-  store.shown = { tiles: 2, vertices: 1000, triangles: 0 };
-  const counts = { drawn: 2, raw: 0, step_celsius: 0.01 };
+  store.costs = { raw_bytes: 2000, change_bytes: 2000 };
+  const counts = { drawn: 2, raw: 0, step_celsius: 0.01, waiting: 0 };
   const diary: string[] = [];
   const asked: object[] = [];
   const busy = { settings: false };
   const picture = {
-    startFusing: () => diary.push('module'),
+    startFusing: () => {
+      diary.push('module');
+      if (isDrawerQuick) fusing.drawerIsReady();
+    },
     setFacts: () => diary.push('facts'),
     fuse: (settings: object | null) => diary.push(settings === null ? 'fuse nothing' : 'fuse'),
   };
@@ -59,17 +72,21 @@ function setUp({
     { rawCounts: () => counts, setHere: (isHere) => diary.push(isHere ? 'here' : 'not here') },
     picture as never,
     {
-      request: (method, params: { bins?: number; hues?: boolean }) => {
+      request: async (method, params: { bins?: number; hues?: boolean }) => {
         asked.push({ method, ...params });
         const { bins, hues } = params;
-        return Promise.resolve({
+        return {
           ...FACTS,
           ...(bins === undefined ? {} : { counts: new Array<number>(bins).fill(1) }),
           ...(hues === true ? { hues: new Array<number>(36).fill(1) } : {}),
-        });
+          ...(await answer(params)),
+        };
       },
       resubscribe: () => diary.push(`subscribe ${fusing.channels.join('+')}`),
       isBusy: () => busy.settings,
+      isTakenIn: () => true,
+      onShown: (method) => diary.push(`shown ${method}`),
+      onBehind: () => diary.push('behind'),
       onHighlighted: () => undefined,
       onLeft: () => diary.push(`left to ${store.fusingPlace}`),
     },
@@ -85,8 +102,8 @@ beforeEach(() => {
 });
 
 describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
-  async function here() {
-    const all = setUp();
+  async function here(options: Parameters<typeof setUp>[0] = {}) {
+    const all = setUp(options);
     all.fusing.consider();
     await vi.waitFor(() => expect(all.diary).toContain('facts'));
     all.counts.raw = 2;
@@ -102,7 +119,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(store.fusingPlace).toBe('coming');
     expect(diary).toEqual(['subscribe fused+temperature+visible']);
     await vi.waitFor(() => expect(diary).toContain('facts'));
-    expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096 });
+    expect(asked).toEqual([{ method: 'fusion.facts', bins: 4096, hues: true }]);
     counts.raw = 1;
     fusing.consider();
     expect(store.fusingPlace).toBe('coming');
@@ -111,7 +128,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     counts.raw = 2;
     fusing.consider();
     expect(store.fusingPlace).toBe('here');
-    expect(diary.slice(-3)).toEqual(['fuse', 'here', 'subscribe temperature+visible']);
+    expect(diary.slice(-4)).toEqual(['fuse', 'here', 'shown thermal_visible_blend', 'subscribe temperature+visible']);
   });
 
   it('makes plans as the robot does', async () => {
@@ -249,7 +266,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     counts.raw = 2;
     expect(fusing.apply(FUSION)).toMatchObject({ method: FUSION.method });
     expect(store.fusingPlace).toBe('here');
-    expect(diary.slice(-2)).toEqual(['fuse', 'here']);
+    expect(diary.slice(-3)).toEqual(['fuse', 'here', 'shown thermal_visible_blend']);
     // The next connection goes on with it.
     fusing.greeted(['raw_layers']);
     expect(fusing.channels).toEqual(['temperature', 'visible']);
@@ -268,7 +285,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(diary.slice(-4)).toEqual(['not here', 'fuse nothing', 'left to robot', 'subscribe fused']);
     store.scene = scene;
     fusing.consider();
-    await vi.waitFor(() => expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096 }));
+    await vi.waitFor(() => expect(asked).toContainEqual({ method: 'fusion.facts', bins: 4096, hues: true }));
     await later();
     fusing.consider();
     expect(store.fusingPlace).toBe('here');
@@ -312,6 +329,169 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     fusing.consider();
     expect(store.fusingPlace).toBe('here');
   });
+
+  const binned = (bins: number): Fusion => ({
+    ...FUSION,
+    method: 'histogram_bin',
+    params: { bins, n: null, alpha: 1, invert: false, ties: 'index' },
+  });
+  /** As settings do: what is not made here at once is the robot's to put in force. */
+  const set = ({ store, fusing }: ReturnType<typeof setUp>, fusion: Fusion) => {
+    store.fusionInForce = fusing.apply(fusion) ?? fusion;
+  };
+
+  it('shows the last of several numbers of bins that came while facts of another were on their way', async () => {
+    const all = await here();
+    set(all, binned(18));
+    expect(all.store.factsSince).not.toBeNull();
+    for (const bins of [19, 20, 24]) set(all, binned(bins));
+    await later();
+    expect(all.asked.slice(1)).toEqual([18, 24].map((bins) => ({ method: 'fusion.facts', bins })));
+    expect(all.diary.slice(-3)).toEqual(['facts', 'fuse', 'shown histogram_bin']);
+    expect(all.store.fusionInForce?.params).toMatchObject({ bins: 24 });
+    expect(all.store.factsSince).toBeNull();
+  });
+
+  it('makes numbers of bins of which a finer one is exactly so many times as fine, and says what others cost', async () => {
+    const all = await here();
+    const { store, fusing, asked } = all;
+    const before = asked.length;
+    for (const bins of [64, 1, 4096, 512]) expect(fusing.apply(binned(bins))).not.toBeNull();
+    expect(asked).toHaveLength(before);
+    expect(store.fusingCount).toBeNull();
+    set(all, binned(96));
+    await later();
+    expect(store.fusingCount).toEqual({ method: 'histogram_bin', bytes: expect.any(Number) });
+    for (const bins of [48, 24, 12, 6, 3]) expect(fusing.apply(binned(bins))).not.toBeNull();
+    expect(asked).toHaveLength(before + 1);
+  });
+
+  it('uses facts that come of a map that changes faster than they come, and says that the picture is behind until it rests', async () => {
+    const answers: (() => void)[] = [];
+    let isSlow = false;
+    const all = await here({
+      answer: () => (isSlow ? new Promise((resolve) => answers.push(() => resolve({}))) : Promise.resolve({})),
+    });
+    const { store, fusing, diary } = all;
+    isSlow = true;
+    for (let i = 0; i < 6; i += 1) {
+      fusing.factsChanged();
+      expect(store.factsSince).not.toBeNull();
+      // A setting comes into the picture all the same.
+      set(all, { ...FUSION, params: { alpha: i / 10 } });
+      expect(diary.at(-1)).toBe('shown thermal_visible_blend');
+      diary.length = 0;
+      fusing.factsChanged();
+      answers.shift()!();
+      await later();
+      expect(diary).toEqual(['facts', 'fuse', 'shown thermal_visible_blend']);
+    }
+    set(all, binned(17));
+    for (let i = 0; i < 4; i += 1) {
+      fusing.factsChanged();
+      answers.shift()!();
+      await later();
+    }
+    expect(diary).toContain('shown histogram_bin');
+    expect(store.factsSince).not.toBeNull();
+    isSlow = false;
+    for (const answer of answers) answer();
+    await later();
+    expect(store.factsSince).toBeNull();
+    expect(store.fusingProblem).toBeNull();
+  });
+
+  it('asks for facts again when the robot is busy', async () => {
+    let count = 0;
+    const busy = new RpcError({ code: BUSY, message: 'busy', data: { field: '', reason: 'busy' } });
+    const { store } = await here({ answer: () => (++count === 1 ? Promise.reject(busy) : Promise.resolve({})) });
+    expect([count, store.fusingProblem]).toEqual([2, null]);
+  });
+
+  it('leaves a method that the library does not know to the robot, and says so until it knows it', async () => {
+    const { store, fusing, diary } = await here();
+    store.fusionInForce = { ...FUSION, method: 'of_tomorrow', params: {} };
+    expect(fusing.apply(store.fusionInForce)).toBeNull();
+    expect(diary.at(-1)).toBe('subscribe fused');
+    fusing.completed();
+    expect(store.fusingPlace).toBe('robot');
+    expect(fusing.leftToRobot).toBe("Here method 'of_tomorrow' is unknown.");
+    for (const unknown of [{ palette: 'of_tomorrow' }, { params: { alpha: 0.5, beta: 1 } }]) {
+      store.fusionInForce = { ...FUSION, ...unknown } as Fusion;
+      expect(fusing.leftToRobot).toMatch(/unknown|no parameter/);
+      fusing.consider();
+      expect(store.fusingPlace).toBe('robot');
+    }
+    store.fusionInForce = FUSION;
+    expect(fusing.leftToRobot).toBeNull();
+    fusing.consider();
+    await vi.waitFor(() => expect(diary.at(-1)).toBe('facts'));
+    fusing.consider();
+    expect(store.fusingPlace).toBe('here');
+    expect(() => fusing.apply({ ...FUSION, params: { alpha: 7 } })).toThrow(FusionRefusal);
+  });
+
+  it('is not here before what draws is ready, and gives it the library again after it has failed', async () => {
+    const { store, fusing, counts, diary } = setUp({ isDrawerQuick: false });
+    const modules = () => diary.filter((what) => what === 'module').length;
+    fusing.consider();
+    await vi.waitFor(() => expect(diary).toContain('facts'));
+    counts.raw = 2;
+    fusing.consider();
+    expect([store.fusingPlace, store.rawShare, store.hasFusingLibrary]).toEqual(['coming', 1, false]);
+    expect(fusing.apply(FUSION)).toBeNull();
+    fusing.drawerHasFailed('it did not come');
+    expect([store.fusingPlace, store.fusingProblem]).toEqual(['robot', 'Fusing here has failed: it did not come']);
+    expect(modules()).toBe(1);
+    fusing.setWish('here');
+    expect(modules()).toBe(2);
+    expect(store.fusingPlace).toBe('coming');
+    await later();
+    fusing.drawerIsReady();
+    expect(store.fusingPlace).toBe('here');
+    // What is set and was not made is asked of the robot.
+    fusing.drawerHasFailed('it broke');
+    expect(diary.slice(-2)).toEqual(['behind', 'subscribe fused']);
+    expect(fusing.apply(FUSION)).toBeNull();
+    fusing.completed();
+    fusing.setWish('here');
+    expect(modules()).toBe(3);
+  });
+
+  describe('and a clock', () => {
+    beforeEach(() => {
+      vi.useFakeTimers({ toFake: ['performance'] });
+    });
+    afterEach(() => {
+      vi.useRealTimers();
+    });
+
+    it.each([
+      ['while they are waited for', { raw: 1 }],
+      ['of a tile that comes later', { raw: 2, waiting: 1 }],
+    ])('goes back to the robot when raw layers do not come %s', async (_when, lacking) => {
+      const all = lacking.raw === 2 ? await here() : setUp();
+      const { store, fusing, counts } = all;
+      fusing.consider();
+      await vi.waitFor(() => expect(all.diary).toContain('facts'));
+      Object.assign(counts, lacking);
+      const pass = (ms: number) => {
+        vi.advanceTimersByTime(ms);
+        fusing.consider();
+      };
+      for (let i = 0; i < 2; i += 1) {
+        store.rate_bytes_per_s = 1;
+        pass(10);
+        store.rate_bytes_per_s = 0;
+        pass(10);
+        pass(LONGEST_PAUSE_MS - 1);
+      }
+      expect(store.fusingProblem).toBeNull();
+      pass(10);
+      expect(store.fusingProblem).toContain('do not come');
+      expect(fusing.channels).toEqual(['fused']);
+    });
+  });
 });
 
 describe('Fusing', () => {
@@ -321,15 +501,23 @@ describe('Fusing', () => {
       return store.fusingPlace === 'robot';
     };
     const slow = setUp();
-    slow.store.shown = { tiles: 1, vertices: 1e6, triangles: 0 };
+    slow.store.costs = { raw_bytes: 2e6, change_bytes: 2e6 };
     slow.store.stats = { throughput_bytes_per_s: 10_000 } as never;
     expect(stays(slow)).toBe(true);
+    expect(slow.fusing.unfit).toBe('link');
+    const unmeasured = setUp();
+    unmeasured.store.stats = null;
+    expect(stays(unmeasured)).toBe(true);
+    expect(unmeasured.fusing.unfit).toBe('unmeasured');
     const live = setUp();
     live.store.scene = { ...live.store.scene, live: true } as never;
     expect(stays(live)).toBe(true);
+    expect(live.fusing.unfit).toBe('map');
     expect(stays(setUp({ capabilities: [] }))).toBe(true);
     vi.stubGlobal('navigator', { hardwareConcurrency: 1 });
-    expect(stays(setUp())).toBe(true);
+    const tiny = setUp();
+    expect(stays(tiny)).toBe(true);
+    expect(tiny.fusing.unfit).toBe('machine');
     // Unless it is asked for.
     slow.fusing.setWish('here');
     expect(slow.store.fusingPlace).toBe('coming');

@@ -1,19 +1,19 @@
 import address from 'virtual:fusion-module';
 import type { FusionModule, SceneFacts, WantedFacts } from '../fusion/fusion_module';
 import { FusionRefusal } from '../fusion/fusion_refusal';
-import { facts as factsReply, type Fusion, type FusionChange } from '../protocol/messages';
+import { facts as factsReply, type Facts, type Fusion, type FusionChange } from '../protocol/messages';
+import { BUSY, ConnectionLost, RpcError } from '../transport/connection';
 import { wholeChange } from './fusion_change';
 import type { Store } from './store.svelte';
 
 /** Where the user wants colours to be made; automatic: here, where the link and the machine are fit for it. */
 export type FusingWish = 'automatic' | 'here' | 'robot';
 
+/** Why automatic stays with the robot. */
+export type Unfit = 'machine' | 'map' | 'link' | 'unmeasured';
+
 /** Longest time that raw layers may take over the link before they are left to whoever asks for them. */
 export const LONGEST_RAW_S = 60;
-/** Bytes of both raw layers for each vertex, about; the castle of 990,044 vertices takes 2.09 MB. */
-export const RAW_BYTES_PER_VERTEX = 2.1;
-/** Of a change of fused colours. */
-export const CHANGE_BYTES_PER_VERTEX = 1.6;
 /** Temperatures come here in steps, of which a range needs so many: half of one is then half a level of 256 at most. */
 const STEPS_OF_A_RANGE = 256;
 /** The step that the robot chooses unless a tile spans too much for it. */
@@ -24,8 +24,15 @@ const FINER_STEPS_OF_A_RANGE = 4 * STEPS_OF_A_RANGE;
 const SAME = 1.0001;
 /** Of the span of a scene's temperatures: what stood far out is gone; the ends of a map that grows move by less all the time. */
 const NARROWED_SPAN = 7 / 8;
-/** Histograms that are got before they are needed, so that a lost link does not keep them away: of percentiles, and of bins by default. */
-const EARLY_BINS = [4096, 64];
+/** Of the histogram that is got before it is needed, so that a lost link does not keep it away: that of percentiles, of which coarser ones are made. */
+const BINS = 4096;
+/** Histograms of other numbers of bins that are kept. */
+const MOST_OTHERS = 8;
+const BUSY_WAIT_MS = 300;
+/** Codes of refusals for names that the library does not know: of a method, a parameter, a palette. */
+const UNKNOWN = [100, 101, 105];
+/** Raw layers are given up when nothing has come over the link for so long. */
+export const LONGEST_PAUSE_MS = 20_000;
 
 export interface FusingEvents {
   /** Asks the server; rejects with RpcError when it refuses. */
@@ -34,8 +41,14 @@ export interface FusingEvents {
   resubscribe: () => void;
   /** Settings are on their way to the server, or it has not answered yet. */
   isBusy: () => boolean;
+  /** All that has come over the link has been brought into the tiles. */
+  isTakenIn: () => boolean;
   /** What a method highlights in the settings that are now in force here. */
   onHighlighted: (method: string, intervals: [number, number][]) => void;
+  /** The next picture shows this method by what is here. */
+  onShown: (method: string) => void;
+  /** What is shown here is not what is set, and the robot is asked for it. */
+  onBehind: () => void;
   /** Colours are not made here any more, and the robot's settings are those that count. */
   onLeft: () => void;
 }
@@ -48,7 +61,7 @@ export interface FusingPicture {
 }
 
 export interface FusingTiles {
-  rawCounts(asked_celsius: number): { drawn: number; raw: number; step_celsius: number };
+  rawCounts(asked_celsius: number): { drawn: number; raw: number; step_celsius: number; waiting: number };
   setHere(isHere: boolean): void;
 }
 
@@ -62,10 +75,22 @@ export class Fusing {
   /** Of the page: makes plans. That of what draws makes colours. */
   #planner: FusionModule | null = null;
   #isLoading = false;
+  /** What draws has been given the library, which it may have still to get ready. */
+  #isGiven = false;
+  /** The newest that have come; of temperatures that have moved since, until others are there. */
   #facts: SceneFacts | null = null;
-  #factsNumber = 0;
-  #isAskingFacts = false;
+  /** Counts by their number of bins, and after how many moves of the temperatures they were asked for. */
+  readonly #histograms = new Map<number, { counts: readonly number[]; move: number }>();
+  #moves = 0;
+  /** Another number of bins that the settings want. */
+  #otherBins = BINS;
+  /** Another scene has other facts. */
+  #sceneNumber = 0;
+  /** Whose facts are being asked for; -1: none. */
+  #askingFor = -1;
   #wantsRaw = false;
+  /** Since when nothing has come of the raw layers that are wanted; null: something has. */
+  #pauseSince: number | null = null;
   /** Colours come from the robot again, and are still on their way. */
   #isLeaving = false;
   #isOfferedRaw = false;
@@ -82,7 +107,9 @@ export class Fusing {
     private readonly events: FusingEvents,
     private readonly fetchModule: () => Promise<WebAssembly.Module> = compile,
     private readonly isBuilt: boolean = address !== null,
-  ) {}
+  ) {
+    store.hasFusingLibrary = false;
+  }
 
   /** What scene.subscribe asks for. */
   get channels(): string[] {
@@ -117,28 +144,41 @@ export class Fusing {
 
   /** There is no scene any more, or another one: its picture comes from the robot first. */
   sceneGone(): void {
-    this.#facts = null;
-    this.#factsNumber += 1;
-    this.#isAskingFacts = false;
+    this.#sceneNumber += 1;
+    this.#forgetFacts();
     this.#isLeaving = false;
     this.#asked_celsius = USUAL_STEP_CELSIUS;
     this.#leaveAtOnce();
   }
 
-  /** The temperatures of the scene have moved: plans are made of other facts. */
+  /** The temperatures of the scene have moved: plans are made of other facts as soon as they are here, and of those that are here until then. */
   factsChanged(): void {
-    this.#facts = null;
-    this.#factsNumber += 1;
-    this.#isAskingFacts = false;
-    if (this.#wantsRaw) void this.#askFacts(EARLY_BINS, true);
+    this.#moves += 1;
+    if (this.#wantsRaw) this.#askForFacts();
+    else this.#forgetFacts();
+  }
+
+  /** What draws is ready to make colours. */
+  drawerIsReady(): void {
+    this.store.hasFusingLibrary = true;
+    this.consider();
+  }
+
+  /** What draws cannot make colours; whoever wants them here again gives it the library anew. */
+  drawerHasFailed(message: string): void {
+    this.#isGiven = false;
+    this.store.hasFusingLibrary = false;
+    this.failed(`Fusing here has failed: ${message}`);
   }
 
   /** The library or a tile cannot be used here. */
   failed(message: string): void {
     this.store.fusingProblem = message;
     if (this.store.fusingPlace === 'robot') return;
-    if (this.isHere) this.#leave();
-    else this.#leaveAtOnce();
+    if (this.isHere) {
+      this.events.onBehind();
+      this.#leave();
+    } else this.#leaveAtOnce();
   }
 
   /** All that was asked for of the robot is in the picture. */
@@ -176,14 +216,19 @@ export class Fusing {
       this.#wantsRaw = true;
       store.fusingPlace = 'coming';
       this.#load();
-      this.factsChanged();
+      this.#forgetFacts();
+      this.#askForFacts();
       this.events.resubscribe();
       return;
     }
     if (isFiner) this.events.resubscribe();
+    if (this.#isStuck(counts)) {
+      this.failed('Raw values of a part of the picture do not come.');
+      return;
+    }
     if (store.fusingPlace !== 'coming') return;
     store.rawShare = counts.drawn === 0 ? 0 : counts.raw / counts.drawn;
-    if (store.rawShare < 1 || this.#planner === null || this.#facts === null) return;
+    if (store.rawShare < 1 || !store.hasFusingLibrary || this.#facts === null) return;
     if (!store.settled || store.wanted !== null || this.events.isBusy() || store.fusion === null) return;
     this.#enter(store.fusion);
   }
@@ -193,18 +238,19 @@ export class Fusing {
    * as the robot would refuse.
    */
   apply(wanted: Fusion): Fusion | null {
-    if (this.store.fusingProblem !== null || this.#planner === null || this.#facts === null) return null;
+    if (this.store.fusingProblem !== null || !this.store.hasFusingLibrary || this.#facts === null) return null;
     if (!this.isHere && !this.#isAllHereWithoutLink()) return null;
     try {
       const change = wholeChange(wanted);
-      const inForce = this.#leftToRobot(wanted) === null ? this.#planned(wanted, change) : null;
-      if (this.#leftToRobot(inForce ?? wanted) !== null) {
+      const inForce = this.#left(wanted) === null ? this.#planned(wanted, change) : null;
+      if (this.#left(inForce ?? wanted) !== null) {
         this.#leave();
         return null;
       }
       if (inForce === null) return null;
       this.picture.fuse(change);
       if (!this.isHere) this.#stay();
+      this.events.onShown(wanted.method);
       return inForce;
     } catch (error) {
       if (error instanceof FusionRefusal) throw error;
@@ -217,13 +263,29 @@ export class Fusing {
     const { store } = this;
     if (store.fusingProblem !== null || store.fusingWish === 'robot' || !store.hasThermal || !this.isPossible) return false;
     if (this.leftToRobot !== null) return false;
-    return store.fusingWish === 'here' || this.#isFit();
+    return store.fusingWish === 'here' || this.unfit === null;
   }
 
   /** Why the settings that are shown are the robot's; null: they can be made here. */
   get leftToRobot(): string | null {
     const { fusion } = this.store;
-    return fusion === null ? null : this.#leftToRobot(fusion);
+    return fusion === null ? null : this.#left(fusion);
+  }
+
+  #left(fusion: Fusion): string | null {
+    return this.#leftToRobot(fusion) ?? this.#unknown(fusion);
+  }
+
+  /** Of a robot that has more than the library here. */
+  #unknown(fusion: Fusion): string | null {
+    if (!this.store.hasFusingLibrary || this.#planner === null) return null;
+    try {
+      this.#planner.resetSettings();
+      this.#planner.change(wholeChange(fusion));
+    } catch (error) {
+      if (error instanceof FusionRefusal && UNKNOWN.includes(error.code)) return `Here ${error.message.split(';')[0]!}.`;
+    }
+    return null;
   }
 
   #leftToRobot({ method, age, range }: Fusion): string | null {
@@ -259,14 +321,16 @@ export class Fusing {
     return this.isBuilt && this.#isOfferedRaw && typeof WebAssembly === 'object';
   }
 
-  /** What automatic means: more than a tiny machine, a scene that does not grow, and a link over which raw layers come soon. */
-  #isFit(): boolean {
+  /** What automatic means: more than a tiny machine, a scene that does not grow, and a link over which raw layers come soon. Null: all is so. */
+  get unfit(): Unfit | null {
     const { store } = this;
     const machine = navigator as Navigator & { deviceMemory?: number };
-    if ((machine.hardwareConcurrency || 2) < 2 || (machine.deviceMemory ?? 4) < 2 || store.scene?.live === true) return false;
-    if (this.#wantsRaw) return true;
+    if ((machine.hardwareConcurrency || 2) < 2 || (machine.deviceMemory ?? 4) < 2) return 'machine';
+    if (store.scene?.live === true) return 'map';
     const rate = store.stats?.throughput_bytes_per_s ?? null;
-    return rate !== null && (store.shown.vertices * RAW_BYTES_PER_VERTEX) / rate <= LONGEST_RAW_S;
+    if (this.#wantsRaw) return null;
+    if (rate === null) return 'unmeasured';
+    return store.costs.raw_bytes / rate <= LONGEST_RAW_S ? null : 'link';
   }
 
   /** The settings in force, with what the library makes of what is automatic; null when the robot has to make them. */
@@ -285,9 +349,10 @@ export class Fusing {
     return { ...wanted, params: plan.params, params_in_force: plan.params_in_force, range };
   }
 
-  /** Asks for what a plan lacks; the settings go the robot's way until it is there, or wait where there is no link. */
-  #lacks({ bins, hues }: WantedFacts): void {
-    if (this.store.connected) void this.#askFacts(bins === null ? [] : [bins], hues);
+  /** Asks for what a plan lacks; what is shown stays until it is there, or until there is a link again. */
+  #lacks({ bins }: WantedFacts): void {
+    this.#otherBins = bins ?? BINS;
+    if (this.store.connected) this.#askForFacts();
   }
 
   #enter(fusion: Fusion): void {
@@ -300,6 +365,7 @@ export class Fusing {
       return;
     }
     this.#stay();
+    this.events.onShown(fusion.method);
     this.events.resubscribe();
   }
 
@@ -329,6 +395,7 @@ export class Fusing {
     const wasHere = this.isHere;
     this.#wantsRaw = false;
     this.store.fusingPlace = 'robot';
+    this.store.factsSince = null;
     if (wasHere) {
       this.tiles.setHere(false);
       this.picture.fuse(null);
@@ -338,6 +405,7 @@ export class Fusing {
   }
 
   #load(): void {
+    if (this.#compiled !== null) this.#give(this.#compiled);
     if (this.#isLoading || this.#compiled !== null) return;
     this.#isLoading = true;
     // Nothing of it belongs to the first picture.
@@ -345,7 +413,7 @@ export class Fusing {
       .then(async ([compiled, { FusionModule }]) => {
         this.#planner = await FusionModule.instantiate(compiled);
         this.#compiled = compiled;
-        this.picture.startFusing(compiled);
+        this.#give(compiled);
         this.#spread();
       })
       .catch((error: unknown) => this.failed(`The library for fusing here could not be loaded: ${messageOf(error)}`))
@@ -354,29 +422,88 @@ export class Fusing {
       });
   }
 
-  async #askFacts(bins: readonly number[], wantsHues: boolean): Promise<void> {
-    if (this.#isAskingFacts) return;
-    this.#isAskingFacts = true;
-    const number = this.#factsNumber;
+  #give(compiled: WebAssembly.Module): void {
+    if (this.#isGiven) return;
+    this.#isGiven = true;
+    this.picture.startFusing(compiled);
+  }
+
+  /** Some of what is drawn, or is to be, waits for raw layers though the link has been silent for long. */
+  #isStuck({ drawn, raw, waiting }: { drawn: number; raw: number; waiting: number }): boolean {
+    const { store } = this;
+    const isWaiting =
+      store.rate_bytes_per_s === 0 &&
+      store.silentFor_s === null &&
+      this.events.isTakenIn() &&
+      !this.#isLeaving &&
+      (this.isHere ? waiting > 0 : store.settled && raw < drawn);
+    const now = performance.now();
+    this.#pauseSince = isWaiting ? (this.#pauseSince ?? now) : null;
+    return this.#pauseSince !== null && now - this.#pauseSince > LONGEST_PAUSE_MS;
+  }
+
+  #forgetFacts(): void {
+    this.#facts = null;
+    this.#histograms.clear();
+    this.#otherBins = BINS;
+  }
+
+  #askForFacts(): void {
+    if (this.isHere && this.store.connected) this.store.factsSince ??= performance.now();
+    void this.#askFacts();
+  }
+
+  /** Of which number of bins to ask next: the one that is lacking, or of the oldest temperatures; null: all that is wanted is here. */
+  get #nextBins(): number | null {
+    const moveOf = (bins: number) => this.#histograms.get(bins)?.move ?? -1;
+    const old = [BINS, this.#otherBins].filter((bins) => moveOf(bins) < this.#moves).sort((a, b) => moveOf(a) - moveOf(b));
+    return old[0] ?? null;
+  }
+
+  /** Facts that come are used at once, whatever has moved meanwhile; then they are asked for again. */
+  async #askFacts(): Promise<void> {
+    const scene = this.#sceneNumber;
+    if (this.#askingFor === scene) return;
+    this.#askingFor = scene;
     try {
-      const ask = async (params: object) => factsReply(await this.events.request('fusion.facts', params), 'fusion.facts');
-      const replies = [...(wantsHues ? [await ask({ hues: true })] : [])];
-      for (const count of bins) replies.push(await ask({ bins: count }));
-      if (number !== this.#factsNumber) return;
-      const last = replies.at(-1)!;
-      const { min, max, ...rest } = last;
-      const histograms = [
-        ...(this.#facts?.histograms ?? []).filter((one) => !bins.includes(one.length)),
-        ...replies.flatMap(({ counts }) => (counts === undefined ? [] : [counts])),
-      ];
-      const hues = replies.find((reply) => reply.hues !== undefined)?.hues ?? this.#facts?.hues ?? null;
-      const { counts: _counts, hues: _hues, ...summary } = rest;
-      this.#facts = { summary: { ...summary, minimum: min, maximum: max }, histograms, hues };
-      this.#spread();
+      for (let bins = this.#nextBins; bins !== null && this.#wantsRaw; bins = this.#nextBins) {
+        const move = this.#moves;
+        const reply = await this.#factsOf(bins);
+        if (scene !== this.#sceneNumber) return;
+        const { min, max, counts = [], hues = this.#facts?.hues ?? null, ...rest } = reply;
+        this.#histograms.set(bins, { counts, move });
+        if (bins !== BINS)
+          this.store.fusingCount = { method: this.store.fusion?.method ?? '', bytes: JSON.stringify(reply).length };
+        // What the settings want of the others they say again.
+        if (bins === BINS) this.#otherBins = BINS;
+        const others = [...this.#histograms].filter(([other]) => other !== BINS);
+        for (const [i, [other, one]] of others.entries())
+          if ((bins === BINS && one.move < move) || i < others.length - MOST_OTHERS) this.#histograms.delete(other);
+        const histograms = [...this.#histograms.values()].flatMap((one) => coarserCounts(one.counts));
+        this.#facts = { summary: { ...rest, minimum: min, maximum: max }, histograms, hues };
+        this.#spread();
+      }
     } catch (error) {
-      if (number === this.#factsNumber && this.store.connected) this.failed(messageOf(error));
+      if (scene === this.#sceneNumber && !(error instanceof ConnectionLost)) this.failed(messageOf(error));
     } finally {
-      if (number === this.#factsNumber) this.#isAskingFacts = false;
+      if (scene === this.#sceneNumber) {
+        this.#askingFor = -1;
+        this.store.factsSince = null;
+      }
+    }
+  }
+
+  async #factsOf(bins: number): Promise<Facts> {
+    for (;;) {
+      try {
+        return factsReply(
+          await this.events.request('fusion.facts', { bins, ...(bins === BINS ? { hues: true } : {}) }),
+          'fusion.facts',
+        );
+      } catch (error) {
+        if (!(error instanceof RpcError) || error.code !== BUSY) throw error;
+        await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
+      }
     }
   }
 
@@ -390,10 +517,21 @@ export class Fusing {
     try {
       const inForce = this.apply(fusion);
       if (inForce !== null) this.store.fusionInForce = inForce;
-    } catch (error) {
-      this.failed(messageOf(error));
+    } catch {
+      // The robot refuses it, too, and says so.
     }
   }
+}
+
+/** The same counts, and those of half as many bins, of a quarter and so on: each of these bins is exactly two of those. */
+function coarserCounts(counts: readonly number[]): (readonly number[])[] {
+  const all = [counts];
+  for (let finest = counts; finest.length % 2 === 0 && finest.length > 0;) {
+    const pairs = finest;
+    finest = Array.from({ length: pairs.length / 2 }, (_, i) => pairs[2 * i]! + pairs[2 * i + 1]!);
+    all.push(finest);
+  }
+  return all;
 }
 
 async function compile(): Promise<WebAssembly.Module> {

@@ -76,7 +76,7 @@ export class Progress {
     this.#here = this.#here.filter((one) => one.picture > picture);
     this.store.pictureMethod = drawn.method;
     this.store.hereSince = this.#here[0]?.at ?? null;
-    if (this.store.hereSince === null && this.store.behindSince === null) this.store.progress = 1;
+    if (this.store.lateSince === null) this.store.progress = 1;
   }
 
   /** Nothing is made here any more. */
@@ -101,7 +101,7 @@ export class Progress {
     const isShown = store.complete !== null && store.complete.generation >= store.generation;
     if (this.#mayBeRefused && isShown && !this.isBusy()) this.#caughtUp();
     // What is made here comes into the picture all at once.
-    if (store.hereSince !== null) store.progress = 0;
+    if (store.hereSince !== null || store.factsSince !== null) store.progress = 0;
     else if (store.behindSince !== null) store.progress = this.#share();
   }
 
@@ -112,7 +112,7 @@ export class Progress {
     }
     this.#notBehind();
     store.progress = 1;
-    if (store.hereSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
+    if (store.hereSince === null && store.factsSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
   }
 
   #notBehind(): void {

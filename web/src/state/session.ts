@@ -91,7 +91,8 @@ export class Session {
         if (this.#firstColours !== null) this.#judge(this.#firstColours);
         this.readings.askFacts();
       },
-      onNotFused: (message) => this.fusing.failed(`Fusing here has failed: ${message}`),
+      onCanFuse: () => this.fusing.drawerIsReady(),
+      onNotFused: (message) => this.fusing.drawerHasFailed(message),
       onFailure: drawing.onFailure,
     };
     this.viewport = new Viewport(canvas, events, drawing.inWorker ? takePictureWorker() : null);
@@ -109,6 +110,9 @@ export class Session {
       request,
       resubscribe: () => void this.#subscription.channelsChanged(),
       isBusy: () => this.settings.busy,
+      isTakenIn: () => this.#intake.isTakenIn,
+      onShown: (method) => this.#progress.beginHere(method, this.viewport.nextPicture),
+      onBehind: () => this.#progress.begin(),
       onHighlighted: (method, highlighted) => this.#share.changed(method, highlighted),
       onLeft: () => {
         this.#progress.leftHere();
@@ -179,7 +183,6 @@ export class Session {
       onInForce: () => this.readings.askHistogram(),
       onProblem: say,
       fuseHere: (wanted) => this.fusing.apply(wanted),
-      onShownHere: (method) => this.#progress.beginHere(method, this.viewport.nextPicture),
     });
     this.quality = new QualityWish(store, {
       request,
@@ -425,6 +428,7 @@ export class Session {
     if (complete !== null) this.#completed(complete);
     if (this.tiles.updateSelection() || bytes > 0) {
       this.store.shown = this.tiles.counts();
+      this.store.costs = this.tiles.costs();
       this.#look.pictureChanged();
       this.#sayError();
     }

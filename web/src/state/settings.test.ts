@@ -32,7 +32,7 @@ function setUp() {
   store.link = { phase: 'open' };
   const asked: Asked[] = [];
   const problems: unknown[] = [];
-  const events = { changes: 0, inForce: 0, shownHere: [] as string[] };
+  const events = { changes: 0, inForce: 0 };
   let here: (wanted: Fusion) => Fusion | null = () => null;
   const later = () => vi.advanceTimersByTimeAsync(0);
   const settings = new Settings(store, {
@@ -55,7 +55,6 @@ function setUp() {
     onInForce: () => (events.inForce += 1),
     onProblem: (error) => problems.push(error),
     fuseHere: (wanted) => here(wanted),
-    onShownHere: (method) => events.shownHere.push(method),
   });
   expect(settings.greeted(fusionWith(0.5), false)).toBeNull();
   const fuseHere = (how: typeof here) => {
@@ -362,8 +361,22 @@ describe('Settings that are fused here', () => {
     expect(store.generation).toBe(3);
   });
 
+  it('are told at leisure as well where they are other methods, one after the other', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere(shownBy);
+    for (let i = 0; i < 50; i += 1) {
+      settings.setMethod(['other', 'blend'][i % 2]!);
+      await vi.advanceTimersByTimeAsync(20);
+      await asked.at(-1)?.answer(3, fusionWith(0.4));
+    }
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(asked.length).toBeLessThanOrEqual(3);
+    expect(asked.at(-1)?.change.method).toBe('blend');
+  });
+
   it('are in force without a link, and in the picture when that has been drawn', () => {
-    const { store, settings, asked, fuseHere, events } = setUp();
+    const { store, settings, asked, fuseHere } = setUp();
     store.pictureMethod = 'before';
     store.fusionInForce = fusionWith(0.4);
     store.link = { phase: 'connecting', attempt: 3 };
@@ -372,7 +385,7 @@ describe('Settings that are fused here', () => {
     expect(store.fusionInForce?.params['alpha']).toBe(0.9);
     expect(store.wanted).toBeNull();
     expect(asked).toHaveLength(0);
-    expect([store.pictureMethod, events.shownHere]).toEqual(['before', ['blend']]);
+    expect(store.pictureMethod).toBe('before');
   });
 
   it('are refused here in the words of the library', () => {

@@ -33,8 +33,6 @@ export interface SettingsSession {
   onProblem: (error: unknown) => void;
   /** Shows settings by what is here; null when the robot has to. Throws FusionRefusal. */
   fuseHere: (wanted: Fusion) => Fusion | null;
-  /** The next picture shows this method by what is here. */
-  onShownHere: (method: string) => void;
 }
 
 /**
@@ -232,14 +230,14 @@ export class Settings {
     this.#hasChosen = true;
     store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
     store.refusals = {};
-    if (this.#isShownHere(change, isSettled) || !store.connected) return;
+    if (this.#isShownHere(change) || !store.connected) return;
     this.session.onChange();
     this.#sender.push(change);
     if (isSettled) this.#sender.flush();
   }
 
   /** Fused here, or refused here: nothing is left to ask the server for. */
-  #isShownHere(change: FusionChange, isSettled: boolean): boolean {
+  #isShownHere(change: FusionChange): boolean {
     const { store } = this;
     if (store.fusion === null) return false;
     try {
@@ -255,11 +253,7 @@ export class Settings {
       return true;
     }
     store.wanted = null;
-    this.session.onShownHere(store.fusionInForce.method);
-    if (store.connected) {
-      this.#teller.push(change);
-      if (isSettled && change.method !== undefined) this.#teller.flush();
-    }
+    if (store.connected) this.#teller.push(change);
     return true;
   }
 

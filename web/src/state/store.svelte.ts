@@ -16,7 +16,7 @@ import type {
   Vec3,
 } from '../protocol/messages';
 import type { UpAxis } from '../view/first_view';
-import type { DrawnError, TileCounts } from '../tiles/tile_set';
+import type { DrawnError, TileCosts, TileCounts } from '../tiles/tile_set';
 import type { CatalogueFailure } from '../transport/catalogue_loader';
 import type { PartFailure } from '../transport/part_loader';
 import { type LinkState, QUIET_MS } from '../transport/connection';
@@ -115,6 +115,12 @@ export class Store {
   fusingPlace = $state<FusingPlace>('robot');
   /** Share of the drawn tiles whose raw layers are here. */
   rawShare = $state(0);
+  /** The library that makes colours here is ready. */
+  hasFusingLibrary = $state(false);
+  /** What the robot has counted last for a setting of colours that are made here, beside what it says of every scene. */
+  fusingCount = $state.raw<{ method: string; bytes: number } | null>(null);
+  /** What raw layers, or a change of colours, of all that is here take. */
+  costs = $state.raw<TileCosts>({ raw_bytes: 0, change_bytes: 0 });
   /** Why colours are not made here though they are wanted to be. */
   fusingProblem = $state<string | null>(null);
 
@@ -131,6 +137,8 @@ export class Store {
   behindSince = $state<number | null>(null);
   /** Since when settings that are shown by what is here have not been in the picture; null when they are. */
   hereSince = $state<number | null>(null);
+  /** Since when colours that are made here have waited for facts of the scene; null: they do not. */
+  factsSince = $state<number | null>(null);
   /** Share of the tiles that show the newest settings. */
   progress = $state(1);
   /** Of the scene that the tiles of the picture are known to be of; -1: of none. */
@@ -217,11 +225,10 @@ export class Store {
   readonly baseline = $derived(this.scene?.baseline);
   readonly connected = $derived(this.link.phase === 'open');
   /** Since when the picture has been behind what is named, whoever makes its colours; null when it is not. */
-  readonly lateSince = $derived(
-    this.behindSince === null || this.hereSince === null
-      ? (this.behindSince ?? this.hereSince)
-      : Math.min(this.behindSince, this.hereSince),
-  );
+  readonly lateSince = $derived.by(() => {
+    const since = [this.behindSince, this.hereSince, this.factsSince].filter((one) => one !== null);
+    return since.length === 0 ? null : Math.min(...since);
+  });
   readonly behind = $derived(this.lateSince !== null && this.now - this.lateSince > 150);
   /** All that was asked for has come, and is drawn or will be in a moment. */
   readonly settled = $derived(this.complete !== null && this.behindSince === null && !this.behind);

@@ -3,7 +3,7 @@ import type { DecodeResult } from '../decode/messages';
 import { FrameKind } from '../protocol/frame';
 import { FrameIntake } from './frame_intake';
 import { decodedGeometry, ROOT, tileFrame } from './test_tiles';
-import { TileSet } from './tile_set';
+import { RawMismatch, TileSet } from './tile_set';
 
 const COMPLETE = { generation: 1, scene_revision: 1, tiles: 1, vertices: 1 };
 
@@ -136,6 +136,18 @@ describe('FrameIntake', () => {
     expect(problems).toEqual([new Error('broken')]);
     expect(acknowledged).toEqual([1]);
   });
+
+  it.each(['temperature', 'visible', 'visible_subtract_green'] as const)(
+    'tells of a raw layer (%s) that cannot be decoded what it tells of one that does not fit',
+    async (kind) => {
+      receive(FrameKind[kind]);
+      expect(intake.isTakenIn).toBe(false);
+      await decodings[0]?.fail();
+      expect(problems).toEqual([expect.any(RawMismatch)]);
+      expect(String(problems[0])).toContain('tile 0/0/0/0: broken');
+      expect(intake.isTakenIn).toBe(true);
+    },
+  );
 
   it('acknowledges kinds that it does not know', () => {
     receive(200);

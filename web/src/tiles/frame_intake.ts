@@ -4,7 +4,7 @@ import { FrameKind, type TileFrame, tileKey } from '../protocol/frame';
 import type { StreamComplete } from '../protocol/messages';
 import { Acknowledger } from '../decode/acknowledger';
 import { Arrivals } from './arrivals';
-import type { TileSet } from './tile_set';
+import { RawMismatch, type TileSet } from './tile_set';
 
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
@@ -89,6 +89,11 @@ export class FrameIntake {
     }
   }
 
+  /** All that has come has been decoded and brought in. */
+  get isTakenIn(): boolean {
+    return this.#acknowledger.sequence >= this.#lastSequence && this.#arrivals.size === 0;
+  }
+
   /** The server has sent all that was asked for; bringIn() says when that is in the picture. */
   completeAfterAll(message: StreamComplete): void {
     this.#completeAfter = { sequence: this.#lastSequence, message };
@@ -120,10 +125,16 @@ export class FrameIntake {
         this.events.onArrival();
       })
       .catch((error: unknown) => {
-        if (!(error instanceof Superseded)) this.events.onProblem(error);
+        if (error instanceof Superseded) return;
+        const isRaw = job.kind === 'temperature' || job.kind === 'visible';
+        this.events.onProblem(isRaw ? new RawMismatch(`tile ${tileKey(frame.tile)}: ${messageOf(error)}`) : error);
       })
       .finally(() => {
         if (connectionNumber === this.#connectionNumber) this.#acknowledger.finished(frame.sequence);
       });
   }
+}
+
+function messageOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
 }

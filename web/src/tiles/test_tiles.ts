@@ -40,6 +40,7 @@ export function tileFrame(tile: TileId, part: Partial<TileFrame> = {}): TileFram
     temperature_error_celsius: 0,
     lowest_celsius: 0,
     highest_celsius: 0,
+    bytes: 100,
     payload: new Uint8Array(0),
     ...part,
   };

@@ -606,10 +606,10 @@ describe('TileSet, raw layers', () => {
     tiles.updateSelection();
     tiles.addRaw(rawFrame(root), { kind: 'visible', rgb: new Uint8Array(9) });
     expect(top.raw).toBeNull();
-    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 0, step_celsius: 0 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 0, step_celsius: 0, waiting: 0 });
     addRaw(root);
     expect(top.raw).toMatchObject({ scale: 0.01, offset: 20 });
-    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01, waiting: 0 });
   });
 
   it('take temperatures in another step alone, and know which will come no finer', () => {
@@ -623,23 +623,23 @@ describe('TileSet, raw layers', () => {
     expect(top.raw).toMatchObject({ scale: 0.01, rgb: new Uint8Array(9) });
     const claims = tiles.claims(10);
     // A span of 655 degrees has no room for others, one of a degree has, as long as floats have.
-    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01, waiting: 0 });
     expect(tiles.layersOf(claims, Infinity, 0.001).raw).toEqual([0]);
     temperatures(0.01, 0, 100, 65535);
-    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
-    expect(tiles.rawCounts(0.01)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01 });
-    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0 });
+    expect(tiles.rawCounts()).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01, waiting: 0 });
+    expect(tiles.rawCounts(0.01)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.01, waiting: 0 });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0, waiting: 0 });
     expect(tiles.layersOf(claims, Infinity, 0.001).raw).toEqual([]);
     expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0.005);
     temperatures(0.001, 0, 1000, 65535);
     expect(top.raw).toMatchObject({ scale: 0.001, codes: Uint16Array.of(0, 1000, 65535), rgb: new Uint8Array(9) });
-    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.001 });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0.001, waiting: 0 });
     expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0.0005);
     temperatures(2 ** -18, 0, 5, 65535);
     expect(tiles.rawCounts(1e-9)).toMatchObject({ step_celsius: 2 ** -18 });
     // Where nothing has a temperature there are no steps.
     temperatures(1, 65535, 65534, 65533);
-    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0 });
+    expect(tiles.rawCounts(0.001)).toEqual({ drawn: 1, raw: 1, step_celsius: 0, waiting: 0 });
     tiles.setHere(false);
     expect(tiles.drawnError(() => true)?.rounding_celsius).toBe(0);
     expect(() => temperatures(0.01, 0, 1)).toThrow(RawMismatch);
@@ -668,11 +668,36 @@ describe('TileSet, raw layers', () => {
 
   it('make a tile without colours while fusing is here, and not before', () => {
     tiles.addGeometry(frame(root), geometry());
+    expect(tiles.rawCounts().waiting).toBe(1);
     addRaw(root);
     expect(made).toHaveLength(0);
     tiles.setHere(true);
     expect(made).toHaveLength(1);
     expect(made[0]?.visible).toBe(true);
+    expect(tiles.rawCounts().waiting).toBe(0);
+  });
+
+  it('and colours cost what has come of them, of all tiles and not of those that are drawn alone', () => {
+    add(root, { child_mask: 0b11 });
+    for (const octant of [0, 1]) add(child(octant));
+    const { raw_bytes, change_bytes } = tiles.costs();
+    expect(raw_bytes).toBeCloseTo(9 * 2.3);
+    // A colour frame is 100 bytes.
+    expect(change_bytes).toBe(300);
+    tiles.addColours(frame(root, { generation: 2, child_mask: 0b11, bytes: 900 }), colours(2));
+    recolour(root, 3);
+    expect(tiles.costs().change_bytes).toBe(1100);
+    addRaw(child(0), { bytes: 6 });
+    expect(tiles.costs().raw_bytes).toBeCloseTo(3 * 12);
+    addRaw(child(1), { bytes: 8 });
+    addRaw(root, { bytes: 5 });
+    expect(tiles.costs().raw_bytes).toBe(12 + 16 + 10);
+    addRaw(root, { bytes: 7 });
+    expect(tiles.costs().raw_bytes).toBe(12 + 16 + 14);
+    // Of a dearer method, which has not been seen, it is more than what came.
+    tiles.clear();
+    add(root);
+    expect(tiles.costs().raw_bytes).toBeCloseTo(3 * 2.3);
   });
 
   it('draw a tile in front of detail that cannot follow the settings here', () => {

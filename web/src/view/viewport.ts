@@ -34,6 +34,8 @@ export interface ViewportEvents {
   onContext: (isLost: boolean) => void;
   /** The first picture with any of the scene in it stands on the screen. */
   onFirstPicture: () => void;
+  /** The library with which tiles are fused here is ready. */
+  onCanFuse: () => void;
   /** Tiles cannot be fused here. */
   onNotFused: (message: string) => void;
   /** The drawing side has failed; `everDrew` false: it could not even start. */
@@ -539,6 +541,9 @@ export class Viewport {
         break;
       case 'context':
         this.events.onContext(reply.isLost);
+        break;
+      case 'can_fuse':
+        this.events.onCanFuse();
         break;
       case 'not_fused':
         this.events.onNotFused(reply.message);
