@@ -34,7 +34,13 @@ const CROWDED = [
 function crowd(page) {
   return page.evaluate(() => {
     const { store, tiles } = globalThis.spectra;
-    tiles.drawnError = () => ({ position_m: 0.1234, colour_levels: 43.2, rounding_levels: 0.5, temperature_celsius: 0.406 });
+    tiles.drawnError = () => ({
+      position_m: 0.1234,
+      colour_levels: 43.2,
+      rounding_levels: 0.5,
+      temperature_celsius: 0.406,
+      rounding_celsius: 0,
+    });
     tiles.counts = () => ({ ...store.shown, vertices: 20_100 });
     store.shown = { ...store.shown, vertices: 20_100 };
     setInterval(() => {
