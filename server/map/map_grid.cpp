@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
-
-#include "fusion/mesh/surface.hpp"
 
 namespace spectra::map {
 namespace {
@@ -14,9 +11,6 @@ constexpr std::size_t kSampleSize = 4096;
 /// The part of the positions at either end of an axis that may be far from all others, and how much is added beyond the rest.
 constexpr double kFarShare = 0.002;
 constexpr double kMargin = 0.25;
-/// A cell is at most so many times the usual edge, unless so small a part of all that it would be cut into crumbs.
-constexpr double kMostEdges = 0x1p14;
-constexpr double kSmallestCell = 0x1p-11;
 
 struct Interval {
   double low = 0, high = 0;
@@ -33,34 +27,9 @@ Interval most_of(std::vector<double>& values) {
   return {std::max(values.front(), low - margin), std::min(values.back(), high + margin)};
 }
 
-/// The part of it that is not far beyond a side of the core.
-Interval within(const Interval& interval, double core_low, double core_high) {
-  const double margin = kMargin * (core_high - core_low);
-  const Interval part{std::max(interval.low, core_low - margin), std::min(interval.high, core_high + margin)};
-  return part.low <= part.high ? part : interval;
-}
-
-/// The median of some edges; 0 without any.
-double usual_edge_m(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
-  std::vector<double> squared;
-  const std::size_t stride = triangles.size() / kSampleSize + 1;
-  for (std::size_t t = 0; t < triangles.size(); t += stride) {
-    const auto& [a, b, c] = triangles[t];
-    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
-      const double edge = mesh::squared_distance(positions[from], positions[to]);
-      if (edge > 0 && std::isfinite(edge)) squared.push_back(edge);
-    }
-  }
-  if (squared.empty()) return 0;
-  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
-  std::nth_element(squared.begin(), middle, squared.end());
-  return std::sqrt(*middle);
-}
-
 }  // namespace
 
-MapGrid MapGrid::around(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles,
-                        const std::optional<base::Bounds>& core, int level) {
+MapGrid MapGrid::around(std::span<const base::Vec3f> positions, int level) {
   std::array<Interval, 3> box{};
   if (!positions.empty()) {
     const std::size_t stride = (positions.size() + kSampleSize - 1) / kSampleSize;
@@ -72,16 +41,9 @@ MapGrid MapGrid::around(std::span<const base::Vec3f> positions, std::span<const 
     }
     for (std::size_t axis = 0; axis < 3; ++axis) box[axis] = most_of(sample[axis]);
   }
-  if (core) {
-    box[0] = within(box[0], double{core->min.x}, double{core->max.x});
-    box[1] = within(box[1], double{core->min.y}, double{core->max.y});
-    box[2] = within(box[2], double{core->min.z}, double{core->max.z});
-  }
   double extent = 0;
   for (const Interval& side : box) extent = std::max(extent, side.high - side.low);
-  double cell_m = extent > 0 ? extent : 1;
-  const double edge_m = usual_edge_m(positions, triangles);
-  if (edge_m > 0) cell_m = std::min(cell_m, std::max(kMostEdges * edge_m, kSmallestCell * cell_m));
+  const double cell_m = extent > 0 ? extent : 1;
   MapGrid grid;
   grid.edge_m_ = std::ldexp(cell_m, level);
   // A third of the way along, in binary 0.0101..: near no border of any level.
