@@ -485,7 +485,11 @@ export class Session {
     const isVisible = viewport.visibility();
     this.#words.pictureIs(viewport.nextPicture, { error: this.tiles.drawnError(isVisible), methods: this.#methods(isVisible) });
     const { error, methods } = this.#words.afterPicture(viewport.pictures);
-    if (String(Object.values(error ?? {})) !== String(Object.values(store.drawnError ?? {}))) store.drawnError = error;
+    if (String(Object.values(error ?? {})) !== String(Object.values(store.drawnError ?? {}))) {
+      store.drawnError = error;
+      // How far the picture may be off tells what lies before a marked place.
+      this.#markers.update();
+    }
     if (String(methods) !== String(store.shownMethods)) store.shownMethods = methods;
   }
 
