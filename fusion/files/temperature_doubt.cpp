@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_values.hpp"
@@ -62,7 +63,9 @@ std::optional<SharedNumber> shared_number(const TemperatureFacts& facts, const C
     const float range_of_others = -(is_high ? facts.low : facts.high).value - end.next;
     if (!are_many(end.count, facts) || !are_many(facts.finite_count - end.count, facts)) continue;
     const float celsius = is_high ? -end.value : end.value;
-    const double in_file = std::stod(short_number((static_cast<double>(celsius) - scale.offset) / scale.factor));
+    // Without the digits that the way to degC and back has made.
+    const std::string shown = short_number((static_cast<double>(celsius) - scale.offset) / scale.factor);
+    const double in_file = std::strtod(shown.c_str(), nullptr);
     const std::optional<float> distance = least_distance(in_file);
     constexpr float kOfAny = 8, kFewestCelsiusOfAny = 100;
     if (gap < (distance ? kFewestCelsius : kFewestCelsiusOfAny)) continue;

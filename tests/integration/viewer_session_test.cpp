@@ -156,6 +156,15 @@ class ViewerSessionTest : public testing::Test {
   }
   ~ViewerSessionTest() override { server_->stop(); }
 
+  /// The server again, with other limits.
+  template <class Change>
+  void restart(const Change& change) {
+    server_->stop();
+    auto options = quick_options();
+    change(options.limits);
+    start(std::move(options));
+  }
+
   void serve(mesh::MultispectralMesh mesh) { served_.scenes.replace(std::move(mesh), served_.pool); }
   std::string get(const std::string& target) const {
     return http_exchange(server_->port(),
@@ -219,10 +228,7 @@ TEST_F(ViewerSessionTest, ABurstOfLargeAnswersIsRefusedInPartAndCutsNobody) {
 }
 
 TEST_F(ViewerSessionTest, AnswersThatNobodyReadsAreBoundedForAllTogether) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.queue_bytes_at_once = 1'000'000;
-  start(std::move(options));
+  restart([](net::NetLimits& limits) { limits.queue_bytes_at_once = 1'000'000; });
   serve(demo::demo_scene({.vertex_count = 20'000, .seed = 3}));
   const auto ask = [](int id) {
     return json{{"jsonrpc", "2.0"}, {"id", id}, {"method", "scene.histogram"}, {"params", {{"bins", 4096}}}}.dump();
@@ -261,10 +267,7 @@ TEST_F(ViewerSessionTest, AnswersThatNobodyReadsAreBoundedForAllTogether) {
 }
 
 TEST_F(ViewerSessionTest, WhatIsSharedOfGreetingsTakesNoRoom) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.queue_bytes_at_once = 400'000;
-  start(std::move(options));
+  restart([](net::NetLimits& limits) { limits.queue_bytes_at_once = 400'000; });
   serve(sheet(40));
   // Greetings of 150 kB each that nobody reads.
   std::vector<std::unique_ptr<RawWebSocket>> silent;
@@ -278,11 +281,10 @@ TEST_F(ViewerSessionTest, WhatIsSharedOfGreetingsTakesNoRoom) {
 }
 
 TEST_F(ViewerSessionTest, RefusedTextsAreCountedBeforeTheyAreRead) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.message_bytes_per_s = 20'000;
-  options.limits.message_burst_s = 1;
-  start(std::move(options));
+  restart([](net::NetLimits& limits) {
+    limits.message_bytes_per_s = 20'000;
+    limits.message_burst_s = 1;
+  });
   Viewer flood(server_->port()), other(server_->port());
   ASSERT_TRUE(flood.wait_for("hello"));
   ASSERT_TRUE(other.wait_for("hello"));
@@ -320,11 +322,10 @@ TEST_F(ViewerSessionTest, AFileThatIsBeingSentIsNotMadeAgainAndHindersNobody) {
 }
 
 TEST_F(ViewerSessionTest, BlocksBeyondTheBoundAreRefusedBeforeTheyAreRead) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.block_size_bytes = 2000;
-  options.limits.block_bytes_at_once = 3000;
-  start(options);
+  restart([](net::NetLimits& limits) {
+    limits.block_size_bytes = 2000;
+    limits.block_bytes_at_once = 3000;
+  });
   ASSERT_EQ(map_.restore(), std::nullopt);
   const auto head = [](std::size_t size) {
     return "PUT /api/v1/blocks/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(size) + "\r\n\r\n";
@@ -341,10 +342,7 @@ TEST_F(ViewerSessionTest, BlocksBeyondTheBoundAreRefusedBeforeTheyAreRead) {
 }
 
 TEST_F(ViewerSessionTest, ARefusalReachesWhoIsStillSending) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.block_size_bytes = 2000;
-  start(options);
+  restart([](net::NetLimits& limits) { limits.block_size_bytes = 2000; });
   ASSERT_EQ(map_.restore(), std::nullopt);
   const std::string body(1'000'000, 'x');
   for (int i = 0; i < 10; ++i) {
@@ -356,11 +354,10 @@ TEST_F(ViewerSessionTest, ARefusalReachesWhoIsStillSending) {
 }
 
 TEST_F(ViewerSessionTest, BlocksAreReadMoreSlowlyFromWhoSendsTooMuch) {
-  server_->stop();
-  auto options = quick_options();
-  options.limits.block_bytes_per_s = 1e6;
-  options.limits.message_burst_s = 0.1;
-  start(options);
+  restart([](net::NetLimits& limits) {
+    limits.block_bytes_per_s = 1e6;
+    limits.message_burst_s = 0.1;
+  });
   ASSERT_EQ(map_.restore(), std::nullopt);
   const auto put = [&](std::size_t size) {
     RawClient sender(server_->port());

@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { existsSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { sheet } from '../../tests/integration/node/ply.mjs';
+import { demoServer, drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 
 const MODULE = new URL('../../build/wasm/bin/fusion.wasm', import.meta.url);
@@ -43,26 +44,6 @@ function counter(page) {
 const setAlpha = (page, alpha) => page.evaluate((value) => globalThis.spectra.settings.setParameter('alpha', value, true), alpha);
 const setMethod = (page, method) => page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
 
-/** A sheet of 60 x 60 vertices; `celsiusAt` of each in its column, as it is to be written. */
-function sheet(celsiusAt) {
-  const side = 60;
-  const vertices = [];
-  const faces = [];
-  for (let x = 0; x < side; x += 1) {
-    for (let y = 0; y < side; y += 1) {
-      vertices.push(`${x * 0.05} ${y * 0.05} 0 90 ${4 * x} ${4 * y} ${celsiusAt(x, y)}`);
-      const v = x * side + y;
-      if (x > 0 && y > 0) faces.push(`3 ${v - side - 1} ${v - 1} ${v}`, `3 ${v - side - 1} ${v} ${v - side}`);
-    }
-  }
-  const properties = ['x', 'y', 'z'].map((name) => `property float ${name}\n`).join('');
-  const colours = ['red', 'green', 'blue'].map((name) => `property uchar ${name}\n`).join('');
-  return (
-    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\n${properties}${colours}property float temperature\n` +
-    `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header\n${vertices.join('\n')}\n${faces.join('\n')}\n`
-  );
-}
-
 export function addFusingTests(browser, scratch) {
   if (!existsSync(MODULE)) {
     console.log('skipped: fusing in the browser; deploy/build_module.sh could not make the library');
@@ -70,7 +51,7 @@ export function addFusingTests(browser, scratch) {
   }
 
   test('Fused here: the pixels of the robot, no frame and few bytes for a hundred settings', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
     const counts = counter(page);
     await page.goto(server.url);
@@ -125,7 +106,6 @@ export function addFusingTests(browser, scratch) {
     assert.deepEqual(problems, []);
     await robot.page.close();
     await page.close();
-    await server.stop();
   });
 
   test('Temperatures that stand on a threshold are on its same side here and on the robot', async () => {
@@ -167,7 +147,7 @@ export function addFusingTests(browser, scratch) {
   });
 
   test('A narrow range gets finer temperatures, alone, and is said to be as exact as they are', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const here = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
     const kinds = new Set();
     let isCounting = false;
@@ -213,7 +193,6 @@ export function addFusingTests(browser, scratch) {
       assert.deepEqual(problems, []);
       await page.close();
     }
-    await server.stop();
   });
 
   test('One temperature far out: a threshold is left to the robot, however wide the range is', async () => {
@@ -254,7 +233,7 @@ export function addFusingTests(browser, scratch) {
   });
 
   test('A value that is refused here goes back to what is in force, with the reason beside it', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, server.url, { width: 1280, height: 900 }, { fusing: 'here' });
     await settled(page, 180_000);
     await isHere(page);
@@ -285,11 +264,10 @@ export function addFusingTests(browser, scratch) {
     assert.notEqual(await page.evaluate(() => globalThis.spectra.store.histogram.highlighted_share), share);
     assert.deepEqual(problems, []);
     await page.close();
-    await server.stop();
   });
 
   test('How much is highlighted is said where colours are made here, as the robot says it', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const words = async (fusing) => {
       const { page, problems } = await openClient(browser, server.url, { width: 900, height: 560 }, { fusing });
       await settled(page, 180_000);
@@ -334,11 +312,10 @@ export function addFusingTests(browser, scratch) {
       assert.equal(here[what].contrast === null, contrast === null, what);
       assert.equal(here[what].text.replace(/^[\d.]+/, ''), text.replace(/^[\d.]+/, ''));
     }
-    await server.stop();
   });
 
   test('Switching where colours are made leaves no pixel of the old setting', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
     await isHere(page);
@@ -366,11 +343,10 @@ export function addFusingTests(browser, scratch) {
     assert.ok(apart(sample(await screenshot(page, 'switch-amid')), thermal) < 0.002);
     assert.deepEqual(problems, []);
     await page.close();
-    await server.stop();
   });
 
   test('What only the robot knows it shows, and nothing of before stays; afterwards it is here again', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
     await isHere(page);
@@ -398,11 +374,10 @@ export function addFusingTests(browser, scratch) {
     assert.deepEqual(problems, []);
     await robot.page.close();
     await page.close();
-    await server.stop();
   });
 
   test('Without a link the last map is turned, tuned and read, and says how old it is', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const { page } = await openClient(browser, link.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
@@ -456,11 +431,10 @@ export function addFusingTests(browser, scratch) {
     assert.equal(await page.evaluate(() => globalThis.spectra.store.fusingPlace), 'here');
     await page.close();
     await link.stop();
-    await server.stop();
   });
 
   test('What is made here is said to be behind until it has been drawn', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const { page, problems } = await openClient(browser, link.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
@@ -496,7 +470,6 @@ export function addFusingTests(browser, scratch) {
     await sign.waitFor({ state: 'detached', timeout: 10_000 });
     await page.close();
     await link.stop();
-    await server.stop();
   });
 
   test('After the server was started again: the range in force, keys that work, colours made here, and no reading of before', async () => {
@@ -558,7 +531,7 @@ export function addFusingTests(browser, scratch) {
 
   // On the robot: "Hundreds of changes leave nothing behind".
   test('Memory stays flat over 500 settings that are made here', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, server.url, undefined, { fusing: 'here' });
     await settled(page, 180_000);
     await setMethod(page, 'thermal_visible_blend');
@@ -584,11 +557,10 @@ export function addFusingTests(browser, scratch) {
     assert.ok(grown < 3e6, `${grown} bytes more after 500 settings`);
     assert.deepEqual(problems, []);
     await page.close();
-    await server.stop();
   });
 
   test('It is here once what draws is ready, and not before; what fails there is said, and can be tried again', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, 'about:blank', undefined, { fusing: 'here' });
     const held = [];
     const part = /\/tile_fuser-[^/]*\.js$/;
@@ -611,11 +583,10 @@ export function addFusingTests(browser, scratch) {
     await drawn(page);
     assert.ok(apart(sample(await screenshot(page, 'drawer-here')), thermal) > 0.2, 'a setting is made here');
     await page.close();
-    await server.stop();
   });
 
   test('A library that does not load or compile leaves colours to the robot, and the panel says so', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     for (const [what, fulfil] of [
       ['missing', { status: 404, body: '' }],
       ['broken', { status: 200, contentType: 'application/wasm', body: 'not a module' }],
@@ -631,6 +602,5 @@ export function addFusingTests(browser, scratch) {
       assert.equal(await page.evaluate(() => globalThis.spectra.store.pictureMethod), 'visible_only', what);
       await page.close();
     }
-    await server.stop();
   });
 }

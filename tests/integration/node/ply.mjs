@@ -1,5 +1,5 @@
 // Reads the binary little-endian PLY files that Spectra writes and the real scenes have: scalar vertex properties and one
-// triangle list. A reader of the tests' own, so that the program's is not tested with itself.
+// triangle list, by a reader of the tests' own, so that the program's is not tested with itself; and writes a small scene.
 import { readFileSync } from "node:fs";
 
 const SIZES = { char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4, double: 8, uint8: 1, int32: 4, float32: 4, float64: 8 };
@@ -52,4 +52,24 @@ export function readPly(path) {
     seen: column("seen", Float64Array),
     triangles,
   };
+}
+
+/** A sheet of 60 x 60 vertices; `celsiusAt` tells the temperature of the one at x, y, as it is to be written. */
+export function sheet(celsiusAt) {
+  const side = 60;
+  const vertices = [];
+  const faces = [];
+  for (let x = 0; x < side; ++x) {
+    for (let y = 0; y < side; ++y) {
+      vertices.push(`${x * 0.05} ${y * 0.05} 0 90 ${4 * x} ${4 * y} ${celsiusAt(x, y)}`);
+      const v = x * side + y;
+      if (x > 0 && y > 0) faces.push(`3 ${v - side - 1} ${v - 1} ${v}`, `3 ${v - side - 1} ${v} ${v - side}`);
+    }
+  }
+  const properties = ["x", "y", "z"].map((name) => `property float ${name}\n`).join("");
+  const colours = ["red", "green", "blue"].map((name) => `property uchar ${name}\n`).join("");
+  return (
+    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\n${properties}${colours}property float temperature\n` +
+    `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header\n${vertices.join("\n")}\n${faces.join("\n")}\n`
+  );
 }

@@ -5,6 +5,7 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
+import { sheet } from "./ply.mjs";
 import { celsiusOf, KIND, SpectraClient } from "./spectra_client.mjs";
 import { serve } from "./spectra_server.mjs";
 import { loadModule, moduleIsThere, Placed, prepare } from "../../module/client_module.mjs";
@@ -116,26 +117,6 @@ test("the module makes of raw layers what the server fuses, within the step", { 
     await server.stop();
   }
 });
-
-/** A sheet of 60 x 60 vertices; `celsiusAt` of each in its column, as it is to be written. */
-function sheet(celsiusAt) {
-  const side = 60;
-  const vertices = [];
-  const faces = [];
-  for (let x = 0; x < side; ++x) {
-    for (let y = 0; y < side; ++y) {
-      vertices.push(`${x * 0.05} ${y * 0.05} 0 90 ${4 * x} ${4 * y} ${celsiusAt(x)}`);
-      const v = x * side + y;
-      if (x > 0 && y > 0) faces.push(`3 ${v - side - 1} ${v - 1} ${v}`, `3 ${v - side - 1} ${v} ${v - side}`);
-    }
-  }
-  const properties = ["x", "y", "z"].map((name) => `property float ${name}\n`).join("");
-  const colours = ["red", "green", "blue"].map((name) => `property uchar ${name}\n`).join("");
-  return (
-    `ply\nformat ascii 1.0\nelement vertex ${vertices.length}\n${properties}${colours}property float temperature\n` +
-    `element face ${faces.length}\nproperty list uchar int vertex_indices\nend_header\n${vertices.join("\n")}\n${faces.join("\n")}\n`
-  );
-}
 
 const scenes = [
   ["one temperature", () => "25.0", [undefined, 25]],

@@ -85,8 +85,9 @@ export class Settings {
 
   /** The method of a generation of this connection: generations of which nothing was said have that of the one before. */
   methodOf(generation: number): string | undefined {
-    const last = (): number => Math.max(...[...this.#methodOf.keys()].filter((known) => known < generation));
-    return this.#methodOf.get(generation) ?? this.#methodOf.get(last());
+    let newest = -1;
+    for (const known of this.#methodOf.keys()) if (known <= generation && known > newest) newest = known;
+    return this.#methodOf.get(newest);
   }
 
   // Actions of the interface
