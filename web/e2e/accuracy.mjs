@@ -1,7 +1,7 @@
 // What the status bar says of the picture, against the picture: on a link of 1 Mbit/s at random moments, and at rest.
 //   SPECTRA_MOMENTS=50 SPECTRA_E2E='What the bar says' node e2e/run.mjs      (the suite itself looks at a few moments)
 import assert from 'node:assert/strict';
-import { drawn, keep, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { demoServer, drawn, keep, openClient, screenshot, settled, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 
 const MOMENTS = Number(process.env.SPECTRA_MOMENTS ?? 6);
@@ -109,7 +109,7 @@ function difference(a, b, isThermal) {
 
 export function addAccuracyTests(browser) {
   test('What the bar says of colours and temperatures is never less than what they are off, on 1 Mbit/s', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const full = await openFull(browser, server);
     // The program of the page is in the cache: it is not what is slow.
@@ -204,6 +204,5 @@ export function addAccuracyTests(browser) {
     await context.close();
     await full.close();
     await link.stop();
-    await server.stop();
   });
 }

@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { openClient, settled, startServer, test } from './harness.mjs';
+import { demoServer, openClient, settled, test } from './harness.mjs';
+import { startLink } from './link.mjs';
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
@@ -24,8 +25,8 @@ export async function assertAccessible(page, what) {
 
 export function addAxeTests(browser) {
   test('axe finds nothing in the controls, dark and light, with a reading, the help and colours made here', async () => {
-    const server = await startServer(['--demo']);
-    const { page } = await openClient(browser, server.url, { width: 1280, height: 720 }, { fusing: 'here' });
+    const link = await startLink((await demoServer()).port);
+    const { page } = await openClient(browser, link.url, { width: 1280, height: 720 }, { fusing: 'here' });
     await settled(page);
     await page.waitForFunction(() => globalThis.spectra.store.fusingPlace === 'here');
     await page.evaluate(() => globalThis.spectra.pin({ x: 500, y: 400 }));
@@ -62,15 +63,15 @@ export function addAxeTests(browser) {
     await page.getByText('Details', { exact: true }).click();
     await page.setViewportSize({ width: 390, height: 844 });
     await assertAccessible(page, 'a phone');
-    await server.stop();
+    await link.stop();
     await page.getByText('Reconnecting').waitFor();
     await assertAccessible(page, 'without a link');
     await page.close();
   });
 
   test('axe finds nothing in any state of the page: connecting, hidden, tiny, notes, errors, lost graphics, lost link', async () => {
-    const server = await startServer(['--demo']);
-    const { page } = await openClient(browser, server.url, { width: 1280, height: 720 });
+    const link = await startLink((await demoServer()).port);
+    const { page } = await openClient(browser, link.url, { width: 1280, height: 720 });
     await settled(page, 180_000);
     const store = (change) => page.evaluate((values) => Object.assign(globalThis.spectra.store, values), change);
     await page.locator('.panel').waitFor();
@@ -93,7 +94,7 @@ export function addAxeTests(browser) {
     await page.locator('.panel').waitFor();
     await page.evaluate(() => globalThis.spectra.settings.setMethod('intensity_hue'));
     await settled(page);
-    await server.stop();
+    await link.stop();
     await page.getByText('Reconnecting').waitFor();
     await page.evaluate(() => {
       globalThis.spectra.settings.setMethod('thermal_only');

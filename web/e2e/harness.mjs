@@ -53,6 +53,13 @@ export async function startServer(args, port = 0) {
   };
 }
 
+let demo = null;
+/** The server of the demo scene for all tests that neither stop it nor want options of their own; it ends with them. */
+export function demoServer() {
+  demo ??= startServer(['--demo']);
+  return demo;
+}
+
 export function startBrowser() {
   mkdirSync(SHOTS, { recursive: true });
   return chromium.launch({
@@ -61,9 +68,13 @@ export function startBrowser() {
   });
 }
 
+/** Pages of the test that runs: one that has failed has left its own open. */
+const opened = [];
+
 /** Opens the client in a browser or one of its contexts; `problems` collects what the browser complained about (a breach of the content policy among it). */
 export async function openClient(browser, url, viewport = { width: 1440, height: 900 }, { fusing = 'robot' } = {}) {
   const page = await browser.newPage(viewport === null ? undefined : { viewport });
+  opened.push(page);
   // Colours come from the robot unless a test is about something else: what a setting costs is counted then.
   await page.addInitScript((kept) => {
     if (location.protocol === 'about:') return;
@@ -188,6 +199,7 @@ export async function runTests() {
   const wanted = tests.filter(({ name }) => name.includes(process.env.SPECTRA_E2E ?? ''));
   for (const { name, body } of wanted) {
     const begun = Date.now();
+    opened.length = 0;
     try {
       await body();
       console.log(`ok      ${name} (${Date.now() - begun} ms)`);
@@ -195,7 +207,9 @@ export async function runTests() {
       failed += 1;
       console.log(`FAILED  ${name}\n${error instanceof Error ? error.stack : error}`);
     }
+    for (const page of opened) await page.close();
   }
+  if (demo !== null) await (await demo).stop();
   console.log(`\nEnd-to-end: ${wanted.length - failed} passed, ${failed} failed, ${((Date.now() - start) / 1000).toFixed(1)} s`);
   process.exitCode = failed === 0 ? 0 : 1;
 }

@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { drawn, openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
+import { demoServer, drawn, openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
+import { startLink } from './link.mjs';
 
 /** Width and height in CSS pixels; `touch` screens have no mouse. */
 const SCREENS = [
@@ -187,13 +188,13 @@ function boxes(page) {
 export function addLayoutTests(browser, scratch) {
   for (const { width, height, touch } of SCREENS) {
     test(`Nothing is cut and nothing lies over something else at ${width} x ${height}`, async () => {
-      const server = await startServer(['--demo']);
+      const link = await startLink((await demoServer()).port);
       const context = await browser.newContext({
         viewport: { width, height },
         hasTouch: touch === true,
         isMobile: touch === true,
       });
-      const { page, problems } = await openClient(context, server.url, null);
+      const { page, problems } = await openClient(context, link.url, null);
       await settled(page, 180_000);
       const look = async (what) => {
         const { problems: found, targets } = await boxes(page);
@@ -237,7 +238,7 @@ export function addLayoutTests(browser, scratch) {
       await page.getByLabel('Show the controls').click();
       await page.locator('aside.panel').waitFor();
       assert.deepEqual(problems, []);
-      await server.stop();
+      await link.stop();
       await page.getByText('Reconnecting').waitFor();
       // The panel has just come back and the banner with it: their places are known a frame later.
       await drawn(page);
@@ -381,7 +382,7 @@ export function addLayoutTests(browser, scratch) {
   });
 
   test('On a phone too, the marks tell the hottest of all that is seen', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
     const { page } = await openClient(context, server.url, null);
     await settled(page, 180_000);
@@ -437,11 +438,10 @@ export function addLayoutTests(browser, scratch) {
     }
     await screenshot(page, 'phone-card');
     await context.close();
-    await server.stop();
   });
 
   test('Nothing is cut and nothing lies over something else with two device pixels a pixel', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const context = await browser.newContext({ viewport: SCREENS[0], deviceScaleFactor: 2 });
     const { page, problems } = await openClient(context, server.url, null);
     await settled(page, 180_000);
@@ -455,11 +455,10 @@ export function addLayoutTests(browser, scratch) {
     }
     assert.deepEqual(problems, []);
     await context.close();
-    await server.stop();
   });
 
   test('One tab stop a group, arrow keys inside', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page, 180_000);
     const stops = [];
@@ -513,11 +512,10 @@ export function addLayoutTests(browser, scratch) {
     await page.keyboard.press('ArrowRight');
     assert.equal(await page.evaluate(() => document.activeElement.dataset.end), '−X');
     await page.close();
-    await server.stop();
   });
 
   test('Single keys can be switched off, and act on the scene even then', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page, 180_000);
     const method = () => page.evaluate(() => globalThis.spectra.store.fusion.method);
@@ -541,11 +539,10 @@ export function addLayoutTests(browser, scratch) {
     await page.keyboard.press('p');
     await page.locator('.card').waitFor();
     await page.close();
-    await server.stop();
   });
 
   test('Forced colours leave every number and every slider readable', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const context = await browser.newContext({
       viewport: { width: 1280, height: 720 },
       forcedColors: 'active',
@@ -599,6 +596,5 @@ export function addLayoutTests(browser, scratch) {
       );
     }
     await context.close();
-    await server.stop();
   });
 }

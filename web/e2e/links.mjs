@@ -1,6 +1,6 @@
 // What a user sees over a link that is slow, and one that is cut.
 import assert from 'node:assert/strict';
-import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { demoServer, drawn, openClient, screenshot, settled, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 import { linkProxy } from '../../tests/integration/node/link_proxy.mjs';
 
@@ -90,7 +90,7 @@ const shownTiles = (page) => page.evaluate(() => globalThis.spectra.store.shown.
 
 export function addLinkTests(browser) {
   test('On a slow link the coarse answer is seen first, then the fine one', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const { page, problems } = await openClient(browser, link.url);
     await settled(page);
@@ -139,11 +139,10 @@ export function addLinkTests(browser) {
     assert.deepEqual(problems, []);
     await page.close();
     await link.stop();
-    await server.stop();
   });
 
   test('Another view that is chosen while the first picture loads is said to be still to come, also when the link is cut then', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     await ready(server);
     const link = await startLink(server.port);
     link.rate = 300_000;
@@ -175,11 +174,10 @@ export function addLinkTests(browser) {
     assert.match((await state()).pictureMethod, /^thermal_only$/);
     await page.close();
     await link.stop();
-    await server.stop();
   });
 
   test('The client is small: over a thin link it leaves the line to the scene, and the first picture stands within 5 s', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     // What it takes to make the scene is not counted.
     await ready(server);
     const times = [];
@@ -222,11 +220,10 @@ export function addLinkTests(browser) {
       `a first visit loads ${visit_bytes} bytes`,
     );
     await page.close();
-    await server.stop();
   });
 
   test('What the first picture needs is asked for before the program has come, and it is seen from one place', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const proxy = await linkProxy(server.url);
     const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
     // Where the pictures are drawn from that have any of the scene in them.
@@ -265,11 +262,10 @@ export function addLinkTests(browser) {
     assert.equal(new Set(eyes).size, 1, 'the scene was seen from another place first');
     await context.close();
     await proxy.close();
-    await server.stop();
   });
 
   test('Methods and palettes come after the first picture, once, and are asked for again when they do not come', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     await ready(server);
     const proxy = await linkProxy(server.url);
     const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
@@ -321,11 +317,10 @@ export function addLinkTests(browser) {
     assert.equal(times[1], times[0], 'it was asked for again');
     await context.close();
     await proxy.close();
-    await server.stop();
   });
 
   test('The controls come after the first picture, and are asked for again when they do not come', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     await ready(server);
     const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
     const page = await context.newPage();
@@ -369,11 +364,10 @@ export function addLinkTests(browser) {
       before,
     );
     await context.close();
-    await server.stop();
   });
 
   test('A link that brings nothing any more is not "up to date" for longer than a moment, and is left after three seconds', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const { page } = await openClient(browser, link.url);
     await settled(page);
@@ -405,11 +399,10 @@ export function addLinkTests(browser) {
     assert.match(await footer.innerText(), /up to date/);
     await page.close();
     await link.stop();
-    await server.stop();
   });
 
   test('After a cut the picture goes on without anything being sent again', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const link = await startLink(server.port);
     const { page, problems } = await openClient(browser, 'about:blank');
     let kinds = [];
@@ -448,6 +441,5 @@ export function addLinkTests(browser) {
     );
     await page.close();
     await link.stop();
-    await server.stop();
   });
 }

@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { demoServer, drawn, openClient, screenshot, settled, startServer, test } from './harness.mjs';
+import { startLink } from './link.mjs';
 
 /** A PLY file of vertices [x, y, z, red, green, blue] and triangles. */
 function writePly(file, vertices, triangles) {
@@ -152,7 +153,7 @@ export function addViewTests(browser, scratch) {
   });
 
   test('Which way is up is remembered for a scene, and its size is said', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page);
     const up = () => page.evaluate(() => [globalThis.spectra.store.upAxis, globalThis.spectra.viewport.pose.up]);
@@ -166,11 +167,10 @@ export function addViewTests(browser, scratch) {
     await page.getByRole('radio', { name: scene.up.toUpperCase().replace('-', '−'), exact: true }).click();
     assert.equal((await up())[0], scene.up);
     await page.close();
-    await server.stop();
   });
 
   test('Notes are shown, closed one by one and read again', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page);
     await page.evaluate(() => {
@@ -195,7 +195,6 @@ export function addViewTests(browser, scratch) {
     await all.getByRole('button', { name: 'Close the notes' }).click();
     assert.equal(await all.count(), 0);
     await page.close();
-    await server.stop();
   });
 
   test('Odd scenes and a tiny window show a clear state each', async () => {
@@ -320,7 +319,7 @@ export function addViewTests(browser, scratch) {
   });
 
   test('A lost graphics context is said, counted, and restored with everything', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page);
     await page.evaluate(() => globalThis.spectra.setBackground('#6b6d70'));
@@ -373,12 +372,11 @@ export function addViewTests(browser, scratch) {
       for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
     }
     await page.close();
-    await server.stop();
   });
 
   test('A threshold goes along to the other method, also beyond the data, and the scale and the palette say what they show', async () => {
-    const server = await startServer(['--demo']);
-    const { page } = await openClient(browser, server.url);
+    const link = await startLink((await demoServer()).port);
+    const { page } = await openClient(browser, link.url);
     await settled(page);
     const { max } = await page.evaluate(() => globalThis.spectra.store.scene.temperature);
     await page.locator('[data-method="monochrome_threshold"]').click();
@@ -412,7 +410,7 @@ export function addViewTests(browser, scratch) {
     // A wish that is not in force yet is marked at its control.
     await page.evaluate(() => globalThis.spectra.settings.setMethod('colour_mapped_threshold'));
     await settled(page);
-    await server.stop();
+    await link.stop();
     await page.getByText('Reconnecting', { exact: true }).waitFor();
     await field.fill('25');
     await field.press('Enter');
@@ -423,7 +421,7 @@ export function addViewTests(browser, scratch) {
   });
 
   test('The person is outlined where colours alone do not show it to everybody, and nothing is where that is off', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page, problems } = await openClient(browser, server.url);
     await settled(page);
     const state = () =>
@@ -498,7 +496,6 @@ export function addViewTests(browser, scratch) {
     assert.deepEqual([(await state()).marks, (await state()).isOutlined], [false, false]);
     assert.deepEqual(problems, []);
     await page.close();
-    await server.stop();
   });
 
   test('In a point cloud, highlights are outlined, marks are seen where they are, and points have a size of their own', async () => {
@@ -558,7 +555,7 @@ export function addViewTests(browser, scratch) {
   });
 
   test('A slow machine draws less while the camera moves, and everything at rest', async () => {
-    const server = await startServer(['--demo']);
+    const server = await demoServer();
     const { page } = await openClient(browser, server.url);
     await settled(page);
     const pose = await page.evaluate(() => globalThis.spectra.viewport.pose);
@@ -626,6 +623,5 @@ export function addViewTests(browser, scratch) {
       for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
     }
     await page.close();
-    await server.stop();
   });
 }
