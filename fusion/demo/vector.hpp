@@ -3,31 +3,13 @@
 #include <cmath>
 #include <cstdint>
 
+#include "fusion/base/vector.hpp"
+
 namespace spectra::demo {
 
 /// A point or direction in metres: x to the right, y up, z towards the viewer.
-struct Vec {
-  double x = 0, y = 0, z = 0;
-};
+using Vec = base::Vec3d;
 
-inline Vec operator+(Vec a, Vec b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-inline Vec operator-(Vec a, Vec b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-inline Vec operator*(Vec a, double s) {
-  return {a.x * s, a.y * s, a.z * s};
-}
-inline double dot(Vec a, Vec b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-inline Vec cross(Vec a, Vec b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline double length(Vec a) {
-  return std::sqrt(dot(a, a));
-}
 /// The unit vector along `a`; a zero vector stays zero.
 inline Vec normalised(Vec a) {
   const double l = length(a);

@@ -17,6 +17,7 @@
 #include "fusion/files/ply_values.hpp"
 #include "fusion/mesh/nearest_surface.hpp"
 #include "fusion/mesh/stray_points.hpp"
+#include "fusion/mesh/surface.hpp"
 
 namespace spectra::files {
 
@@ -155,13 +156,6 @@ std::string celsius_text(float celsius) {
   return number_text(std::round(static_cast<double>(celsius) * 10) / 10) + " degC";
 }
 
-double squared_distance(const base::Vec3f& a, const base::Vec3f& b) {
-  const double x = static_cast<double>(a.x) - static_cast<double>(b.x);
-  const double y = static_cast<double>(a.y) - static_cast<double>(b.y);
-  const double z = static_cast<double>(a.z) - static_cast<double>(b.z);
-  return x * x + y * y + z * z;
-}
-
 /// Vertices of the scene that are not where the thermal ones of the same number are, but for what a float in the coordinates of the file is
 /// rounded by; those farthest apart first.
 std::vector<std::uint32_t> moved_vertices(const mesh::MultispectralMesh& scene, std::span<const base::Vec3f> thermal) {
@@ -178,7 +172,8 @@ std::vector<std::uint32_t> moved_vertices(const mesh::MultispectralMesh& scene, 
     }
   }
   std::sort(moved.begin(), moved.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const double one = squared_distance(places[a], thermal[a]), other = squared_distance(places[b], thermal[b]);
+    const double one = mesh::squared_distance(places[a], thermal[a]),
+                 other = mesh::squared_distance(places[b], thermal[b]);
     return one != other ? one > other : a < b;
   });
   return moved;
@@ -194,10 +189,10 @@ bool is_in_order(const mesh::MultispectralMesh& scene, std::span<const base::Vec
   const std::size_t pace = std::max<std::size_t>(1, moved.size() / kOthers);
   for (std::size_t i = 0; i < moved.size(); i += i < kFarthest ? 1 : pace) {
     const base::Vec3f& place = places[moved[i]];
-    const double own = squared_distance(place, thermal[moved[i]]);
+    const double own = mesh::squared_distance(place, thermal[moved[i]]);
     constexpr double kClearly = 0.98;
     if (std::any_of(thermal.begin(), thermal.end(),
-                    [&](const base::Vec3f& p) { return squared_distance(place, p) < kClearly * own; })) {
+                    [&](const base::Vec3f& p) { return mesh::squared_distance(place, p) < kClearly * own; })) {
       return false;
     }
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fusion/base/vector.hpp"
+
 namespace spectra::mesh {
 
 namespace {
@@ -11,16 +13,6 @@ namespace {
 constexpr double kTinyShare = 1e-6;
 /// Half of what floats differ by at least, as a share of them, on two axes.
 constexpr double kFloatShare = 1.2e-7;
-
-base::Vec3d between(const base::Vec3f& from, const base::Vec3f& to) {
-  return {static_cast<double>(to.x) - static_cast<double>(from.x),
-          static_cast<double>(to.y) - static_cast<double>(from.y),
-          static_cast<double>(to.z) - static_cast<double>(from.z)};
-}
-
-base::Vec3d cross(const base::Vec3d& a, const base::Vec3d& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 }  // namespace
 
@@ -36,12 +28,12 @@ PolygonCutter::Result PolygonCutter::cut(std::span<const base::Vec3f> corners) {
 bool PolygonCutter::flatten(std::span<const base::Vec3f> corners) {
   base::Vec3d normal, largest;
   double largest_area = 0, size = 0, farthest = 0;
-  base::Vec3d last = between(corners[0], corners[1]);
+  base::Vec3d last = corners[1] - corners[0];
   for (const base::Vec3f& corner : corners) {
     for (const float coordinate : {corner.x, corner.y, corner.z}) {
       farthest = std::max(farthest, std::abs(static_cast<double>(coordinate)));
     }
-    const base::Vec3d edge = between(corners[0], corner);
+    const base::Vec3d edge = corner - corners[0];
     size = std::max({size, std::abs(edge.x), std::abs(edge.y), std::abs(edge.z)});
     const base::Vec3d area = cross(last, edge);
     normal = {normal.x + area.x, normal.y + area.y, normal.z + area.z};
@@ -61,7 +53,7 @@ bool PolygonCutter::flatten(std::span<const base::Vec3f> corners) {
   points_.clear();
   const double x = std::abs(along.x), y = std::abs(along.y), z = std::abs(along.z);
   for (const base::Vec3f& corner : corners) {
-    const base::Vec3d p = between(corners[0], corner);
+    const base::Vec3d p = corner - corners[0];
     if (z >= x && z >= y) {
       points_.push_back({along.z > 0 ? p.x : -p.x, p.y});
     } else if (x >= y) {

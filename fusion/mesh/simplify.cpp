@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "fusion/base/box.hpp"
+#include "fusion/base/vector.hpp"
 #include "fusion/mesh/heat_spots.hpp"
 
 namespace spectra::mesh {
@@ -34,24 +35,7 @@ constexpr double kLengthWeight = 1e-4;
 /// Triangles around a vertex into which others may be drawn: a hub of thousands would cost squares.
 constexpr std::size_t kMostAround = 128;
 
-struct Vector {
-  double x = 0, y = 0, z = 0;
-};
-Vector operator-(const Vector& a, const Vector& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-Vector operator+(const Vector& a, const Vector& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-Vector operator*(double factor, const Vector& a) {
-  return {factor * a.x, factor * a.y, factor * a.z};
-}
-double dot(const Vector& a, const Vector& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Vector cross(const Vector& a, const Vector& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+using Vector = base::Vec3d;
 
 /// A vertex as the quadrics see it: all in metres.
 struct Sight {
@@ -78,7 +62,7 @@ struct Quadric {
     yy += weight * n.y * n.y;
     yz += weight * n.y * n.z;
     zz += weight * n.z * n.z;
-    linear = linear + (weight * d) * n;
+    linear = linear + n * (weight * d);
     constant += weight * d * d;
   }
 
@@ -372,15 +356,15 @@ class Simplifier {
       const double area = doubled_area / 2;
       Quadric q;
       q.area = area;
-      const Vector unit = (1 / doubled_area) * n;
+      const Vector unit = n * (1 / doubled_area);
       q.add_plane(unit, -dot(unit, s[0]->position), area);
       // A needle spreads what it shows beyond all reason.
       const double shape = std::min(1.0, 3.46 * doubled_area / (dot(e1, e1) + dot(e2, e2) + dot(e3, e3)));
       const double weight = area * shape;
-      const Vector along1 = (1 / squared) * cross(e2, n), along2 = (1 / squared) * cross(n, e1);
+      const Vector along1 = cross(e2, n) * (1 / squared), along2 = cross(n, e1) * (1 / squared);
       const auto field = [&](std::size_t j, double field_weight) {
         const double a0 = s[0]->attribute[j];
-        const Vector g = (s[1]->attribute[j] - a0) * along1 + (s[2]->attribute[j] - a0) * along2;
+        const Vector g = along1 * (s[1]->attribute[j] - a0) + along2 * (s[2]->attribute[j] - a0);
         q.add_field(j, g, a0 - dot(g, s[0]->position), field_weight);
       };
       for (std::size_t j = 0; j < kTemperature; ++j) field(j, weight);
@@ -402,7 +386,7 @@ class Simplifier {
     const double length = std::sqrt(dot(outward, outward));
     if (!(length > 0)) return;
     Quadric q;
-    const Vector unit = (1 / length) * outward;
+    const Vector unit = outward * (1 / length);
     q.add_plane(unit, -dot(unit, sights_[a].position), dot(edge, edge));
     quadrics_[a].add(q);
     quadrics_[b].add(q);

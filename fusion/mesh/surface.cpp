@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fusion/base/box.hpp"
+#include "fusion/base/vector.hpp"
 
 namespace spectra::mesh {
 namespace {
@@ -14,22 +15,7 @@ namespace {
 using base::Triangle;
 using base::Vec3f;
 
-struct Vector {
-  double x = 0, y = 0, z = 0;
-};
-
-Vector operator-(const base::Vec3f& a, const base::Vec3f& b) {
-  return {static_cast<double>(a.x) - static_cast<double>(b.x), static_cast<double>(a.y) - static_cast<double>(b.y),
-          static_cast<double>(a.z) - static_cast<double>(b.z)};
-}
-
-double dot(const Vector& a, const Vector& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
-Vector cross(const Vector& a, const Vector& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+using Vector = base::Vec3d;
 
 double squared_distance_to_segment(const base::Vec3f& p, const base::Vec3f& a, const base::Vec3f& b) {
   const Vector ab = b - a, ap = p - a;

@@ -9,6 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include "fusion/base/vector.hpp"
+
 namespace spectra::stream {
 namespace {
 
@@ -19,31 +21,7 @@ constexpr double kViewMargin = 1.1;
 // A patch of a wrong colour that is so many pixels wide is seen as much as a surface that is one pixel away.
 constexpr double kDetailPixels = 2;
 
-struct Vector {
-  double x = 0, y = 0, z = 0;
-};
-
-Vector vector_of(const base::Vec3f& v) {
-  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-Vector operator-(const Vector& a, const Vector& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-Vector operator+(const Vector& a, const Vector& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-Vector operator*(const Vector& a, double factor) {
-  return {a.x * factor, a.y * factor, a.z * factor};
-}
-double dot(const Vector& a, const Vector& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Vector cross(const Vector& a, const Vector& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double length(const Vector& a) {
-  return std::sqrt(dot(a, a));
-}
+using Vector = base::Vec3d;
 
 double half_height_tangent(const Camera& camera) {
   return std::tan(camera.fov_y_deg * std::numbers::pi / 360);
@@ -51,8 +29,8 @@ double half_height_tangent(const Camera& camera) {
 
 // How far the box reaches along a direction, from the eye; negative when all of it lies behind.
 double reach(const Vector& direction, const Vector& eye, const base::Bounds& bounds) {
-  const Vector low = vector_of(bounds.min) - eye;
-  const Vector high = vector_of(bounds.max) - eye;
+  const Vector low = point_of(bounds.min) - eye;
+  const Vector high = point_of(bounds.max) - eye;
   return std::max(direction.x * low.x, direction.x * high.x) + std::max(direction.y * low.y, direction.y * high.y) +
          std::max(direction.z * low.z, direction.z * high.z);
 }
@@ -134,8 +112,8 @@ ViewTree::ViewTree(const map::SceneSnapshot& scene) {
 
 bool is_usable(const Camera& camera) {
   return is_finite(camera.eye) && is_finite(camera.target) && is_finite(camera.up) &&
-         length(vector_of(camera.target) - vector_of(camera.eye)) > 0 && camera.fov_y_deg > 0 &&
-         camera.fov_y_deg < 180 && camera.viewport[0] > 0 && camera.viewport[1] > 0;
+         length(point_of(camera.target) - point_of(camera.eye)) > 0 && camera.fov_y_deg > 0 && camera.fov_y_deg < 180 &&
+         camera.viewport[0] > 0 && camera.viewport[1] > 0;
 }
 
 double seen_error_m(const map::Tile& tile) {
@@ -156,10 +134,10 @@ double screen_error(const Camera& camera, const base::Bounds& bounds, double siz
 }
 
 bool may_be_in_view(const Camera& camera, const base::Bounds& bounds) {
-  const Vector eye = vector_of(camera.eye);
-  Vector forward = vector_of(camera.target) - eye;
+  const Vector eye = point_of(camera.eye);
+  Vector forward = point_of(camera.target) - eye;
   forward = forward * (1 / length(forward));
-  Vector right = cross(forward, vector_of(camera.up));
+  Vector right = cross(forward, point_of(camera.up));
   if (length(right) < 1e-6) right = cross(forward, std::abs(forward.x) < 0.9 ? Vector{1, 0, 0} : Vector{0, 1, 0});
   right = right * (1 / length(right));
   const Vector up = cross(right, forward);
