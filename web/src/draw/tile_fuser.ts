@@ -13,9 +13,9 @@ export class TileFuser {
     this.#module = FusionModule.start(module);
   }
 
+  /** Of those that were set with others colours go on to be made, until settings are set again. */
   setFacts(facts: SceneFacts): void {
     this.#module.setFacts(facts);
-    this.#isReady = false;
   }
 
   /** Settings as a whole, for the facts that were set. */

@@ -131,6 +131,85 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(diary.slice(-4)).toEqual(['fuse', 'here', 'shown thermal_visible_blend', 'subscribe temperature+visible']);
   });
 
+  it('stays when it is wanted again before the robot has brought its colours, and leaves for good when it is not', async () => {
+    const { store, fusing, counts, diary, asked } = await here();
+    const before = asked.length;
+    for (let i = 0; i < 2; i += 1) {
+      fusing.setWish('robot');
+      expect(diary.at(-1)).toBe('subscribe fused');
+      fusing.setWish('here');
+      expect(diary.slice(-4)).toEqual(['fuse', 'here', 'shown thermal_visible_blend', 'subscribe temperature+visible']);
+      fusing.completed(0);
+      expect(store.fusingPlace).toBe('here');
+    }
+    expect(asked).toHaveLength(before);
+    // Not where something has come without raw layers meanwhile.
+    fusing.setWish('robot');
+    counts.drawn = 3;
+    fusing.setWish('here');
+    expect([diary.at(-1), store.fusingPlace]).toEqual(['subscribe fused', 'here']);
+    fusing.setWish('robot');
+    fusing.completed(0);
+    expect([diary.slice(-3), store.fusingPlace]).toEqual([['not here', 'fuse nothing', 'left to robot'], 'robot']);
+  });
+
+  it('stays when the next setting can be made here, as long as the robot is not wanted', async () => {
+    const { store, fusing, diary } = await here();
+    const robots = { ...FUSION, method: 'thermal_change', params: {} };
+    expect(fusing.apply(robots)).toBeNull();
+    expect(diary.at(-1)).toBe('subscribe fused');
+    expect(fusing.apply(FUSION)).not.toBeNull();
+    expect(diary.slice(-3)).toEqual(['here', 'subscribe temperature+visible', 'shown thermal_visible_blend']);
+    fusing.completed(0);
+    expect(store.fusingPlace).toBe('here');
+    fusing.setWish('robot');
+    expect(fusing.apply(FUSION)).not.toBeNull();
+    expect(fusing.channels).toEqual(['fused']);
+  });
+
+  it('does not leave before the robot has brought what is set now', async () => {
+    const { store, fusing } = await here();
+    fusing.setWish('robot');
+    store.generation = 4;
+    fusing.completed(3);
+    expect(store.fusingPlace).toBe('here');
+    fusing.completed(4);
+    expect(store.fusingPlace).toBe('robot');
+  });
+
+  it('decides at once on a new connection whether it stays', async () => {
+    const { store, fusing, diary } = await here();
+    fusing.setWish('robot');
+    store.link = { phase: 'lost' } as never;
+    fusing.setWish('here');
+    store.link = { phase: 'open' };
+    fusing.greeted(['raw_layers']);
+    expect([store.fusingPlace, fusing.channels]).toEqual(['here', ['temperature', 'visible']]);
+    store.link = { phase: 'lost' } as never;
+    store.wanted = { method: 'thermal_change' };
+    store.link = { phase: 'open' };
+    fusing.greeted(['raw_layers']);
+    expect([store.fusingPlace, fusing.channels]).toEqual(['here', ['fused']]);
+    store.link = { phase: 'lost' } as never;
+    store.link = { phase: 'open' };
+    fusing.greeted([]);
+    expect([store.fusingPlace, fusing.channels]).toEqual(['robot', ['fused']]);
+    expect(diary).toContain('fuse nothing');
+  });
+
+  it('gives the library each of the settings once, however often it is looked at', async () => {
+    const { FusionModule } = await import('../fusion/fusion_module');
+    const { store, fusing } = await here();
+    const change = vi.spyOn(FusionModule.prototype, 'change');
+    const wanted = { ...FUSION, params: { alpha: 0.7 } };
+    const inForce = fusing.apply(wanted);
+    expect(change).toHaveBeenCalledTimes(1);
+    store.fusionInForce = inForce;
+    for (let i = 0; i < 10; i += 1) expect([fusing.leftToRobot, fusing.consider()]).toEqual([null, undefined]);
+    expect(change).toHaveBeenCalledTimes(2);
+    change.mockRestore();
+  });
+
   it('makes plans as the robot does', async () => {
     const { fusing } = await here();
     const wanted = { ...FUSION, method: 'histogram_distribution', params: { k: 2, alpha: 1, invert: false } };
@@ -256,7 +335,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     const { store, fusing, counts, diary } = await here();
     store.fusionInForce = { ...FUSION, method: 'thermal_change' };
     fusing.consider();
-    fusing.completed();
+    fusing.completed(0);
     expect(store.fusingPlace).toBe('robot');
     expect(fusing.apply(FUSION)).toBeNull();
     store.link = { phase: 'lost' } as never;
@@ -297,10 +376,10 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(diary.at(-1)).toBe('subscribe fused');
     expect(store.fusingPlace).toBe('here');
     busy.settings = true;
-    fusing.completed();
+    fusing.completed(0);
     expect(store.fusingPlace).toBe('here');
     busy.settings = false;
-    fusing.completed();
+    fusing.completed(0);
     expect(store.fusingPlace).toBe('robot');
     expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'left to robot']);
   });
@@ -314,7 +393,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect(fusing.apply(wanted)).toBeNull();
     expect(diary.at(-1)).toBe('subscribe fused');
     store.fusionInForce = wanted;
-    fusing.completed();
+    fusing.completed(0);
     expect(store.fusingPlace).toBe('robot');
     expect(diary.slice(-3)).toEqual(['not here', 'fuse nothing', 'left to robot']);
     expect(store.fusingProblem).toBeNull();
@@ -408,12 +487,28 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     expect([count, store.fusingProblem]).toEqual([2, null]);
   });
 
+  it('gives up a robot that stays busy, and says so', async () => {
+    vi.useFakeTimers();
+    const busy = new RpcError({ code: BUSY, message: 'busy', data: { field: '', reason: 'busy' } });
+    const { store, fusing, asked } = setUp({ answer: () => Promise.reject(busy) });
+    fusing.consider();
+    await vi.advanceTimersByTimeAsync(LONGEST_PAUSE_MS - 1000);
+    expect(store.fusingProblem).toBeNull();
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(store.fusingProblem).toContain('too busy');
+    expect(fusing.channels).toEqual(['fused']);
+    const before = asked.length;
+    await vi.advanceTimersByTimeAsync(LONGEST_PAUSE_MS);
+    expect(asked).toHaveLength(before);
+    vi.useRealTimers();
+  });
+
   it('leaves a method that the library does not know to the robot, and says so until it knows it', async () => {
     const { store, fusing, diary } = await here();
     store.fusionInForce = { ...FUSION, method: 'of_tomorrow', params: {} };
     expect(fusing.apply(store.fusionInForce)).toBeNull();
     expect(diary.at(-1)).toBe('subscribe fused');
-    fusing.completed();
+    fusing.completed(0);
     expect(store.fusingPlace).toBe('robot');
     expect(fusing.leftToRobot).toBe("Here method 'of_tomorrow' is unknown.");
     for (const unknown of [{ palette: 'of_tomorrow' }, { params: { alpha: 0.5, beta: 1 } }]) {
@@ -453,7 +548,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     fusing.drawerHasFailed('it broke');
     expect(diary.slice(-2)).toEqual(['behind', 'subscribe fused']);
     expect(fusing.apply(FUSION)).toBeNull();
-    fusing.completed();
+    fusing.completed(0);
     fusing.setWish('here');
     expect(modules()).toBe(3);
   });

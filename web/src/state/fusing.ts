@@ -97,6 +97,8 @@ export class Fusing {
   /** The coarsest in which temperatures of the picture have come, and of which scene, and which span of it, that was. */
   #step_celsius = 0;
   #stepOf = { scene: '', span_celsius: Infinity };
+  /** Settings that the planner has, and why it does not take them; null: it does. */
+  #given: { fusion: Fusion; error: unknown } | null = null;
   /** In which temperatures are asked for; it only gets finer. */
   #asked_celsius = USUAL_STEP_CELSIUS;
 
@@ -137,8 +139,11 @@ export class Fusing {
   /** A new connection, whose scene is known. */
   greeted(capabilities: readonly string[]): void {
     this.#isOfferedRaw = capabilities.includes('raw_layers');
+    // What is shown is made here, as long as nothing else comes; before anything is asked for it is decided anew whether that is to go on.
     this.#isLeaving = false;
+    this.#wantsRaw ||= this.isHere;
     if (!this.#isOfferedRaw && this.#wantsRaw) this.#leaveAtOnce();
+    if (this.isHere) this.consider();
     if (this.#wantsRaw) this.factsChanged();
   }
 
@@ -181,9 +186,9 @@ export class Fusing {
     } else this.#leaveAtOnce();
   }
 
-  /** All that was asked for of the robot is in the picture. */
-  completed(): void {
-    if (this.#isLeaving && !this.events.isBusy()) {
+  /** All that was asked for of the robot, in the settings of this generation, is in the picture. */
+  completed(generation: number): void {
+    if (this.#isLeaving && generation >= this.store.generation && !this.events.isBusy()) {
       this.#isLeaving = false;
       this.#leaveAtOnce();
     }
@@ -208,6 +213,12 @@ export class Fusing {
     if (!this.#isWanted()) {
       if (this.isHere) this.#leave();
       else if (this.#wantsRaw) this.#leaveAtOnce();
+      return;
+    }
+    if (this.#isLeaving) {
+      // Wanted again before the robot has brought its colours.
+      const isReady = store.hasFusingLibrary && this.#facts !== null && counts.raw === counts.drawn;
+      if (isReady && store.wanted === null && store.fusion !== null) this.#enter(store.fusion);
       return;
     }
     const isFiner = this.#asksFiner();
@@ -242,14 +253,19 @@ export class Fusing {
     if (!this.isHere && !this.#isAllHereWithoutLink()) return null;
     try {
       const change = wholeChange(wanted);
-      const inForce = this.#left(wanted) === null ? this.#planned(wanted, change) : null;
-      if (this.#left(inForce ?? wanted) !== null) {
+      const isLeft = this.#left(wanted) !== null;
+      const inForce = isLeft ? null : this.#planned(wanted);
+      if (isLeft || (inForce !== null && this.#leftToRobot(inForce) !== null)) {
         this.#leave();
         return null;
       }
       if (inForce === null) return null;
       this.picture.fuse(change);
       if (!this.isHere) this.#stay();
+      else if (this.#isLeaving && this.#isWanted() && this.#isAllHere()) {
+        this.#stay();
+        this.events.resubscribe();
+      }
       this.events.onShown(wanted.method);
       return inForce;
     } catch (error) {
@@ -279,13 +295,22 @@ export class Fusing {
   /** Of a robot that has more than the library here. */
   #unknown(fusion: Fusion): string | null {
     if (!this.store.hasFusingLibrary || this.#planner === null) return null;
-    try {
-      this.#planner.resetSettings();
-      this.#planner.change(wholeChange(fusion));
-    } catch (error) {
-      if (error instanceof FusionRefusal && UNKNOWN.includes(error.code)) return `Here ${error.message.split(';')[0]!}.`;
+    const error = this.#give(this.#planner, fusion);
+    return error instanceof FusionRefusal && UNKNOWN.includes(error.code) ? `Here ${error.message.split(';')[0]!}.` : null;
+  }
+
+  /** Returns why the planner does not take these settings; null: it has them. */
+  #give(planner: FusionModule, fusion: Fusion): unknown {
+    if (this.#given?.fusion !== fusion) {
+      this.#given = { fusion, error: null };
+      try {
+        planner.resetSettings();
+        planner.change(wholeChange(fusion));
+      } catch (error) {
+        this.#given.error = error;
+      }
     }
-    return null;
+    return this.#given.error;
   }
 
   #leftToRobot({ method, age, range }: Fusion): string | null {
@@ -334,10 +359,10 @@ export class Fusing {
   }
 
   /** The settings in force, with what the library makes of what is automatic; null when the robot has to make them. */
-  #planned(wanted: Fusion, change: FusionChange): Fusion | null {
+  #planned(wanted: Fusion): Fusion | null {
     const planner = this.#planner!;
-    planner.resetSettings();
-    planner.change(change);
+    const error = this.#give(planner, wanted);
+    if (error !== null) throw error;
     const lacking = planner.prepare();
     if (lacking !== null) {
       this.#lacks(lacking);
@@ -356,10 +381,9 @@ export class Fusing {
   }
 
   #enter(fusion: Fusion): void {
-    const change = wholeChange(fusion);
     try {
-      if (this.#planned(fusion, change) === null) return;
-      this.picture.fuse(change);
+      if (this.#planned(fusion) === null) return;
+      this.picture.fuse(wholeChange(fusion));
     } catch (error) {
       this.failed(messageOf(error));
       return;
@@ -370,6 +394,7 @@ export class Fusing {
   }
 
   #stay(): void {
+    this.#isLeaving = false;
     this.#wantsRaw = true;
     this.store.fusingPlace = 'here';
     this.tiles.setHere(true);
@@ -377,8 +402,12 @@ export class Fusing {
 
   /** The link is lost while the robot made the colours, and all that is drawn could be fused here. */
   #isAllHereWithoutLink(): boolean {
+    return !this.store.connected && this.#isAllHere();
+  }
+
+  #isAllHere(): boolean {
     const { drawn, raw } = this.tiles.rawCounts(this.#asked_celsius);
-    return !this.store.connected && drawn > 0 && raw === drawn;
+    return drawn > 0 && raw === drawn;
   }
 
   /** The robot makes colours again; until they are there what is here is shown, in the same settings. */
@@ -405,7 +434,7 @@ export class Fusing {
   }
 
   #load(): void {
-    if (this.#compiled !== null) this.#give(this.#compiled);
+    if (this.#compiled !== null) this.#startDrawer(this.#compiled);
     if (this.#isLoading || this.#compiled !== null) return;
     this.#isLoading = true;
     // Nothing of it belongs to the first picture.
@@ -413,7 +442,7 @@ export class Fusing {
       .then(async ([compiled, { FusionModule }]) => {
         this.#planner = await FusionModule.instantiate(compiled);
         this.#compiled = compiled;
-        this.#give(compiled);
+        this.#startDrawer(compiled);
         this.#spread();
       })
       .catch((error: unknown) => this.failed(`The library for fusing here could not be loaded: ${messageOf(error)}`))
@@ -422,7 +451,7 @@ export class Fusing {
       });
   }
 
-  #give(compiled: WebAssembly.Module): void {
+  #startDrawer(compiled: WebAssembly.Module): void {
     if (this.#isGiven) return;
     this.#isGiven = true;
     this.picture.startFusing(compiled);
@@ -494,7 +523,7 @@ export class Fusing {
   }
 
   async #factsOf(bins: number): Promise<Facts> {
-    for (;;) {
+    for (const start = performance.now(); ;) {
       try {
         return factsReply(
           await this.events.request('fusion.facts', { bins, ...(bins === BINS ? { hues: true } : {}) }),
@@ -502,6 +531,7 @@ export class Fusing {
         );
       } catch (error) {
         if (!(error instanceof RpcError) || error.code !== BUSY) throw error;
+        if (performance.now() - start > LONGEST_PAUSE_MS) throw new Error('The robot is too busy to say what it has counted.');
         await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
       }
     }

@@ -15,7 +15,7 @@ import {
 } from '../protocol/messages';
 import type { Insets, UpAxis, View } from '../view/first_view';
 import { FrameIntake } from '../tiles/frame_intake';
-import { RawMismatch, TileSet } from '../tiles/tile_set';
+import { TileSet } from '../tiles/tile_set';
 import { FIELD_OF_VIEW_DEG, Viewport, type ViewportEvents } from '../view/viewport';
 import { mustLogIn } from '../transport/access';
 import { CatalogueLoader } from '../transport/catalogue_loader';
@@ -149,6 +149,7 @@ export class Session {
         else this.#firstColours = rgba.slice();
       },
       onProblem: say,
+      onRawProblem: (message) => this.fusing.failed(message),
     });
     const expectation = new Expectation(store, this.tiles);
     this.#connection = new Connection(
@@ -450,7 +451,7 @@ export class Session {
     this.#markers.update();
     this.readings.pictureIsOf(message.scene_revision, this.viewport.nextPicture);
     // What is not made here any more is not waited for.
-    this.fusing.completed();
+    this.fusing.completed(message.generation);
     this.#progress.completed(message, this.viewport.nextPicture);
   }
 
@@ -505,7 +506,6 @@ export class Session {
 
   #say(error: unknown): void {
     if (error instanceof ConnectionLost || error instanceof Superseded) return;
-    if (error instanceof RawMismatch) this.fusing.failed(error.message);
     const message = error instanceof Error ? error.message : String(error);
     console.warn(message);
     this.store.failure = message;

@@ -375,6 +375,78 @@ describe('Settings that are fused here', () => {
     expect(asked.at(-1)?.change.method).toBe('blend');
   });
 
+  it('are told before what the server has to show after them', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere((wanted) => (wanted.method === 'robots' ? null : shownBy(wanted)));
+    settings.setMethod('other');
+    settings.setMethod('third');
+    settings.setPalette('grey');
+    settings.setMethod('robots');
+    await vi.advanceTimersByTimeAsync(3000);
+    expect(asked.map(({ change }) => change)).toEqual([
+      { method: 'other' },
+      { method: 'third', palette: 'grey' },
+      { method: 'robots' },
+    ]);
+    await asked[0]?.answer(1, fusionWith(0.4, 'other'));
+    await asked[1]?.answer(2, fusionWith(0.4, 'third'));
+    expect(store.fusion?.method).toBe('robots');
+    await asked[2]?.answer(3, fusionWith(0.4, 'robots'));
+    expect([store.fusionInForce?.method, store.generation, settings.busy]).toEqual(['robots', 3, false]);
+  });
+
+  it('stay in force when the server answers what was asked of it before', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere((wanted) => (wanted.method === 'robots' ? null : shownBy(wanted)));
+    settings.setMethod('robots');
+    settings.setMethod('other');
+    await asked[0]?.answer(1, fusionWith(0.4, 'robots'));
+    expect([store.fusion?.method, store.generation, settings.methodOf(1)]).toEqual(['other', 1, 'robots']);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(asked.map(({ change }) => change.method)).toEqual(['robots', 'other']);
+    await asked[1]?.answer(2, fusionWith(0.4, 'other'));
+    expect([store.fusion?.method, store.generation, settings.busy]).toEqual(['other', 2, false]);
+  });
+
+  it('take along what waits to be sent, which is not sent after them', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere((wanted) => (wanted.age?.mode === 'fade' ? null : shownBy(wanted)));
+    settings.setAge({ mode: 'fade', half_life_s: 60 }, false);
+    settings.setAge({ half_life_s: 90 }, false);
+    settings.setAge({ mode: 'off' }, false);
+    await vi.advanceTimersByTimeAsync(3000);
+    expect(asked.map(({ change }) => change.age)).toEqual([
+      { mode: 'fade', half_life_s: 60 },
+      { mode: 'off', half_life_s: 90 },
+    ]);
+  });
+
+  it('are told as a whole to a server that was too busy, whichever came meanwhile', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere(shownBy);
+    settings.setParameter('alpha', 0.6, true);
+    settings.setParameter('alpha', 0.7, true);
+    await asked[0]?.refuse(refusal('', 'too fast', BUSY));
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(asked.at(-1)?.change).toMatchObject({ method: 'blend', params: { alpha: 0.7 }, palette: 'iron' });
+    expect(asked).toHaveLength(2);
+    // And by the other way.
+    await asked[1]?.answer(1, fusionWith(0.7));
+    fuseHere(() => null);
+    settings.setPalette('grey');
+    fuseHere(shownBy);
+    settings.setParameter('alpha', 0.8, true);
+    await asked[2]?.refuse(refusal('', 'too fast', BUSY));
+    await vi.advanceTimersByTimeAsync(2000);
+    await asked[3]?.answer(2, fusionWith(0.8));
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(asked.at(-1)?.change).toMatchObject({ params: { alpha: 0.8 }, palette: 'grey' });
+  });
+
   it('are in force without a link, and in the picture when that has been drawn', () => {
     const { store, settings, asked, fuseHere } = setUp();
     store.pictureMethod = 'before';

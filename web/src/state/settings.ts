@@ -54,6 +54,8 @@ export class Settings {
   #hasChosen = false;
   /** By generation, of this connection. */
   readonly #methodOf = new Map<number, string>();
+  /** How many settings have been shown here. */
+  #countHere = 0;
   /** A change went under with its connection: it is still wanted, and is sent with the rest when there is another one. */
   #hasUnanswered = false;
 
@@ -195,14 +197,19 @@ export class Settings {
 
   /** Sends a change at once and takes in the answer; never rejects. */
   async send(change: FusionChange): Promise<void> {
+    const { store } = this;
+    const count = this.#countHere;
     try {
-      const answer = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
-      this.inForce(answer.generation, answer.fusion);
+      const { generation, fusion } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      // What is shown here since is what is set.
+      if (count === this.#countHere) this.inForce(generation, fusion);
+      else this.#isTold(generation, fusion);
     } catch (error) {
       if (error instanceof RpcError && error.code === BUSY) {
         // Too fast for the server, not wrong: the newest wish is still to be told.
         await new Promise((resolve) => setTimeout(resolve, BUSY_WAIT_MS));
-        if (this.store.connected) this.#sender.push(this.store.wanted ?? change);
+        if (store.connected && count === this.#countHere) this.#sender.push(store.wanted ?? change);
+        else if (store.connected) this.#tellAll();
       } else if (error instanceof RpcError) this.refused(error, change);
       else if (error instanceof ConnectionLost) this.#hasUnanswered = true;
       else this.session.onProblem(error);
@@ -232,6 +239,9 @@ export class Settings {
     store.wanted = store.wanted === null ? change : mergedChange(store.wanted, change);
     store.refusals = {};
     if (this.#isShownHere(change) || !store.connected) return;
+    // The server hears of what was shown before in its turn.
+    const untold = this.#teller.take();
+    if (untold !== undefined) void this.#tell(untold);
     this.session.onChange();
     this.#sender.push(change);
     if (isSettled) this.#sender.flush();
@@ -254,18 +264,31 @@ export class Settings {
       return true;
     }
     store.wanted = null;
-    if (store.connected) this.#teller.push(change);
+    this.#countHere += 1;
+    const unsent = this.#sender.take();
+    if (store.connected) this.#teller.push(unsent === undefined ? change : mergedChange(unsent, change));
     return true;
+  }
+
+  /** Whatever the server knows of it. */
+  #tellAll(): void {
+    const { fusion } = this.store;
+    if (fusion !== null) this.#teller.push(wholeChange(fusion));
+  }
+
+  #isTold(generation: number, fusion: Fusion): void {
+    this.#methodOf.set(generation, fusion.method);
+    this.store.generation = Math.max(this.store.generation, generation);
   }
 
   /** The server keeps up with what is shown here; what it answers is known already. */
   async #tell(change: FusionChange): Promise<void> {
     try {
       const { generation, fusion } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
-      this.#methodOf.set(generation, fusion.method);
-      this.store.generation = Math.max(this.store.generation, generation);
+      this.#isTold(generation, fusion);
     } catch (error) {
-      if (error instanceof RpcError && error.code === BUSY) this.#teller.push(change);
+      // It may have heard of others meanwhile.
+      if (error instanceof RpcError && error.code === BUSY) this.#tellAll();
       else if (error instanceof RpcError) this.refused(error, change);
       else this.session.onProblem(error);
     }

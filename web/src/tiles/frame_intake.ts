@@ -18,6 +18,8 @@ export interface FrameIntakeEvents {
   onWholeColours: (rgba: Uint8Array) => void;
   /** A frame that could not be decoded, or does not fit to the others; it is left out. */
   onProblem: (error: unknown) => void;
+  /** The same of a raw layer. */
+  onRawProblem: (message: string) => void;
 }
 
 /** The way of tile frames from the connection through the decoder into the tile set. */
@@ -38,7 +40,7 @@ export class FrameIntake {
     private readonly events: FrameIntakeEvents,
   ) {
     this.#acknowledger = new Acknowledger(events.onDecoded);
-    this.#arrivals = new Arrivals(tiles, events.onProblem);
+    this.#arrivals = new Arrivals(tiles, (error) => this.#failed(error));
   }
 
   /** Frames count from 1 again, and what is still on its way from the connection before is not wanted any more. */
@@ -113,6 +115,11 @@ export class FrameIntake {
     return { bytes, next_ms, complete: last.message };
   }
 
+  #failed(error: unknown): void {
+    if (error instanceof RawMismatch) this.events.onRawProblem(error.message);
+    else this.events.onProblem(error);
+  }
+
   #decode(key: string, frame: TileFrame, job: DecodeJob): void {
     const connectionNumber = this.#connectionNumber;
     this.pool
@@ -127,7 +134,7 @@ export class FrameIntake {
       .catch((error: unknown) => {
         if (error instanceof Superseded) return;
         const isRaw = job.kind === 'temperature' || job.kind === 'visible';
-        this.events.onProblem(isRaw ? new RawMismatch(`tile ${tileKey(frame.tile)}: ${messageOf(error)}`) : error);
+        this.#failed(isRaw ? new RawMismatch(`tile ${tileKey(frame.tile)}: ${messageOf(error)}`) : error);
       })
       .finally(() => {
         if (connectionNumber === this.#connectionNumber) this.#acknowledger.finished(frame.sequence);

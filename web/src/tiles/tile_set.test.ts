@@ -654,6 +654,23 @@ describe('TileSet, raw layers', () => {
     expect(next.raw).not.toBeNull();
   });
 
+  it('of an earlier revision that are decoded late take nothing of a later one away, nor do its colours or its geometry', () => {
+    add(root);
+    const temperature = { kind: 'temperature', codes: new Uint16Array(3), scale: 0.01, offset: 20 } as const;
+    const visible = { kind: 'visible', rgb: new Uint8Array(9) } as const;
+    tiles.addRaw(rawFrame(root, { revision: 3 }), temperature);
+    tiles.addRaw(rawFrame(root, { revision: 2 }), visible);
+    tiles.addRaw(rawFrame(root, { revision: 3 }), visible);
+    tiles.addGeometry(frame(root, { revision: 3 }), geometry());
+    tiles.addGeometry(frame(root, { revision: 2 }), geometry());
+    tiles.addColours(frame(root, { revision: 3 }), colours(3));
+    expect(made.at(-1)).toMatchObject({ shade: 3, raw: { scale: 0.01 } });
+    tiles.addColours(frame(root, { revision: 5 }), colours(5));
+    tiles.addColours(frame(root, { revision: 4 }), colours(4));
+    tiles.addGeometry(frame(root, { revision: 5 }), geometry());
+    expect(made.at(-1)).toMatchObject({ shade: 5 });
+  });
+
   it('that do not fit are refused', () => {
     add(root);
     const codes = new Uint16Array(4);

@@ -341,6 +341,7 @@ export class TileSet {
     this.#setChildMask(node, frame.child_mask);
     const { shown } = node;
     if (shown !== null && !this.#isStale(shown) && frame.revision < shown.revision) return;
+    if (isOlder(frame, node.waitingGeometry)) return;
     const error: DrawnError = {
       // Rounding moves a vertex by half a step along each of three axes at most.
       position_m: frame.geometric_error_m + (frame.position_step_m / 2) * Math.sqrt(3),
@@ -358,6 +359,7 @@ export class TileSet {
     this.#setChildMask(node, frame.child_mask);
     const { waitingColours, received } = node;
     received.colours = Math.max(received.colours, frame.bytes);
+    if (isOlder(frame, waitingColours)) return;
     if (waitingColours !== null && waitingColours.revision === frame.revision && waitingColours.generation > frame.generation)
       return;
     node.waitingColours = { revision: frame.revision, generation: frame.generation, sequence: frame.sequence, rgba };
@@ -374,6 +376,7 @@ export class TileSet {
     const node = this.#node(frame.tile);
     this.#setChildMask(node, frame.child_mask);
     node.received[layer.kind] = frame.bytes;
+    if (isOlder(frame, node.waitingRaw)) return;
     if (node.waitingRaw?.revision !== frame.revision) {
       node.waitingRaw = { revision: frame.revision, temperature: null, visible: null };
     }
@@ -800,6 +803,11 @@ function stepsOf({ codes, scale, offset }: DecodedTemperature): Pick<Shown, 'raw
   const farthest = Math.max(Math.abs(lowest * scale + offset), Math.abs(highest * scale + offset));
   // A span has room for so many steps, and a 32-bit float for such ones.
   return { rawStep_celsius: scale, finestStep_celsius: Math.max(((highest - lowest + 1) * scale) / 65000, farthest * 2 ** -22) };
+}
+
+/** Decoded after what has come of a newer revision, with which it has nothing to do. */
+function isOlder({ revision }: TileFrame, waiting: { revision: number } | null): boolean {
+  return waiting !== null && revision < waiting.revision;
 }
 
 function octantOf(id: TileId): number {

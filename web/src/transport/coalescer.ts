@@ -43,6 +43,14 @@ export class Coalescer<T> {
     this.#pump();
   }
 
+  /** What waits; it is not sent any more. */
+  take(): T | undefined {
+    const pending = this.#pending;
+    this.#pending = undefined;
+    this.#urgent = false;
+    return pending;
+  }
+
   /** Forgets everything: the connection it was meant for is gone. Returns the change that had not been sent. */
   reset(): T | undefined {
     const pending = this.#pending;
