@@ -1,10 +1,11 @@
 #include "server/sources/block_options.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
+
+#include "fusion/files/ply_values.hpp"
 
 namespace spectra::sources {
 namespace {
@@ -83,12 +84,6 @@ base::Result<void> read_field(IncomingBlock& block, const std::string& name, con
   return base::success();
 }
 
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end};
-}
-
 }  // namespace
 
 std::optional<std::string> repeated_field(const std::vector<std::pair<std::string, std::string>>& query) {
@@ -114,10 +109,10 @@ std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptio
       query.emplace_back("temperature_unit", name);
     }
   }
-  if (read.temperature_scale) query.emplace_back("temperature_scale", number_text(*read.temperature_scale));
-  if (read.temperature_offset) query.emplace_back("temperature_offset", number_text(*read.temperature_offset));
-  for (const double value : read.no_data) query.emplace_back("no_data", number_text(value));
-  if (read.metres_per_unit) query.emplace_back("scale", number_text(*read.metres_per_unit));
+  if (read.temperature_scale) query.emplace_back("temperature_scale", files::number_text(*read.temperature_scale));
+  if (read.temperature_offset) query.emplace_back("temperature_offset", files::number_text(*read.temperature_offset));
+  for (const double value : read.no_data) query.emplace_back("no_data", files::number_text(value));
+  if (read.metres_per_unit) query.emplace_back("scale", files::number_text(*read.metres_per_unit));
   if (read.up) query.emplace_back("up", base::to_string(*read.up));
   return query;
 }

@@ -1,5 +1,5 @@
 /** The ends of a scale of temperatures, where it has some. */
-export type Ends = { min: number | null; max: number | null } | undefined;
+export type Ends = { min?: number | null | undefined; max?: number | null | undefined } | undefined;
 
 /** How many decimals tell temperatures of every one of these scales apart: a hundredth of the narrowest; never less than one. */
 export function decimalsOf(...scales: Ends[]): number {

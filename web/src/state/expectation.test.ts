@@ -12,7 +12,7 @@ describe('Expectation', () => {
     server: { capabilities: ['temperature_sigma'] },
   } as unknown as What;
   const isMuch = (change: Partial<What>, lacking = 0) =>
-    new Expectation({ ...quiet, ...change }, { lackingSigma: () => lacking }).isMuch;
+    new Expectation({ ...quiet, ...change }, { lackingSigma: () => lacking }).isMuch();
 
   it.each([
     ['the picture', { settled: false }],
@@ -34,15 +34,15 @@ describe('Expectation', () => {
     let now = 100_000;
     let lacking = 3;
     const expectation = new Expectation({ ...quiet, hatchAbove_kelvin: 0.5 }, { lackingSigma: () => lacking }, () => now);
-    expect(expectation.isMuch).toBe(true);
+    expect(expectation.isMuch()).toBe(true);
     now += 29_000;
     lacking = 2;
-    expect(expectation.isMuch).toBe(true);
+    expect(expectation.isMuch()).toBe(true);
     now += 29_000;
-    expect(expectation.isMuch).toBe(true);
+    expect(expectation.isMuch()).toBe(true);
     now += 2_000;
-    expect(expectation.isMuch).toBe(false);
+    expect(expectation.isMuch()).toBe(false);
     lacking = 1;
-    expect(expectation.isMuch).toBe(true);
+    expect(expectation.isMuch()).toBe(true);
   });
 });

@@ -17,7 +17,7 @@ export class Expectation {
     private readonly now: () => number = () => performance.now(),
   ) {}
 
-  get isMuch(): boolean {
+  isMuch(): boolean {
     const { settled, fusingPlace, methods } = this.store;
     return !settled || fusingPlace === 'coming' || methods.length === 0 || this.#isSigmaComing();
   }

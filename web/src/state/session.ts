@@ -168,7 +168,7 @@ export class Session {
           // A refused upgrade looks like a broken link to a page.
           if (state.phase === 'waiting') void mustLogIn().then((must) => must && location.replace('./login'));
         },
-        expectsMuch: () => expectation.isMuch,
+        expectsMuch: () => expectation.isMuch(),
         onProtocolError: (error) => console.warn('left out:', error.message),
         onRoundTrip: (round_trip_ms) => {
           const before = store.round_trip_ms;

@@ -16,6 +16,11 @@ describe('wishWords', () => {
     ]);
   });
 
+  it('tells the ends of a narrow range apart', () => {
+    const words = wishWords({ range: { mode: 'manual', min: 20.11, max: 20.14 } }, methods, [], 'blend');
+    expect(plain(words)).toEqual(['range 20.110 °C to 20.140 °C']);
+  });
+
   it('says what is asked for, setting by setting', () => {
     const words = wishWords(
       {

@@ -1,4 +1,5 @@
 import type { FusionChange, Method, Palette } from '../protocol/messages';
+import { decimalsOf } from '../state/decimals';
 import { celsius, figures } from './format';
 
 /** What a change asks for, in words: one entry a setting. */
@@ -28,8 +29,10 @@ export function wishWords(
   if (palette !== undefined) words.push(`palette ${palettes.find(({ id }) => id === palette)?.label ?? palette}`);
   if (change.range !== undefined) {
     const { mode, min, max, low, high } = change.range;
-    if (mode === 'manual') words.push(`range ${celsius(min)} to ${celsius(max)}`);
-    else if (mode === 'auto') words.push('range to the extremes');
+    if (mode === 'manual') {
+      const decimals = decimalsOf({ min, max });
+      words.push(`range ${celsius(min, decimals)} to ${celsius(max, decimals)}`);
+    } else if (mode === 'auto') words.push('range to the extremes');
     else words.push(`range ${figures(low ?? 1, 3)}\u2013${figures(high ?? 99, 3)} %`);
   }
   if (change.age?.mode !== undefined) words.push(change.age.mode === 'fade' ? 'fading by age' : 'no fading by age');
