@@ -28,6 +28,10 @@ constexpr double kTouch = 0.05;
 /// Pieces of more vertices are as many cells.
 constexpr std::uint32_t kSmallPieceVertexCount = 64;
 
+/// Pieces that touch others, sharing no vertices with them, have a form of their own from so many vertices on: triangles and what is
+/// drawn of triangles that share none have not.
+constexpr std::size_t kFewestOfTouching = 4;
+
 /// A scene may be rounded finer everywhere for so many bits; by no more than a thousandth of the step.
 constexpr std::size_t kNegligibleBits = 8 * 4096;
 constexpr int kMostSpareHalvings = 10;
@@ -173,43 +177,69 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
     }
   }
   if (!has_triangles) return;
-  for (const auto& [a, b] : coincident_) pieces.join(a, b);
+  std::vector<Member> members, alone;
+  std::vector<std::uint32_t> cell_of(points_.size());
+  for (std::size_t c = 0; c < cells_.size(); ++c) {
+    for (std::uint32_t i = cells_[c].begin; i < cells_[c].end; ++i) {
+      members.push_back({points_[i].source, i});
+      cell_of[i] = static_cast<std::uint32_t>(c);
+    }
+  }
+  if (!coincident_.empty()) {
+    std::vector<std::uint32_t> point_of(source_count);
+    std::vector<bool> touches(source_count);
+    for (const Member& member : members) point_of[member.piece] = member.point;
+    alone = members;
+    for (const auto& [kept, other] : coincident_) {
+      alone.push_back({other, point_of[kept]});
+      touches[pieces.of(kept)] = touches[pieces.of(other)] = true;
+    }
+    for (Member& member : alone) member.piece = pieces.of(member.piece);
+    std::erase_if(alone, [&](const Member& member) { return !touches[member.piece]; });
+    for (const auto& [a, b] : coincident_) pieces.join(a, b);
+  }
+  for (Member& member : members) member.piece = pieces.of(member.piece);
+  ask_pieces_of(members, 1, source_count, cell_of);
+  // Boxes that stand on each other are one piece, and each has its own form. Of single triangles none has.
+  ask_pieces_of(alone, kFewestOfTouching, source_count, cell_of);
+}
 
+void PositionSteps::ask_pieces_of(std::span<const Member> members, std::size_t fewest, std::uint32_t piece_count,
+                                  std::span<const std::uint32_t> cell_of) {
   constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> number_of(source_count, kNone);
+  std::vector<std::uint32_t> number_of(piece_count, kNone);
   struct Piece {
     base::Bounds bounds;
     std::uint32_t count = 0;
     StepHalvings halvings{};
-    std::vector<base::Vec3f> positions;  ///< Of a small one.
-    std::vector<std::uint32_t> points;   ///< The same ones.
+    std::vector<std::uint32_t> points;  ///< Of a small one.
   };
   std::vector<Piece> all;
-  for (const Cell& cell : cells_) {
-    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-      const base::Vec3f& p = points_[i].position;
-      std::uint32_t& number = number_of[pieces.of(points_[i].source)];
-      if (number == kNone) {
-        number = static_cast<std::uint32_t>(all.size());
-        all.push_back({{p, p}, 0, {}, {}, {}});
-      }
-      Piece& piece = all[number];
-      piece.bounds.min = {std::min(piece.bounds.min.x, p.x), std::min(piece.bounds.min.y, p.y),
-                          std::min(piece.bounds.min.z, p.z)};
-      piece.bounds.max = {std::max(piece.bounds.max.x, p.x), std::max(piece.bounds.max.y, p.y),
-                          std::max(piece.bounds.max.z, p.z)};
-      if (++piece.count > kSmallPieceVertexCount) continue;
-      piece.positions.push_back(p);
-      piece.points.push_back(i);
+  for (const Member& member : members) {
+    const base::Vec3f& p = points_[member.point].position;
+    std::uint32_t& number = number_of[member.piece];
+    if (number == kNone) {
+      number = static_cast<std::uint32_t>(all.size());
+      all.push_back({{p, p}, 0, {}, {}});
     }
+    Piece& piece = all[number];
+    base::include(piece.bounds, p);
+    if (++piece.count <= kSmallPieceVertexCount) piece.points.push_back(member.point);
   }
   const auto step_m = static_cast<double>(largest_step_m_);
   bool is_any_fine = false;
+  std::vector<base::Vec3f> positions;
   for (Piece& piece : all) {
+    // A piece may have several vertices in one place.
+    std::sort(piece.points.begin(), piece.points.end());
+    piece.points.erase(std::unique(piece.points.begin(), piece.points.end()), piece.points.end());
+    if (piece.points.size() < fewest) continue;
     const Shape shape(piece.bounds);
     piece.halvings = shape.for_sides(kStepOfPieceSide, step_m);
     if (piece.count <= kSmallPieceVertexCount) {
-      const std::uint8_t apart = halvings_apart(piece.positions, piece.positions.size() / kVerticesToMerged, step_m);
+      positions.clear();
+      for (const std::uint32_t i : piece.points) positions.push_back(points_[i].position);
+      const std::uint8_t apart = halvings_apart(positions, positions.size() / kVerticesToMerged, step_m);
       piece.halvings = finer(piece.halvings, {apart, apart, apart});
       small_pieces_.push_back(std::move(piece.points));
     }
@@ -217,10 +247,9 @@ void PositionSteps::ask_pieces(std::span<const std::shared_ptr<Tile>> leaves) {
     is_any_fine = is_any_fine || piece.halvings != StepHalvings{};
   }
   if (!is_any_fine) return;
-  for (Cell& cell : cells_) {
-    for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-      cell.halvings = finer(cell.halvings, all[number_of[pieces.of(points_[i].source)]].halvings);
-    }
+  for (const Member& member : members) {
+    StepHalvings& halvings = cells_[cell_of[member.point]].halvings;
+    halvings = finer(halvings, all[number_of[member.piece]].halvings);
   }
 }
 

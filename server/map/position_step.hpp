@@ -21,7 +21,8 @@ namespace spectra::map {
 /// - four fifths of a few dozen neighbouring vertices stay apart,
 /// - what they span along an axis is at least four steps (what is thinner than a 4,096th of its breadth, or than eight times
 ///   what floats tell apart there, counts as flat),
-/// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps.
+/// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps; pieces are connected by vertices in
+///   the same place, and what is connected by shared vertices alone is one too, unless it is a triangle.
 /// Neighbours get the finer of their steps. Where a ball of neighbours would still have a side off by more than a tenth, the few
 /// vertices that its box stands on are rounded finer by themselves. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
 /// Vertices of no triangle in a scene with triangles are not drawn and have no say.
@@ -73,6 +74,13 @@ class PositionSteps {
   void cut(jobs::WorkerPool& pool);
   void ask_cells(jobs::WorkerPool& pool);
   void ask_pieces(std::span<const std::shared_ptr<Tile>> leaves);
+  /// Which piece a vertex is of, and which of points_ is in its place.
+  struct Member {
+    std::uint32_t piece = 0, point = 0;
+  };
+  /// Of pieces of that many places or more. `cell_of` has the cell of each of points_.
+  void ask_pieces_of(std::span<const Member> members, std::size_t fewest, std::uint32_t piece_count,
+                     std::span<const std::uint32_t> cell_of);
   void ask_neighbours(jobs::WorkerPool& pool);
   /// Per axis: the vertices of each exact plane across it that some cell lies in.
   using Planes = std::array<std::vector<std::vector<std::uint32_t>>, 3>;

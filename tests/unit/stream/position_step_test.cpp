@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "form.hpp"
 #include "fusion/demo/demo_scene.hpp"
@@ -261,6 +264,50 @@ TEST(PositionSteps, AreTheSameForATriangleSoup) {
   EXPECT_EQ(shared->suggested_position_step_m(), soup->suggested_position_step_m());
   EXPECT_EQ(form_of(*soup, 100).torn_count, 0u);
   EXPECT_EQ(form_of(*shared, 100).torn_count, 0u);
+}
+
+/// The sides of what triangles make of each run of `count` vertices of the file, from `first` on, as they are drawn at full detail; one
+/// for each run.
+std::vector<std::array<double, 3>> drawn_sides(const map::SceneSnapshot& scene, std::uint32_t first,
+                                               std::uint32_t count) {
+  struct Ends {
+    std::array<double, 3> low{1e30, 1e30, 1e30}, high{-1e30, -1e30, -1e30};
+  };
+  std::vector<Ends> ends((scene.vertex_count() - first) / count);
+  for (const auto& tile : scene.tiles()) {
+    if (tile->child_mask != 0) continue;
+    const TileLattice lattice = tile_lattice(*tile, scene.suggested_position_step_m()).value();
+    for (std::size_t v = 0; v < tile->positions.size(); ++v) {
+      if (tile->source_vertex[v] < first) continue;
+      Ends& of_run = ends[(tile->source_vertex[v] - first) / count];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double at = double{lattice.origin_m[axis] + static_cast<float>(lattice.points[v][axis]) * lattice.step_m};
+        of_run.low[axis] = std::min(of_run.low[axis], at);
+        of_run.high[axis] = std::max(of_run.high[axis], at);
+      }
+    }
+  }
+  std::vector<std::array<double, 3>> sides;
+  for (const auto& [low, high] : ends) sides.push_back({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  return sides;
+}
+
+TEST(PositionSteps, KeepBoxesThatStandOnEachOther) {
+  Parts parts;
+  parts.grid(80, 80, {0, 0, 0}, {6.25F, 0, 0}, {0, 6.25F, 0}, [](int x, int y) { return 0.3 * std::sin(x + 0.7 * y); });
+  const auto first = static_cast<std::uint32_t>(parts.positions.size());
+  const auto at = [](double start, double step, int k) { return static_cast<float>(start + step * k); };
+  for (int k = 0; k < 40; ++k) {
+    parts.box({at(100, 0.3, k), 100, at(5, 0.17, k)}, {at(100, 0.3, k + 1), 102, at(5, 0.17, k + 1)});
+  }
+  const auto scene = scene_of(parts.mesh());
+  const auto sides = drawn_sides(*scene, first, 8);
+  ASSERT_EQ(sides.size(), 40U);
+  for (const auto& side : sides) {
+    EXPECT_NEAR(side[0], 0.3, 0.03);
+    EXPECT_NEAR(side[1], 2, 0.2);
+    EXPECT_NEAR(side[2], 0.17, 0.017);
+  }
 }
 
 TEST(PositionSteps, KnowTheLastVerticesWhereOthersLieInTheSamePlace) {
