@@ -353,7 +353,9 @@ export function addFusingTests(browser, scratch) {
     await setMethod(page, 'thermal_only');
     await drawn(page);
     const here = sample(await screenshot(page, 'robot-only-before'));
-    // Without a past nothing has changed: it shows what is visible.
+    // Without a past nothing has changed: it shows what is visible. Of what was set a moment before, the robot has not heard yet.
+    await setMethod(page, 'visible_only');
+    await setMethod(page, 'thermal_only');
     await setMethod(page, 'thermal_change');
     await isOnRobot(page);
     await settled(page);

@@ -356,6 +356,7 @@ describe.skipIf(!existsSync(MODULE))('Fusing, with the library', () => {
     const { scene } = store;
     asked.length = 0;
     store.scene = null;
+    store.fusingProblem = 'a tile of the other scene';
     fusing.sceneGone();
     fusing.greeted(['raw_layers']);
     await later();

@@ -150,6 +150,8 @@ export class Fusing {
   /** There is no scene any more, or another one: its picture comes from the robot first. */
   sceneGone(): void {
     this.#sceneNumber += 1;
+    // What could not be done with the other one.
+    this.store.fusingProblem = null;
     this.#forgetFacts();
     this.#isLeaving = false;
     this.#asked_celsius = USUAL_STEP_CELSIUS;

@@ -646,6 +646,26 @@ describe('TileSet, raw layers', () => {
     expect(made.length).toBe(1);
   });
 
+  it('leave none of the colours of before: those are not claimed, and the step is said until others have come', () => {
+    add(root, { sequence: 7 });
+    addRaw(root);
+    tiles.updateSelection();
+    const state = () => [tiles.layersOf(tiles.claims(10)).colours, tiles.drawnError(() => true)?.rounding_celsius];
+    expect(state()).toEqual([[[0, 7]], 0]);
+    tiles.setHere(true);
+    expect(state()).toEqual([[], 0.005]);
+    // Those of the robot wait, as long as they are made here.
+    tiles.addColours(frame(root, { generation: 2, sequence: 8 }), colours(8));
+    expect(state()).toEqual([[], 0.005]);
+    tiles.setHere(false);
+    expect(state()).toEqual([[[0, 8]], 0]);
+    tiles.setHere(true);
+    tiles.setHere(false);
+    expect(state()).toEqual([[], 0.005]);
+    tiles.addColours(frame(root, { generation: 3, sequence: 9 }), colours(9));
+    expect(state()).toEqual([[[0, 9]], 0]);
+  });
+
   it('of another revision wait for their geometry', () => {
     const top = add(root);
     addRaw(root, { revision: 2 });

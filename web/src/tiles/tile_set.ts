@@ -64,6 +64,8 @@ interface Shown {
   answer: number;
   /** In which its temperatures came, where the drawing side has both raw layers of this geometry; null: it lacks them. */
   rawStep_celsius: number | null;
+  /** Its colours were made here, and no others have come since. */
+  isMadeHere: boolean;
   /** Their span and their size allow for no finer one, or hardly. */
   finestStep_celsius: number;
   /** The drawing side has how sure its temperatures are. */
@@ -228,7 +230,9 @@ export class TileSet {
       if (left < 0) break;
       if (isInStep(shown, asked_celsius)) held.raw.push(place);
       if (shown.hasSigma) held.temperature_sigma.push(place);
-      if (shown.colourSequence !== null) held.colours.push([place, shown.colourSequence]);
+      // Colours that came before those that are made here are not there any more.
+      const isMadeHere = shown.isMadeHere || (this.#isHere && shown.rawStep_celsius !== null);
+      if (shown.colourSequence !== null && !isMadeHere) held.colours.push([place, shown.colourSequence]);
     }
     return held;
   }
@@ -264,6 +268,7 @@ export class TileSet {
     const nodes = [...this.#nodes.values()].sort((a, b) => b.id.level - a.id.level);
     for (const node of nodes) {
       this.#joinRaw(node);
+      if (isHere && node.shown !== null) node.shown.isMadeHere = node.shown.rawStep_celsius !== null;
       node.bestRank = NaN;
       this.#changed(node);
     }
@@ -482,7 +487,7 @@ export class TileSet {
     let largest: DrawnError | null = null;
     for (const { shown } of this.#drawn) {
       if (shown === null || !isVisible(shown.geometry.centre, shown.geometry.radius)) continue;
-      const step = this.#isHere ? shown.rawStep_celsius : null;
+      const step = this.#isHere || shown.isMadeHere ? shown.rawStep_celsius : null;
       const rounding = step === null ? {} : { rounding_levels: 0, rounding_celsius: step / 2 };
       largest = worse(largest, { ...shown.error, ...rounding });
     }
@@ -624,6 +629,7 @@ export class TileSet {
       checkRaw(node, raw, shown.geometry);
       shown.drawable.setRaw(raw);
       Object.assign(shown, steps);
+      if (this.#isHere) shown.isMadeHere = true;
       this.#changed(node);
     } else if (this.#isHere && waitingGeometry !== null && waitingGeometry.revision === revision) {
       node.waitingRaw = null;
@@ -643,6 +649,7 @@ export class TileSet {
         rank,
         answer: rank,
         rawStep_celsius: null,
+        isMadeHere: true,
         finestStep_celsius: 0,
         ...steps,
         hasSigma: false,
@@ -667,6 +674,7 @@ export class TileSet {
       shown.rank = rank;
       shown.answer = this.#answer(generation);
       shown.colourSequence = sequence;
+      shown.isMadeHere = false;
       shown.error.rounding_levels = roundingOf(rgba);
       shown.drawable.setColours(rgba);
       this.#arrived(node);
@@ -687,6 +695,7 @@ export class TileSet {
         rank,
         answer,
         rawStep_celsius: null,
+        isMadeHere: false,
         finestStep_celsius: 0,
         hasSigma: false,
         colourSequence: sequence,

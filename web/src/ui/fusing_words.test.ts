@@ -33,6 +33,7 @@ describe('fusingWords', () => {
     expect(fusingWords({ ...FACTS, problem: 'it broke' }).now).toBe('On the robot: it broke');
     expect(fusingWords({ ...FACTS, isPossible: false }).now).toContain('no library');
     expect(fusingWords(FACTS).now).toBe('On the robot.');
+    expect(fusingWords({ ...FACTS, wish: 'here', unfit: 'map' }).now).toBe('On the robot, until its picture is complete.');
     expect(fusingWords({ ...FACTS, unfit: 'link' }).now).toContain('longer than');
     expect(fusingWords({ ...FACTS, unfit: 'map' }).now).toBe('On the robot, as long as the map grows.');
     expect(fusingWords({ ...FACTS, unfit: 'machine' }).now).toContain('small');

@@ -46,5 +46,5 @@ function nowWords({ place, wish, isPossible, problem, unfit, hasLibrary, counted
   if (wish === 'automatic' && unfit === 'map') return 'On the robot, as long as the map grows.';
   if (wish === 'automatic' && unfit === 'link')
     return `On the robot: raw values would take longer than ${duration(LONGEST_RAW_S)}.`;
-  return 'On the robot.';
+  return wish === 'here' ? 'On the robot, until its picture is complete.' : 'On the robot.';
 }
