@@ -16,62 +16,66 @@ namespace {
 
 constexpr float kBesideVoxels = 1.5F;  ///< What lies so near to a surface is an end of an edge that crosses it.
 constexpr float kFarthest = std::numeric_limits<float>::infinity();
-constexpr int kEdgeReach = 3, kHoleReach = 2;
+constexpr std::size_t kEdgeReach = 3, kHoleReach = 2;  ///< Pixels.
+
+/// 1 where either is 1. Without captured sizes, which bytes that are written might change for all that a compiler knows.
+void add_marks(const std::uint8_t* from, std::size_t count, std::uint8_t* to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] |= from[i];
+}
 
 /// 1 where any value within `reach` is 1, along both axes.
-std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, int width, int height, int reach,
-                                  jobs::WorkerPool& pool) {
-  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
-  std::vector<std::uint8_t> across(mask.size(), 0), both(mask.size(), 0);
-  const auto n = static_cast<std::size_t>(reach);
-  for_each_row(h, pool, [&](std::size_t y) {
-    const std::uint8_t* from = &mask[y * w];
-    std::uint8_t* to = &across[y * w];
-    std::size_t until = 0;  // one past the last pixel that some 1 covers
-    for (std::size_t x = 0; x < w + n; ++x) {
-      if (x < w && from[x] != 0) until = x + 2 * n + 1;
-      if (x >= n && x < until) to[x - n] = 1;
+std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& mask, std::size_t width, std::size_t height,
+                                  std::size_t reach, jobs::WorkerPool& pool) {
+  std::vector<std::uint8_t> across = mask, both(mask.size(), 0);
+  for_each_row(height, pool, [&](std::size_t y) {
+    const std::uint8_t* from = &mask[y * width];
+    std::uint8_t* to = &across[y * width];
+    for (std::size_t step = 1; step <= std::min(reach, width - 1); ++step) {
+      add_marks(from + step, width - step, to);
+      add_marks(from, width - step, to + step);
     }
   });
-  for_each_row(h, pool, [&](std::size_t y) {
-    const std::size_t low = y >= n ? y - n : 0, high = std::min(h - 1, y + n);
-    std::uint8_t* to = &both[y * w];
-    for (std::size_t row = low; row <= high; ++row) {
-      const std::uint8_t* from = &across[row * w];
-      for (std::size_t x = 0; x < w; ++x) to[x] |= from[x];
-    }
+  for_each_row(height, pool, [&](std::size_t y) {
+    const std::size_t low = y >= reach ? y - reach : 0, high = std::min(height - 1, y + reach);
+    for (std::size_t row = low; row <= high; ++row) add_marks(&across[row * width], width, &both[y * width]);
   });
   return both;
+}
+
+/// 1 / z is linear over a plane, however askew it is: what it bends by from one neighbour to the other, as a depth, is a jump. `before`, `here` and `after` are
+/// 1 / z of the pixels of a row and of those beside them on both sides, 0 where there is nothing.
+void mark_jumps(const float* depth_m, const float* before, const float* here, const float* after, std::size_t count,
+                float least_m, std::uint8_t* jumps) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float z = depth_m[i];
+    const float bend = z * z * std::abs(before[i] + after[i] - 2 * here[i]);
+    const float most = std::max(least_m, 0.02F * z);
+    // Infinite and 0 make what is no number, and that is not larger.
+    const bool is_jump = (bend > most) & (z < kFarthest) & (before[i] > 0) & (after[i] > 0);
+    jumps[i] |= static_cast<std::uint8_t>(is_jump);
+  }
 }
 
 std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, int height, float voxel_m,
                                    jobs::WorkerPool& pool) {
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
-  std::vector<std::uint8_t> jumps(depth.size(), 0), something(depth.size(), 0);
-  for (std::size_t i = 0; i < depth.size(); ++i) something[i] = depth[i] < kFarthest ? 1 : 0;
-  // Nothing counts where it is more than a gap between the squares that were drawn.
-  const std::vector<std::uint8_t> covered = widened(something, width, height, kHoleReach, pool);
-  // 1 / z is linear over a plane, however askew it is: what it bends by, as a depth, is a jump.
-  for_each_row(h, pool, [&, all = depth.data()](std::size_t y) {
-    const auto bend = [all](std::size_t before, std::size_t i, std::size_t after) {
-      if (all[before] == kFarthest || all[after] == kFarthest) return 0.0F;
-      const float z = all[i];
-      return z * z * std::abs(1 / all[before] + 1 / all[after] - 2 / z);
-    };
-    for (std::size_t x = 0; x < w; ++x) {
-      const std::size_t i = y * w + x;
-      const float z = all[i];
-      if (z == kFarthest) continue;
-      const float most =
-          std::max(x > 0 && x + 1 < w ? bend(i - 1, i, i + 1) : 0, y > 0 && y + 1 < h ? bend(i - w, i, i + w) : 0);
-      if (most > std::max(3 * voxel_m, 0.02F * z)) jumps[i] = 1;
-    }
+  std::vector<std::uint8_t> jumps(depth.size(), 0), something(depth.size());
+  std::vector<float> inverse(depth.size());
+  for_each_row(h, pool, [&](std::size_t y) {
+    for (std::size_t i = y * w; i < (y + 1) * w; ++i) inverse[i] = 1 / depth[i];
+    for (std::size_t i = y * w; i < (y + 1) * w; ++i) something[i] = depth[i] < kFarthest ? 1 : 0;
   });
-  std::vector<std::uint8_t> near = widened(jumps, width, height, kEdgeReach, pool);
-  std::vector<std::uint8_t> nothing(depth.size());
-  for (std::size_t i = 0; i < depth.size(); ++i) nothing[i] = covered[i] == 0 ? 1 : 0;
-  const std::vector<std::uint8_t> beside = widened(nothing, width, height, kHoleReach + kEdgeReach, pool);
-  for (std::size_t i = 0; i < near.size(); ++i) near[i] |= beside[i];
+  // Nothing counts where it is more than a gap between the squares that were drawn.
+  std::vector<std::uint8_t> nothing = widened(something, w, h, kHoleReach, pool);
+  for (std::uint8_t& mark : nothing) mark ^= 1;
+  for_each_row(h, pool, [&](std::size_t y) {
+    const float* here = &inverse[y * w];
+    if (w > 2) mark_jumps(&depth[y * w + 1], here, here + 1, here + 2, w - 2, 3 * voxel_m, &jumps[y * w + 1]);
+    if (y > 0 && y + 1 < h) mark_jumps(&depth[y * w], here - w, here, here + w, w, 3 * voxel_m, &jumps[y * w]);
+  });
+  std::vector<std::uint8_t> near = widened(jumps, w, h, kEdgeReach, pool);
+  const std::vector<std::uint8_t> beside = widened(nothing, w, h, kHoleReach + kEdgeReach, pool);
+  add_marks(beside.data(), beside.size(), near.data());
   return near;
 }
 
