@@ -48,24 +48,31 @@ HWY_INLINE Ints project(const KernelCamera& camera, const std::array<float, 3>& 
 
 /// Means after one more value: rounded, at least one step of 1 towards it.
 HWY_INLINE Floats mean_after(Floats mean, Floats value, Floats share) {
-  const FloatTag d;
-  const IntTag di;
   const Floats difference = hn::Sub(value, mean), step = hn::Mul(difference, share);
-  const Floats rounded = hn::ConvertTo(d, hn::ConvertTo(di, hn::Add(step, hn::CopySign(all(0.5F), step))));
-  const Floats least = hn::ConvertTo(d, hn::ConvertTo(di, hn::Max(hn::Min(difference, all(1)), all(-1))));
+  const Floats rounded = hn::Trunc(hn::Add(step, hn::CopySign(all(0.5F), step)));
+  const Floats least = hn::Trunc(hn::Max(hn::Min(difference, all(1)), all(-1)));
   return hn::Add(mean, hn::IfThenElse(hn::Eq(rounded, all(0)), least, rounded));
+}
+
+/// Of pixels of DepthFrame::packed.
+HWY_INLINE Floats weight_of(hn::Vec<hn::RebindToUnsigned<FloatTag>> packed) {
+  const hn::RebindToUnsigned<FloatTag> du;
+  return hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), hn::And(packed, hn::Set(du, 0xffffU))));
 }
 
 BlockChange distances(const DistanceKernel& kernel, const std::array<float, 3>& corner, VoxelBlock& block,
                       NearPixels& near) {
   const FloatTag d;
   const IntTag di;
+  const hn::RebindToUnsigned<FloatTag> du;
   const Floats per_m = all(kDistanceOne / kernel.truncation_m), half = all(0.5F * kDistanceOne);
   Floats moved = all(0), nearest = all(kDistanceOne), least = all(kDistanceOne), largest = all(-kDistanceOne);
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(d)) {
     Floats z;
     const Ints pixel = project(kernel.camera, corner, i, z);
-    const Floats seen = hn::GatherIndex(d, kernel.depth_m, pixel), trust = hn::GatherIndex(d, kernel.weight, pixel);
+    const auto packed = hn::GatherIndex(du, kernel.pixels, pixel);
+    const Floats seen = hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(packed))), all(kernel.unit_m));
+    const Floats trust = weight_of(packed);
     const Floats metres = hn::Sub(seen, z);
     // The same weight for all that may err, whether towards the camera or away: else the surface would move one way.
     const Floats beyond = hn::Max(all(0), hn::Sub(seen, all(kernel.from_m)));
@@ -73,8 +80,15 @@ BlockChange distances(const DistanceKernel& kernel, const std::array<float, 3>& 
     const Floats behind = hn::Max(all(kernel.behind_m), noise);
     const Floats weight = hn::IfThenElseZero(hn::Gt(metres, hn::Neg(behind)), trust);
     const auto is_seen = hn::Gt(weight, all(0));
-    const Floats old = load_narrow(&block.distance[i]), old_weight = load_narrow(&block.weight[i]);
-    const Floats sum = hn::Add(old_weight, weight);
+    const Floats old = load_narrow(&block.distance[i]);
+    if (hn::AllFalse(d, is_seen)) {
+      nearest = hn::Min(nearest, hn::Abs(old));
+      least = hn::Min(least, old);
+      largest = hn::Max(largest, old);
+      hn::StoreU(hn::Set(di, -1), di, &near[i]);
+      continue;
+    }
+    const Floats old_weight = load_narrow(&block.weight[i]), sum = hn::Add(old_weight, weight);
     const Floats target = hn::Min(all(kDistanceOne), hn::Max(all(-kDistanceOne), hn::Mul(metres, per_m)));
     const Floats mean = mean_after(old, target, hn::Div(weight, hn::Max(all(1), sum)));
     const Floats next = hn::IfThenElse(is_seen, mean, old);
@@ -103,6 +117,7 @@ float colours(const ColourKernel& kernel, const std::array<float, 3>& corner, Vo
               const NearPixels& near) {
   const FloatTag d;
   const IntTag di;
+  const hn::RebindToUnsigned<FloatTag> du;
   const Ints outside = hn::Set(di, kernel.camera.width * kernel.camera.height);
   Floats recoloured = all(0);
   for (std::size_t i = 0; i < kBlockVoxels; i += hn::Lanes(d)) {
@@ -119,14 +134,12 @@ float colours(const ColourKernel& kernel, const std::array<float, 3>& corner, Vo
     pixel = hn::IfThenElseZero(is_seen, pixel);
     const auto is_taken = hn::RebindMask(d, is_seen);
     // The nearer and the less askew, the more: the weight of the distance, of which little is left beyond 3 m, by its root.
-    const Floats trust = hn::GatherIndex(d, kernel.depth_weight, hn::IfThenElseZero(is_seen, depth_pixel));
+    const Floats trust = weight_of(hn::GatherIndex(du, kernel.depth_pixels, hn::IfThenElseZero(is_seen, depth_pixel)));
     const Floats root = hn::Sqrt(hn::Mul(trust, all(1 / kWeightOne)));
-    const Floats weight =
-        hn::Max(all(1), hn::ConvertTo(d, hn::ConvertTo(di, hn::Add(hn::Mul(all(16), root), all(0.5F)))));
+    const Floats weight = hn::Max(all(1), hn::Trunc(hn::Add(hn::Mul(all(16), root), all(0.5F))));
     const Floats old_weight = load_narrow(&block.colour_weight[i]);
     const Floats sum = hn::Add(old_weight, weight);
     const Floats share = hn::Div(weight, sum);
-    const hn::RebindToUnsigned<FloatTag> du;
     const auto seen = hn::BitCast(di, hn::GatherIndex(du, kernel.pixels, pixel));
     const auto fuse_channel = [&](Ints level, std::uint16_t* channel) HWY_ATTR {
       const Floats old = load_narrow(channel);

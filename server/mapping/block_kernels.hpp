@@ -20,11 +20,11 @@ struct KernelCamera {
   std::int32_t width, height;
 };
 
-/// What the kernel of distances needs. A picture has one value more than it has pixels, 0, for what lies outside of it.
+/// What the kernel of distances needs.
 struct DistanceKernel {
   KernelCamera camera;
-  const float* depth_m;
-  const float* weight;  ///< Whole numbers; kWeightOne = one look from near.
+  const std::uint32_t* pixels;  ///< DepthFrame::packed.
+  float unit_m;
   float truncation_m, voxel_m;
   /// Voxels count so far behind a surface at z: max(behind_m, base_m + growth_per_m max(0, z - from_m)^2).
   float behind_m, base_m, growth_per_m, from_m;
@@ -49,9 +49,9 @@ BlockChange fuse_distances(const DistanceKernel& kernel, const std::array<float,
 /// What the kernel of colours needs.
 struct ColourKernel {
   KernelCamera camera;
-  bool is_depth_camera;         ///< Both pictures have the same pixels.
-  const std::uint32_t* pixels;  ///< 0xBBGGRR.
-  const float* depth_weight;    ///< As DistanceKernel::weight.
+  bool is_depth_camera;               ///< Both pictures have the same pixels.
+  const std::uint32_t* pixels;        ///< 0xBBGGRR.
+  const std::uint32_t* depth_pixels;  ///< As DistanceKernel::pixels.
 };
 
 /// Moves the colours of the voxels near what was seen; the largest change in levels. Every instruction set gives the same bytes.

@@ -90,6 +90,25 @@ struct BorderPixels {
   }
 };
 
+void pack(const std::uint16_t* depth, const float* weight, std::size_t count, std::uint32_t* packed) {
+  for (std::size_t i = 0; i < count; ++i) {
+    packed[i] =
+        static_cast<std::uint32_t>(depth[i]) << 16 | static_cast<std::uint32_t>(static_cast<std::int32_t>(weight[i]));
+  }
+}
+
+/// Of pixels that count: how many, and the farther of each and of what is known of its column.
+std::size_t note_farthest(const float* depth_m, const float* weight, std::size_t count, float* farthest_m) {
+  std::int32_t counted = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool counts = weight[i] > 0;
+    const float z = counts ? depth_m[i] : 0;
+    farthest_m[i] = farthest_m[i] < z ? z : farthest_m[i];
+    counted += static_cast<std::int32_t>(counts);
+  }
+  return static_cast<std::size_t>(counted);
+}
+
 }  // namespace
 
 RayTable::RayTable(const CameraModel& camera) : width(camera.width), height(camera.height) {
@@ -111,12 +130,14 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
   frame.width = picture.width;
   frame.height = picture.height;
   const auto width = static_cast<std::size_t>(frame.width), height = static_cast<std::size_t>(frame.height);
-  frame.depth_m.assign(width * height + 1, 0);
-  frame.weight.assign(width * height + 1, 0);
+  frame.depth_m.resize(width * height);
+  frame.weight.assign(width * height, 0);
+  frame.packed.assign(width * height + 1, 0);
   frame.tiles_across = (frame.width + DepthFrame::kTile - 1) / DepthFrame::kTile;
   frame.tiles_down = (frame.height + DepthFrame::kTile - 1) / DepthFrame::kTile;
   frame.farthest_m.assign(static_cast<std::size_t>(frame.tiles_across * frame.tiles_down), 0);
   const auto unit = static_cast<float>(calibration.unit_m);
+  frame.unit_m = unit;
   std::transform(picture.pixels.begin(), picture.pixels.end(), frame.depth_m.begin(), [&](std::uint16_t value) {
     return value == calibration.invalid ? 0 : static_cast<float>(value) * unit;
   });
@@ -141,6 +162,7 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
   static_assert(kBandRows == DepthFrame::kTile);
   pool.for_each(static_cast<std::size_t>(frame.tiles_down), [&](std::size_t band) {
     const int first = static_cast<int>(band) * kBandRows, last = std::min(first + kBandRows, frame.height);
+    std::vector<float> columns(width, 0);
     for (int y = first; y < last; ++y) {
       const std::size_t row = static_cast<std::size_t>(y) * width;
       const bool is_inner = y >= kNormalReach && y + kNormalReach < frame.height &&
@@ -153,13 +175,12 @@ DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& cali
         const std::size_t pixel = row + static_cast<std::size_t>(begin);
         weigh_pixels(pixels, pixel, static_cast<std::size_t>(end - begin), &frame.weight[pixel]);
       }
-      for (std::size_t x = 0; x < width; ++x) {
-        if (frame.weight[row + x] <= 0) continue;
-        float& farthest = frame.farthest_m[band * static_cast<std::size_t>(frame.tiles_across) + x / DepthFrame::kTile];
-        farthest = std::max(farthest, frame.depth_m[row + x]);
-        ++counts[band];
-      }
+      pack(&picture.pixels[row], &frame.weight[row], width, &frame.packed[row]);
+      counts[band] += note_farthest(&frame.depth_m[row], &frame.weight[row], width, columns.data());
     }
+    float* tiles = &frame.farthest_m[band * static_cast<std::size_t>(frame.tiles_across)];
+    for (std::size_t x = 0; x < width; ++x)
+      tiles[x / DepthFrame::kTile] = std::max(tiles[x / DepthFrame::kTile], columns[x]);
   });
   frame.counted = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
   return frame;

@@ -13,8 +13,12 @@ namespace spectra::mapping {
 struct DepthFrame {
   int width = 0;
   int height = 0;
-  std::vector<float> depth_m;  ///< One more than there are pixels; the last is 0.
-  std::vector<float> weight;   ///< The same; whole numbers, kWeightOne from near; 0: left out.
+  std::vector<float> depth_m;
+  std::vector<float> weight;  ///< Whole numbers, kWeightOne from near; 0: left out.
+  /// Both at once: steps of unit_m in the upper 16 bits, the weight in the others. One more than there are pixels; the last, for what lies
+  /// outside of the picture, is 0.
+  std::vector<std::uint32_t> packed;
+  float unit_m = 0;
   /// Of tiles of 16 x 16 pixels, row after row: the farthest pixel that counts; 0: none.
   int tiles_across = 0, tiles_down = 0;
   std::vector<float> farthest_m;

@@ -1,12 +1,12 @@
 #include "server/mapping/depth_fusion.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
 #include "server/mapping/block_kernels.hpp"
 #include "server/mapping/picture_rows.hpp"
+#include "server/mapping/place_kernel.hpp"
 #include "server/mapping/surface_view.hpp"
 #include "server/mapping/whole_numbers.hpp"
 
@@ -18,44 +18,45 @@ constexpr float kNearest = 0.05F;      ///< Metres before the camera.
 /// The blocks that lie within the truncation of what is seen, in the order of their places.
 std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m, jobs::WorkerPool& pool) {
   constexpr int kBand = 32, kStride = 2;
-  const auto before = static_cast<float>(kTruncationVoxels * voxel_m),
-             behind = static_cast<float>(kBehindVoxels * voxel_m);
-  const float per_m = static_cast<float>(1 / (kBlockEdge * voxel_m));
-  const Eigen::Matrix3f turn = look.world_from_camera.linear().cast<float>();
   // Relative to the camera's own block, so that single precision holds wherever the map is.
-  const Eigen::Vector3d camera = look.world_from_camera.translation() / (kBlockEdge * voxel_m);
-  const Eigen::Vector3d home(std::floor(camera.x()), std::floor(camera.y()), std::floor(camera.z()));
-  const Eigen::Vector3f from = (camera - home).cast<float>();
+  const double per_m = 1 / (kBlockEdge * voxel_m);
+  const Eigen::Vector3d eye = look.world_from_camera.translation() * per_m;
+  const Eigen::Vector3d home(std::floor(eye.x()), std::floor(eye.y()), std::floor(eye.z()));
+  const Eigen::Matrix3f turn = (look.world_from_camera.linear() * per_m).cast<float>();
+  const Eigen::Vector3f from = (eye - home).cast<float>();
+  PlaceKernel kernel{{},
+                     {from.x(), from.y(), from.z()},
+                     kNearest,
+                     static_cast<float>(kTruncationVoxels * voxel_m),
+                     static_cast<float>(kBehindVoxels * voxel_m),
+                     static_cast<float>(kBehindSigmas * look.noise.base_m),
+                     static_cast<float>(kBehindSigmas * look.noise.growth_per_m),
+                     static_cast<float>(look.noise.from_m)};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      kernel.turn[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] = turn(row, column);
+    }
+  }
   const GridPlace base{static_cast<std::int32_t>(home.x()), static_cast<std::int32_t>(home.y()),
                        static_cast<std::int32_t>(home.z())};
+  const auto width = static_cast<std::size_t>(look.frame.width);
   const int bands = (look.frame.height + kBand - 1) / kBand;
   std::vector<std::vector<GridPlace>> found(static_cast<std::size_t>(bands));
   pool.for_each(found.size(), [&](std::size_t band) {
-    std::array<GridPlace, 1024> recent;
-    recent.fill({INT32_MIN, 0, 0});
+    RecentPlaces recent;
     std::vector<GridPlace>& places = found[band];
+    std::vector<float> depth_m(width / std::size_t{kStride} + 1 + kPacked, 0), ray_x = depth_m, ray_y = depth_m;
     const int first = static_cast<int>(band) * kBand, last = std::min(first + kBand, look.frame.height);
     for (int y = first; y < last; y += kStride) {
-      for (int x = 0; x < look.frame.width; x += kStride) {
-        const std::size_t pixel =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(look.frame.width) + static_cast<std::size_t>(x);
-        if (look.frame.weight[pixel] <= 0) continue;
-        const float z = look.frame.depth_m[pixel];
-        const Eigen::Vector3f ray = turn * Eigen::Vector3f(look.rays.x[pixel], look.rays.y[pixel], 1) * per_m;
-        const auto noise = static_cast<float>(kBehindSigmas * look.noise.sigma_m(static_cast<double>(z)));
-        const float begin = std::max(kNearest, z - before), end = z + std::max(behind, noise);
-        const int steps = static_cast<int>(std::ceil((end - begin) * ray.norm() * 2));
-        for (int s = 0; s <= steps; ++s) {
-          const Eigen::Vector3f at =
-              from + ray * (begin + (end - begin) * static_cast<float>(s) / static_cast<float>(std::max(steps, 1)));
-          const GridPlace place{base.x + floor_of(at.x()), base.y + floor_of(at.y()), base.z + floor_of(at.z())};
-          GridPlace& known =
-              recent[index_within(place, 3) * 2 % recent.size() + (static_cast<std::size_t>(place.x) >> 3 & 1)];
-          if (known == place) continue;
-          known = place;
-          places.push_back(place);
-        }
+      const std::size_t row = static_cast<std::size_t>(y) * width;
+      std::size_t count = 0;
+      for (std::size_t pixel = row; pixel < row + width; pixel += std::size_t{kStride}) {
+        depth_m[count] = look.frame.depth_m[pixel];
+        ray_x[count] = look.rays.x[pixel];
+        ray_y[count] = look.rays.y[pixel];
+        count += look.frame.weight[pixel] > 0 ? 1U : 0U;
       }
+      find_places(kernel, {depth_m.data(), ray_x.data(), ray_y.data(), count}, recent, places);
     }
     std::sort(places.begin(), places.end());
     places.erase(std::unique(places.begin(), places.end()), places.end());
@@ -64,6 +65,7 @@ std::vector<GridPlace> blocks_near_surface(const DepthLook& look, double voxel_m
   for (const auto& places : found) all.insert(all.end(), places.begin(), places.end());
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
+  for (GridPlace& place : all) place = {place.x + base.x, place.y + base.y, place.z + base.z};
   return all;
 }
 
@@ -115,8 +117,8 @@ std::size_t fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* 
                        std::uint64_t most_bytes) {
   const double voxel_m = map.voxel_m();
   const DistanceKernel kernel{KernelCamera(depth.camera, depth.world_from_camera, voxel_m),
-                              depth.frame.depth_m.data(),
-                              depth.frame.weight.data(),
+                              depth.frame.packed.data(),
+                              depth.frame.unit_m,
                               static_cast<float>(kTruncationVoxels * voxel_m),
                               static_cast<float>(voxel_m),
                               static_cast<float>(kBehindVoxels * voxel_m),
@@ -168,7 +170,7 @@ std::size_t fuse_depth(VoxelMap& map, const DepthLook& depth, const ColourLook* 
     const bool is_depth_camera =
         colour->camera == depth.camera && colour->world_from_camera.matrix() == depth.world_from_camera.matrix();
     colours.emplace(ColourKernel{KernelCamera(colour->camera, colour->world_from_camera, voxel_m), is_depth_camera,
-                                 pixels.data(), depth.frame.weight.data()});
+                                 pixels.data(), depth.frame.packed.data()});
   }
   constexpr std::size_t kChunk = 64;
   pool.for_each((blocks.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {

@@ -12,20 +12,20 @@ namespace spectra::mapping::HWY_NAMESPACE {
 constexpr float kSurfaceNearest = 0.1F;  ///< Metres before the camera.
 constexpr std::size_t kMargin = 64;      ///< Voxels to the farthest neighbour, in the order of a block.
 
-/// Distances of a block with room on both sides, and 1 where a voxel was seen.
-struct Padded {
-  alignas(64) std::array<float, kBlockVoxels + 2 * kMargin> distance, seen;
-};
+constexpr float kUnseen = 1e9F;  ///< In place of a distance.
+
+/// Distances of a block with room on both sides.
+using Padded = std::array<float, kBlockVoxels + 2 * kMargin>;
 
 /// Half the difference across voxels along an axis, or the whole one to the neighbour that is in the block and was seen.
 HWY_INLINE Floats slope(const Padded& block, std::size_t at, Floats own, Ints place, std::size_t stride) {
   const FloatTag d;
   const IntTag di;
-  const auto is_seen = [&](std::size_t i) HWY_ATTR { return hn::Gt(hn::LoadU(d, &block.seen[i]), hn::Zero(d)); };
-  const auto has_low = hn::And(hn::RebindMask(d, hn::Gt(place, hn::Zero(di))), is_seen(at - stride));
-  const auto has_high = hn::And(hn::RebindMask(d, hn::Lt(place, hn::Set(di, kBlockEdge - 1))), is_seen(at + stride));
-  const Floats low = hn::IfThenElse(has_low, hn::LoadU(d, &block.distance[at - stride]), own);
-  const Floats high = hn::IfThenElse(has_high, hn::LoadU(d, &block.distance[at + stride]), own);
+  const Floats below = hn::LoadU(d, &block[at - stride]), above = hn::LoadU(d, &block[at + stride]);
+  const auto has_low = hn::And(hn::RebindMask(d, hn::Gt(place, hn::Zero(di))), hn::Lt(below, hn::Set(d, kUnseen)));
+  const auto has_high =
+      hn::And(hn::RebindMask(d, hn::Lt(place, hn::Set(di, kBlockEdge - 1))), hn::Lt(above, hn::Set(d, kUnseen)));
+  const Floats low = hn::IfThenElse(has_low, below, own), high = hn::IfThenElse(has_high, above, own);
   const Floats difference = hn::Sub(high, low);
   return hn::IfThenElse(hn::And(has_low, has_high), hn::Mul(hn::Set(d, 0.5F), difference), difference);
 }
@@ -37,26 +37,24 @@ void see(const KernelCamera& camera, const VoxelBlock& block, const std::array<f
   const hn::Rebind<std::int16_t, FloatTag> narrow;
   const hn::Rebind<std::uint16_t, FloatTag> narrow_weight;
   const std::size_t lanes = hn::Lanes(d);
-  Padded padded;
+  alignas(64) Padded padded;
   for (std::size_t i = 0; i < kMargin; i += lanes) {
-    for (auto* array : {&padded.distance, &padded.seen}) {
-      hn::StoreU(hn::Zero(d), d, &(*array)[i]);
-      hn::StoreU(hn::Zero(d), d, &(*array)[kMargin + kBlockVoxels + i]);
-    }
+    hn::StoreU(hn::Zero(d), d, &padded[i]);
+    hn::StoreU(hn::Zero(d), d, &padded[kMargin + kBlockVoxels + i]);
   }
   for (std::size_t i = 0; i < kBlockVoxels; i += lanes) {
     const Ints distance = hn::PromoteTo(di, hn::LoadU(narrow, &block.distance[i]));
     const Ints weight = hn::PromoteTo(di, hn::LoadU(narrow_weight, &block.weight[i]));
-    hn::StoreU(hn::ConvertTo(d, distance), d, &padded.distance[kMargin + i]);
-    hn::StoreU(hn::ConvertTo(d, weight), d, &padded.seen[kMargin + i]);
+    const auto is_seen = hn::RebindMask(d, hn::Gt(weight, hn::Zero(di)));
+    hn::StoreU(hn::IfThenElse(is_seen, hn::ConvertTo(d, distance), all(kUnseen)), d, &padded[kMargin + i]);
   }
   out.count = 0;
   const Lens& lens = camera.lens;
   const Ints within = hn::Set(di, kBlockEdge - 1);
   for (std::size_t i = 0; i < kBlockVoxels; i += lanes) {
     const std::size_t at = kMargin + i;
-    const Floats own = hn::LoadU(d, &padded.distance[at]);
-    auto is_taken = hn::And(hn::Le(hn::Abs(own), all(beside)), hn::Gt(hn::LoadU(d, &padded.seen[at]), all(0)));
+    const Floats own = hn::LoadU(d, &padded[at]);
+    auto is_taken = hn::Le(hn::Abs(own), all(beside));
     if (hn::AllFalse(d, is_taken)) continue;
     const Ints voxel = hn::Iota(di, static_cast<std::int32_t>(i));
     const Floats gx = slope(padded, at, own, hn::And(voxel, within), 1);

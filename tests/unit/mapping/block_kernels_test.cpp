@@ -18,6 +18,7 @@ namespace spectra::mapping {
 namespace {
 
 constexpr double kVoxel = 0.01;
+constexpr float kUnit = 0.0001F;
 
 float mean_after(float mean, float value, float share) {
   const float step = (value - mean) * share;
@@ -43,13 +44,17 @@ class BlockKernels : public testing::TestWithParam<bool> {
     std::mt19937 random(7);
     depth_.assign(count + 1, 0);
     weight_.assign(count + 1, 0);
+    packed_.assign(count + 1, 0);
     pixels_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
       pixels_[i] = random() & 0xffffff;
       if (random() % 9 == 0) continue;
-      depth_[i] = 0.97F + 0.001F * static_cast<float>(i % static_cast<std::size_t>(camera_.width)) +
-                  1e-5F * static_cast<float>(random() % 1000);
-      weight_[i] = static_cast<float>(1 + random() % 1024);
+      const auto steps =
+          static_cast<std::uint32_t>(9700 + 10 * (i % static_cast<std::size_t>(camera_.width)) + random() % 100);
+      const auto weight = static_cast<std::uint32_t>(1 + random() % 1024);
+      depth_[i] = static_cast<float>(steps) * kUnit;
+      weight_[i] = static_cast<float>(weight);
+      packed_[i] = steps << 16 | weight;
     }
     for (std::size_t i = 0; i < kBlockVoxels; ++i) {
       before_->distance[i] = static_cast<std::int16_t>(static_cast<int>(random() % 65535) - 32767);
@@ -70,15 +75,15 @@ class BlockKernels : public testing::TestWithParam<bool> {
   CameraModel camera_{64, 48, 70, 72, 31, 24, {}};
   Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
   std::vector<float> depth_, weight_;
-  std::vector<std::uint32_t> pixels_;
+  std::vector<std::uint32_t> packed_, pixels_;
   const std::array<float, 3> corner_{-0.03F, -0.02F, 0.95F};
   const std::unique_ptr<VoxelBlock> before_ = std::make_unique<VoxelBlock>();
 };
 
 TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
   const DistanceKernel kernel{
-      KernelCamera(camera_, pose_, kVoxel), depth_.data(), weight_.data(), 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
-  const ColourKernel colours{kernel.camera, false, pixels_.data(), weight_.data()};
+      KernelCamera(camera_, pose_, kVoxel), packed_.data(), kUnit, 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
+  const ColourKernel colours{kernel.camera, false, pixels_.data(), packed_.data()};
   const auto wanted = copy();
   NearPixels wanted_near{};
   float recoloured = 0, moved = 0, nearest = kDistanceOne;
@@ -144,7 +149,7 @@ TEST_P(BlockKernels, EveryInstructionSetGivesWhatTheFormulaSays) {
 
 TEST_P(BlockKernels, EveryInstructionSetSaysTheSameOfBlocksOfEveryKind) {
   const DistanceKernel kernel{
-      KernelCamera(camera_, pose_, kVoxel), depth_.data(), weight_.data(), 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
+      KernelCamera(camera_, pose_, kVoxel), packed_.data(), kUnit, 0.04F, 0.01F, 0.03F, 0.003F, 0.005F, 0.4F};
   constexpr std::int16_t kHalf = 16384;  // The first whole number that is not within half of the truncation.
   for (const std::int16_t lone : {std::int16_t{32767}, kHalf, std::int16_t{kHalf - 1}, std::int16_t{0},
                                   std::int16_t{-1}, std::int16_t{-kHalf}, std::int16_t{-32767}}) {
