@@ -41,6 +41,8 @@ export interface FusingEvents {
   resubscribe: () => void;
   /** Settings are on their way to the server, or it has not answered yet. */
   isBusy: () => boolean;
+  /** Of the settings that it has answered last. */
+  answeredGeneration: () => number;
   /** All that has come over the link has been brought into the tiles. */
   isTakenIn: () => boolean;
   /** What a method highlights in the settings that are now in force here. */
@@ -188,9 +190,9 @@ export class Fusing {
     } else this.#leaveAtOnce();
   }
 
-  /** All that was asked for of the robot, in the settings of this generation, is in the picture. */
+  /** All that was asked for of the robot, of this generation, is in the picture; on a map that changes all the time there may be newer ones already. */
   completed(generation: number): void {
-    if (this.#isLeaving && generation >= this.store.generation && !this.events.isBusy()) {
+    if (this.#isLeaving && generation >= this.events.answeredGeneration() && !this.events.isBusy()) {
       this.#isLeaving = false;
       this.#leaveAtOnce();
     }

@@ -110,6 +110,7 @@ export class Session {
       request,
       resubscribe: () => void this.#subscription.channelsChanged(),
       isBusy: () => this.settings.busy,
+      answeredGeneration: () => this.settings.answeredGeneration,
       isTakenIn: () => this.#intake.isTakenIn,
       onShown: (method) => this.#progress.beginHere(method, this.viewport.nextPicture),
       onBehind: () => this.#progress.begin(),

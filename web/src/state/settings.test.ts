@@ -404,10 +404,14 @@ describe('Settings that are fused here', () => {
     settings.setMethod('other');
     await asked[0]?.answer(1, fusionWith(0.4, 'robots'));
     expect([store.fusion?.method, store.generation, settings.methodOf(1)]).toEqual(['other', 1, 'robots']);
+    expect(settings.answeredGeneration).toBe(1);
+    store.generation = 7;
     await vi.advanceTimersByTimeAsync(2000);
     expect(asked.map(({ change }) => change.method)).toEqual(['robots', 'other']);
     await asked[1]?.answer(2, fusionWith(0.4, 'other'));
-    expect([store.fusion?.method, store.generation, settings.busy]).toEqual(['other', 2, false]);
+    expect([store.fusion?.method, store.generation, settings.busy, settings.answeredGeneration]).toEqual(['other', 7, false, 2]);
+    settings.greeted(fusionWith(0.5), true);
+    expect(settings.answeredGeneration).toBe(0);
   });
 
   it('take along what waits to be sent, which is not sent after them', async () => {

@@ -54,6 +54,8 @@ export class Settings {
   #hasChosen = false;
   /** By generation, of this connection. */
   readonly #methodOf = new Map<number, string>();
+  /** Generation of the settings that the server has answered last: later ones are of a scene that has changed by itself. */
+  #answered = 0;
   /** How many settings have been shown here. */
   #countHere = 0;
   /** A change went under with its connection: it is still wanted, and is sent with the rest when there is another one. */
@@ -83,6 +85,10 @@ export class Settings {
   /** True while a change waits or is unanswered. */
   get busy(): boolean {
     return this.#sender.busy || this.#teller.busy;
+  }
+
+  get answeredGeneration(): number {
+    return this.#answered;
   }
 
   /** The method of a generation of this connection: generations of which nothing was said have that of the one before. */
@@ -181,6 +187,7 @@ export class Settings {
     store.wanted = before;
     store.refusals = {};
     store.generation = 0;
+    this.#answered = 0;
     this.#methodOf.clear();
     this.#methodOf.set(0, fusion.method);
     this.#rememberFused(fusion);
@@ -201,6 +208,7 @@ export class Settings {
     const count = this.#countHere;
     try {
       const { generation, fusion } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      this.#answered = Math.max(this.#answered, generation);
       // What is shown here since is what is set.
       if (count === this.#countHere) this.inForce(generation, fusion);
       else this.#isTold(generation, fusion);
@@ -285,6 +293,7 @@ export class Settings {
   async #tell(change: FusionChange): Promise<void> {
     try {
       const { generation, fusion } = fusionState(await this.session.request('fusion.set', change), 'fusion.set');
+      this.#answered = Math.max(this.#answered, generation);
       this.#isTold(generation, fusion);
     } catch (error) {
       // It may have heard of others meanwhile.
