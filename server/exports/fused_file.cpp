@@ -173,6 +173,8 @@ base::Result<void> round_for_file(const map::SceneSnapshot& scene, mesh::Multisp
     const auto lattice = stream::tile_lattice(*tile, usual_step_m);
     if (!lattice) return base::failure(base::ErrorCode::Unsupported, lattice.error().message);
     const auto& [origin_m, step_m, coarsest_step_m, points] = lattice.value();
+    // It reaches too far for any lattice of that step, and the file will have none: floats tell more.
+    if (coarsest_step_m > usual_step_m) continue;
     finest_m = std::min(finest_m, step_m);
     options.largest_position_step_m = std::max(options.largest_position_step_m, coarsest_step_m);
     const auto round = [&, &origin = origin_m, &step = step_m, &lattice_points = points](std::uint32_t v) {

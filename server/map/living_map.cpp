@@ -366,7 +366,8 @@ bool LivingMap::is_there_already(const BlockPut& put) const {
 void LivingMap::put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress) {
   const FreedMemoryGoesBack scope;
   constants_ = {.origin = put.scene.mesh.origin,
-                .grid = MapGrid::around(put.scene.mesh.positions(), options_.first_level)};
+                .grid = MapGrid::around(put.scene.mesh.positions(), put.scene.mesh.triangles(), put.scene.core_bounds,
+                                        options_.first_level)};
   std::vector<BlockPut> only;
   only.push_back(std::move(put));
   change(std::move(only), {}, pool, progress);

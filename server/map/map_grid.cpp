@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
+
+#include "fusion/mesh/surface.hpp"
 
 namespace spectra::map {
 namespace {
@@ -11,6 +14,12 @@ constexpr std::size_t kSampleSize = 4096;
 /// The part of the positions at either end of an axis that may be far from all others, and how much is added beyond the rest.
 constexpr double kFarShare = 0.002;
 constexpr double kMargin = 0.25;
+/// More steps than a tile has from end to end.
+constexpr double kStepsOfTile = 0x1p23;
+/// Where one tile of all would have coarser steps than the usual edge, a cell is so many edges (64 of them a tile with steps of a quarter of
+/// one), unless so small a part of all that the cube would end before it.
+constexpr double kEdgesOfCell = 0x1p15;
+constexpr double kSmallestCell = 0x1p-11;
 
 struct Interval {
   double low = 0, high = 0;
@@ -27,9 +36,34 @@ Interval most_of(std::vector<double>& values) {
   return {std::max(values.front(), low - margin), std::min(values.back(), high + margin)};
 }
 
+/// The part of it that is not far beyond a side of the core.
+Interval within(const Interval& interval, double core_low, double core_high) {
+  const double margin = kMargin * (core_high - core_low);
+  const Interval part{std::max(interval.low, core_low - margin), std::min(interval.high, core_high + margin)};
+  return part.low <= part.high ? part : interval;
+}
+
+/// The median of some edges; 0 without any.
+double usual_edge_m(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
+  std::vector<double> squared;
+  const std::size_t stride = triangles.size() / kSampleSize + 1;
+  for (std::size_t t = 0; t < triangles.size(); t += stride) {
+    const auto& [a, b, c] = triangles[t];
+    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
+      const double edge = mesh::squared_distance(positions[from], positions[to]);
+      if (edge > 0 && std::isfinite(edge)) squared.push_back(edge);
+    }
+  }
+  if (squared.empty()) return 0;
+  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
+  std::nth_element(squared.begin(), middle, squared.end());
+  return std::sqrt(*middle);
+}
+
 }  // namespace
 
-MapGrid MapGrid::around(std::span<const base::Vec3f> positions, int level) {
+MapGrid MapGrid::around(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles,
+                        const std::optional<base::Bounds>& core, int level) {
   std::array<Interval, 3> box{};
   if (!positions.empty()) {
     const std::size_t stride = (positions.size() + kSampleSize - 1) / kSampleSize;
@@ -41,9 +75,18 @@ MapGrid MapGrid::around(std::span<const base::Vec3f> positions, int level) {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) box[axis] = most_of(sample[axis]);
   }
+  if (core) {
+    box[0] = within(box[0], double{core->min.x}, double{core->max.x});
+    box[1] = within(box[1], double{core->min.y}, double{core->max.y});
+    box[2] = within(box[2], double{core->min.z}, double{core->max.z});
+  }
   double extent = 0;
   for (const Interval& side : box) extent = std::max(extent, side.high - side.low);
-  const double cell_m = extent > 0 ? extent : 1;
+  double cell_m = extent > 0 ? extent : 1;
+  const double edge_m = usual_edge_m(positions, triangles);
+  if (edge_m > 0 && std::exp2(std::ceil(std::log2(cell_m / kStepsOfTile))) > edge_m) {
+    cell_m = std::min(cell_m, std::max(kEdgesOfCell * edge_m, kSmallestCell * cell_m));
+  }
   MapGrid grid;
   grid.edge_m_ = std::ldexp(cell_m, level);
   // A third of the way along, in binary 0.0101..: near no border of any level.

@@ -235,6 +235,26 @@ TEST(RoundForFile, KeepsTheFormBesideAVertexFarAway) {
   }
 }
 
+TEST(RoundForFile, KeepsTheFormBesideATriangleFarAway) {
+  jobs::WorkerPool pool(1);
+  const auto patch_with_a_triangle = [] {
+    auto mesh = patch_with_a_stray(false);
+    const auto last = static_cast<std::uint32_t>(mesh.vertex_count() - 1);
+    mesh.triangles().push_back({0, 1, last});
+    return mesh;
+  };
+  const auto exact = patch_with_a_triangle();
+  const auto scene = map::SceneSnapshot::build(patch_with_a_triangle(), 1, pool);
+  auto rounded = patch_with_a_triangle();
+  SceneFileOptions options{.format = SceneFileFormat::Draco};
+  ASSERT_TRUE(round_for_file(*scene, rounded, options));
+  EXPECT_EQ(options.position_step_m, 0) << "it has no lattice";
+  for (std::size_t v = 0; v < exact.vertex_count(); ++v) {
+    EXPECT_LT(std::abs(exact.positions()[v].x - rounded.positions()[v].x), 0.003F);
+    EXPECT_LT(std::abs(exact.positions()[v].y - rounded.positions()[v].y), 0.003F);
+  }
+}
+
 TEST(TemperatureOfMesh, LeavesMissingValuesOut) {
   const auto mesh = two_triangles();
   const auto temperature = temperature_of(mesh);

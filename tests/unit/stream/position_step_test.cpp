@@ -11,6 +11,8 @@
 
 #include "form.hpp"
 #include "fusion/demo/demo_scene.hpp"
+#include "fusion/mesh/stray_points.hpp"
+#include "server/map/scene_store.hpp"
 #include "server/stream/lattice.hpp"
 #include "tests/unit/map/generated_scene.hpp"
 
@@ -307,6 +309,38 @@ TEST(PositionSteps, KeepBoxesThatStandOnEachOther) {
     EXPECT_NEAR(side[0], 0.3, 0.03);
     EXPECT_NEAR(side[1], 2, 0.2);
     EXPECT_NEAR(side[2], 0.17, 0.017);
+  }
+}
+
+TEST(PositionSteps, OfASmallMeshAreNotCoarsenedByWhatIsFarAway) {
+  enum class Far { Piece, Spike, Mesh };
+  for (const Far what : {Far::Piece, Far::Spike, Far::Mesh}) {
+    Parts parts;
+    parts.grid(30, 20, {0, 0, 0}, {4.0F / 29, 0, 0}, {0, 4.0F / 19, 0},
+               [](int x, int y) { return 0.2 * std::sin(x * y); });
+    if (what == Far::Mesh) {
+      parts.grid(10, 10, {1e7F, 0, 0}, {5000, 0, 0}, {0, 5000, 0}, [](int, int) { return 0; });
+    } else {
+      const std::uint32_t far = parts.add(1e7, 0, 0);
+      if (what == Far::Spike) {
+        parts.triangles.push_back({0, 1, far});
+      } else {
+        parts.triangles.push_back({far, parts.add(1e7, 1, 0), parts.add(1e7, 0, 1)});
+      }
+    }
+    files::LoadedScene loaded;
+    loaded.mesh = parts.mesh();
+    loaded.core_bounds = mesh::stray_points(loaded.mesh.positions(), loaded.mesh.triangles()).core;
+    jobs::WorkerPool pool(2);
+    map::SceneStore scenes;
+    const auto scene = scenes.replace(std::move(loaded), pool, map::LevelsOfDetail::All);
+    double coarsest_m = 0;
+    for (const auto& tile : scene->tiles()) {
+      if (tile->child_mask != 0 || tile->bounds.max.x > 100) continue;
+      coarsest_m = double{tile_lattice(*tile, scene->suggested_position_step_m()).value().coarsest_step_m};
+    }
+    EXPECT_GT(coarsest_m, 0) << "the small mesh has a tile of its own";
+    EXPECT_LT(coarsest_m, 0.02);
   }
 }
 
