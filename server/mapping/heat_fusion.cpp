@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -69,26 +70,60 @@ class Differences {
   std::size_t count_ = 0;
 };
 
+/// Takes what is larger.
+void take_larger(const float* from, std::size_t count, float* to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] = to[i] < from[i] ? from[i] : to[i];
+}
+
 /// The largest value within kSpread pixels, along both axes.
 std::vector<float> largest_around(const std::vector<float>& values, std::size_t width, std::size_t height,
                                   jobs::WorkerPool& pool) {
   std::vector<float> across(values.size()), both(values.size());
   for_each_row(height, pool, [&](std::size_t y) {
-    const float* row = &values[y * width];
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t first = x > kSpread ? x - kSpread : 0, end = std::min(width, x + kSpread + 1);
-      across[y * width + x] = *std::max_element(row + first, row + end);
+    const float* from = &values[y * width];
+    float* to = &across[y * width];
+    std::copy_n(from, width, to);
+    for (std::size_t step = 1; step <= std::min(kSpread, width - 1); ++step) {
+      take_larger(from + step, width - step, to);
+      take_larger(from, width - step, to + step);
     }
   });
   for_each_row(height, pool, [&](std::size_t y) {
     const std::size_t first = y > kSpread ? y - kSpread : 0, end = std::min(height, y + kSpread + 1);
-    float* to = &both[y * width];
-    for (std::size_t row = first; row < end; ++row) {
-      const float* from = &across[row * width];
-      for (std::size_t x = 0; x < width; ++x) to[x] = std::max(to[x], from[x]);
-    }
+    for (std::size_t row = first; row < end; ++row) take_larger(&across[row * width], width, &both[y * width]);
   });
   return both;
+}
+
+/// Of a row: how temperatures change with a pixel, less `noise`, at least 0. `above` and `below` are the rows beside it, or the row itself.
+void find_gradient(const float* above, const float* row, const float* below, std::size_t width, float noise,
+                   float* to) {
+  const auto at = [&](std::size_t left, std::size_t x, std::size_t right) {
+    const float dx = 0.5F * (row[right] - row[left]), dy = 0.5F * (below[x] - above[x]);
+    const float steep = std::sqrt(dx * dx + dy * dy) - noise;
+    return steep > 0 ? steep : 0;
+  };
+  to[0] = at(0, 0, std::min<std::size_t>(1, width - 1));
+  for (std::size_t x = 1; x + 1 < width; ++x) to[x] = at(x - 1, x, x + 1);
+  if (width > 1) to[width - 1] = at(width - 2, width - 1, width - 1);
+}
+
+/// The value in the middle of all.
+std::uint16_t middle_of(const std::vector<std::uint16_t>& pixels) {
+  const auto [lowest, highest] = std::minmax_element(pixels.begin(), pixels.end());
+  const std::size_t low = *lowest, range = std::size_t{*highest} - low + 1;
+  // Neighbours are mostly the same: counted in turns, so that no count waits for the one before.
+  constexpr std::size_t kTurns = 4;
+  std::vector<std::uint32_t> counts(kTurns * range, 0);
+  for (std::size_t i = 0; i < pixels.size(); ++i) ++counts[i % kTurns * range + pixels[i] - low];
+  const auto count_of = [&](std::size_t value) {
+    std::size_t count = 0;
+    for (std::size_t turn = 0; turn < kTurns; ++turn) count += counts[turn * range + value];
+    return count;
+  };
+  std::size_t value = 0;
+  for (std::size_t below = count_of(0); below <= pixels.size() / 2; below += count_of(value)) ++value;
+  return static_cast<std::uint16_t>(low + value);
 }
 
 }  // namespace
@@ -122,11 +157,7 @@ float HeatFusion::middle_celsius(const Picture16& picture, const std::vector<flo
     return sorted[middle];
   }
   // Without it temperatures are in the order of the values.
-  std::vector<std::uint32_t> counts(std::size_t{1} << 16, 0);
-  for (const std::uint16_t value : picture.pixels) ++counts[value];
-  std::size_t value = 0;
-  for (std::size_t below = counts[0]; below <= middle; below += counts[value]) ++value;
-  return celsius_of(static_cast<std::uint16_t>(value));
+  return celsius_of(middle_of(picture.pixels));
 }
 
 HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerPool& pool) const {
@@ -135,9 +166,10 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
   const auto width = static_cast<std::size_t>(picture.width), height = static_cast<std::size_t>(picture.height);
   prepared.celsius.resize(count);
   prepared.gradient.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    prepared.celsius[i] = celsius_of(picture.pixels[i]);
-    if (!vignetting_.empty()) prepared.celsius[i] -= vignetting_.pixels[i];
+  std::transform(picture.pixels.begin(), picture.pixels.end(), prepared.celsius.begin(), celsius_of);
+  if (!vignetting_.empty()) {
+    std::transform(prepared.celsius.begin(), prepared.celsius.end(), vignetting_.pixels.begin(),
+                   prepared.celsius.begin(), std::minus<float>());
   }
   if (calibration_.reflected_celsius) {
     prepared.reflected = static_cast<float>(*calibration_.reflected_celsius);
@@ -161,13 +193,9 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
   const auto noise = static_cast<float>(2 * calibration_.netd_kelvin);
   for_each_row(height, pool, [&](std::size_t y) {
     const std::size_t above = (y > 0 ? y - 1 : y) * width, below = (y + 1 < height ? y + 1 : y) * width;
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t left = x > 0 ? x - 1 : x, right = x + 1 < width ? x + 1 : x;
-      const float dx = 0.5F * (prepared.celsius[y * width + right] - prepared.celsius[y * width + left]);
-      const float dy = 0.5F * (prepared.celsius[below + x] - prepared.celsius[above + x]);
-      // What noise alone makes is none.
-      prepared.gradient[y * width + x] = std::max(0.0F, std::sqrt(dx * dx + dy * dy) - noise);
-    }
+    const float* all = prepared.celsius.data();
+    // What noise alone makes is none.
+    find_gradient(all + above, all + y * width, all + below, width, noise, &prepared.gradient[y * width]);
   });
   prepared.gradient = largest_around(prepared.gradient, width, height, pool);
   return prepared;
