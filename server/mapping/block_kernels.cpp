@@ -89,11 +89,15 @@ BlockChange distances(const DistanceKernel& kernel, const std::array<float, 3>& 
       continue;
     }
     const Floats old_weight = load_narrow(&block.weight[i]), sum = hn::Add(old_weight, weight);
-    const Floats target = hn::Min(all(kDistanceOne), hn::Max(all(-kDistanceOne), hn::Mul(metres, per_m)));
-    const Floats mean = mean_after(old, target, hn::Div(weight, hn::Max(all(1), sum)));
-    const Floats next = hn::IfThenElse(is_seen, mean, old);
-    store_narrow(next, &block.distance[i]);
     store_narrow(hn::Min(all(kWeightMost), sum), &block.weight[i]);
+    const Floats target = hn::Min(all(kDistanceOne), hn::Max(all(-kDistanceOne), hn::Mul(metres, per_m)));
+    Floats next = old;
+    // What is well before a surface mostly was before.
+    if (!hn::AllFalse(d, hn::And(is_seen, hn::Ne(target, old)))) {
+      const Floats mean = mean_after(old, target, hn::Div(weight, hn::Max(all(1), sum)));
+      next = hn::IfThenElse(is_seen, mean, old);
+      store_narrow(next, &block.distance[i]);
+    }
     const Floats either = hn::Min(hn::Abs(next), hn::Abs(old));
     moved = hn::Max(moved, hn::IfThenElseZero(hn::Lt(either, half), hn::Abs(hn::Sub(next, old))));
     nearest = hn::Min(nearest, either);

@@ -28,7 +28,7 @@ struct BorderPixels {
 
   /// Metres by which neighbours may differ that are so many pixels apart on one surface.
   float largest_step(float z, float sigma_m, int pixels) const {
-    return 6 * sigma_m + static_cast<float>(pixels) * z / focal * kSteepest;
+    return 6 * sigma_m + static_cast<float>(pixels) * (z / focal * kSteepest);
   }
 
   bool is_at_edge(int x, int y, float z, float sigma_m) const {
@@ -125,8 +125,7 @@ RayTable::RayTable(const CameraModel& camera) : width(camera.width), height(came
 }
 
 DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& calibration, const RayTable& rays,
-                          double truncation_m, jobs::WorkerPool& pool) {
-  DepthFrame frame;
+                          double truncation_m, jobs::WorkerPool& pool, DepthFrame frame) {
   frame.width = picture.width;
   frame.height = picture.height;
   const auto width = static_cast<std::size_t>(frame.width), height = static_cast<std::size_t>(frame.height);

@@ -36,8 +36,8 @@ struct RayTable {
 
 /// Weighs the pixels of a depth picture: (2 sigma_0 / sigma_z)^2 cos(angle to the surface), at most 1, with sigma of the sensor's noise. Left
 /// out are pixels within 2 of a jump of depth and those beside nothing (what a sensor says there lies between near and far), those seen
-/// at more than 80 degrees, and those whose noise is more than `truncation_m`.
+/// at more than 80 degrees, and those whose noise is more than `truncation_m`. `frame`: an earlier one, whose memory is used again.
 DepthFrame prepared_depth(const Picture16& picture, const DepthCalibration& calibration, const RayTable& rays,
-                          double truncation_m, jobs::WorkerPool& pool);
+                          double truncation_m, jobs::WorkerPool& pool, DepthFrame frame = {});
 
 }  // namespace spectra::mapping

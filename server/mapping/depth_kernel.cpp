@@ -63,10 +63,9 @@ void weigh(const DepthPixels& pixels, std::size_t first, std::size_t count, floa
     const Floats sigma = hn::LoadU(d, noise.sigma_m.data());
     is_taken = hn::And(is_taken, hn::Ge(sigma, zero));
     // Metres by which neighbours may differ that are so many pixels apart on one surface.
-    const auto largest_step = [&](float apart) HWY_ATTR {
-      const Floats steepest = hn::Mul(hn::Div(hn::Mul(all(apart), z), all(pixels.focal)), all(kSteepest));
-      return hn::Add(hn::Mul(all(6), sigma), steepest);
-    };
+    const Floats steepest = hn::Mul(hn::Div(z, all(pixels.focal)), all(kSteepest));
+    const auto largest_step = [&](float apart)
+                                  HWY_ATTR { return hn::Add(hn::Mul(all(6), sigma), hn::Mul(all(apart), steepest)); };
     const std::array most{largest_step(1), largest_step(2), largest_step(3)};
     static_assert(kEdgeReach == 2 && kNormalReach == 3);
     const auto side = [&](std::ptrdiff_t step) HWY_ATTR {

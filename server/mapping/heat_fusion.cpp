@@ -126,6 +126,39 @@ std::uint16_t middle_of(const std::vector<std::uint16_t>& pixels) {
   return static_cast<std::uint16_t>(low + value);
 }
 
+/// Voxels that a picture tells something of, some at a time, an array a quantity.
+struct SeenHeat {
+  static constexpr std::size_t kRoom = 256;
+  std::size_t count = 0;
+  std::array<const SurfaceVoxel*, kRoom> voxel;
+  alignas(64) std::array<float, kRoom> u, v, z, cosine, celsius, gradient;
+  std::array<float, kRoom> own, scale;  ///< As Look's.
+};
+
+/// What weighs looks. Motions are those within the time of a pixel.
+struct LookWeights {
+  Lens lens;
+  std::array<float, 3> linear, angular;
+  float noise, reflected_celsius, after_shutter;
+
+  void weigh(SeenHeat& seen) const {
+    for (std::size_t i = 0; i < seen.count; ++i) {
+      const float z = seen.z[i], c = seen.cosine[i] < 0.05F ? 0.05F : seen.cosine[i];
+      const float px = (seen.u[i] - lens.cx) / lens.fx, py = (seen.v[i] - lens.cy) / lens.fy, x = px * z, y = py * z;
+      // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
+      const float moved_x = -(linear[0] + (angular[1] * z - angular[2] * y)),
+                  moved_y = -(linear[1] + (angular[2] * x - angular[0] * z)),
+                  moved_z = -(linear[2] + (angular[0] * y - angular[1] * x));
+      const float du = lens.fx * (moved_x - px * moved_z) / z, dv = lens.fy * (moved_y - py * moved_z) / z;
+      const float uncertain = kPixelError * seen.gradient[i];
+      const float askew = (1 - c) * (1 - c);
+      const float reflected = kReflection * askew * askew * (1 - c) * (seen.celsius[i] - reflected_celsius);
+      seen.own[i] = noise + uncertain * uncertain + reflected * reflected;
+      seen.scale[i] = z * z / c * (1 + du * du + dv * dv) * after_shutter;
+    }
+  }
+};
+
 }  // namespace
 
 /// What one picture says of one voxel.
@@ -257,11 +290,28 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
   const bool is_after_shutter = rules_.shutter && moment_s - last_frozen_s_ < kAfterShutterSeconds;
   const auto noise = static_cast<float>(calibration_.netd_kelvin * calibration_.netd_kelvin);
   const CameraModel& model = calibration_.camera;
-  const Lens lens(model);
 
+  const LookWeights of_picture{
+      Lens(model),        {linear.x(), linear.y(), linear.z()},   {angular.x(), angular.y(), angular.z()}, noise,
+      prepared.reflected, is_after_shutter ? kAfterShutter : 1.0F};
   std::vector<std::vector<Look>> looks(view.voxels.size());
   pool.for_each(looks.size(), [&](std::size_t chunk) {
     looks[chunk].reserve(view.voxels[chunk].size());
+    SeenHeat some;
+    const auto take = [&] {
+      if (rules_.weights) of_picture.weigh(some);
+      for (std::size_t i = 0; i < some.count; ++i) {
+        const SurfaceVoxel& voxel = *some.voxel[i];
+        Look look{voxel.block, voxel.voxel, some.celsius[i], 1, noise};
+        if (rules_.weights) {
+          if (some.own[i] * some.scale[i] > kMostVariance) continue;
+          look.scale = some.scale[i];
+          look.own = some.own[i];
+        }
+        looks[chunk].push_back(look);
+      }
+      some.count = 0;
+    };
     for (const SurfaceVoxel& seen : view.voxels[chunk]) {
       const int x = floor_of(seen.u), y = floor_of(seen.v);
       if (x < 0 || y < 0 || x + 1 >= model.width || y + 1 >= model.height) continue;
@@ -272,24 +322,17 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
       const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
       const float* row = &prepared.celsius[pixel];
       const float* next = row + model.width;
-      const float celsius = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
-      Look look{seen.block, seen.voxel, celsius, 1, noise};
-      if (rules_.weights) {
-        const float z = seen.z_m, c = std::max(seen.cosine, 0.05F);
-        const float px = (seen.u - lens.cx) / lens.fx, py = (seen.v - lens.cy) / lens.fy;
-        // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
-        const Eigen::Vector3f point(px * z, py * z, z);
-        const Eigen::Vector3f moved = -(linear + angular.cross(point));
-        const float du = lens.fx * (moved.x() - px * moved.z()) / z, dv = lens.fy * (moved.y() - py * moved.z()) / z;
-        const float uncertain = kPixelError * prepared.gradient[pixel];
-        const float askew = (1 - c) * (1 - c);
-        const float reflected = kReflection * askew * askew * (1 - c) * (celsius - prepared.reflected);
-        look.own = noise + uncertain * uncertain + reflected * reflected;
-        look.scale = z * z / c * (1 + du * du + dv * dv) * (is_after_shutter ? kAfterShutter : 1.0F);
-        if (look.own * look.scale > kMostVariance) continue;
-      }
-      looks[chunk].push_back(look);
+      const std::size_t i = some.count++;
+      some.celsius[i] = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
+      some.gradient[i] = prepared.gradient[pixel];
+      some.voxel[i] = &seen;
+      some.u[i] = seen.u;
+      some.v[i] = seen.v;
+      some.z[i] = seen.z_m;
+      some.cosine[i] = seen.cosine;
+      if (some.count == SeenHeat::kRoom) take();
     }
+    take();
   });
 
   if (rules_.frame_offset) find_offset(map, looks, moment_s, pool, report);

@@ -95,9 +95,9 @@ bool Mapper::fuse_surface(const Frame& frame, const Trajectory& trajectory, Faul
   PoseAnswer pose;
   if (!find_pose(trajectory, frame.time_s + calibration_.depth.delay_s, pose, faults)) return false;
   note_time(frame);
-  const DepthFrame depth =
-      prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
-  const DepthLook look{depth, calibration_.depth.camera, rays_, calibration_.depth.noise, pose.pose};
+  depth_ = prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_,
+                          std::move(depth_));
+  const DepthLook look{depth_, calibration_.depth.camera, rays_, calibration_.depth.noise, pose.pose};
   // Poses after a correction are of another world than those before.
   if (submaps_ && !submaps_->is_open()) is_doubtful_ = false;
   if (is_doubtful_ && fused().block_count() > 0) {
@@ -201,11 +201,11 @@ void Mapper::fuse_tracked(const Frame& frame, const Trajectory& trajectory, Faul
     }
   }
   if (!frame.depth.empty()) {
-    const DepthFrame depth =
-        prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_);
-    if (const auto pose = track(frame, depth, trajectory, faults)) {
+    depth_ = prepared_depth(frame.depth, calibration_.depth, rays_, kTruncationVoxels * settings_.voxel_m, pool_,
+                            std::move(depth_));
+    if (const auto pose = track(frame, depth_, trajectory, faults)) {
       tracked_.add(frame.time_s + calibration_.depth.delay_s, *pose);
-      fuse_prepared(frame, {depth, calibration_.depth.camera, rays_, calibration_.depth.noise, *pose}, tracked_,
+      fuse_prepared(frame, {depth_, calibration_.depth.camera, rays_, calibration_.depth.noise, *pose}, tracked_,
                     faults);
     }
   }

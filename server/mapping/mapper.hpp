@@ -130,6 +130,7 @@ class Mapper {
   bool is_doubtful_ = false;  ///< Poses have jumped, and none has been found to fit since.
   std::optional<Tracker> tracker_;
   Trajectory tracked_;
+  DepthFrame depth_;                        ///< The last one.
   std::vector<Frame> held_;                 ///< Thermal pictures that wait for a pose after them, at most kMostHeld.
   Picture16 newest_thermal_;                ///< That differs from the one before.
   std::optional<double> newest_thermal_s_;  ///< When it was taken.

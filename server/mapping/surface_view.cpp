@@ -92,9 +92,11 @@ struct Drawing {
     SeenVoxels seen;
     see_voxels(kernel, map.voxels(index), kernel.view.corner(map.head(index).at), voxel_m, beside,
                kTruncation * voxel_m / kDistanceOne, seen);
+    const std::size_t first = out.size();
+    out.resize(first + seen.count);
     for (std::size_t i = 0; i < seen.count; ++i) {
-      out.push_back(
-          {index, static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]});
+      out[first + i] = {
+          index, static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]};
       if (seen.off_m[i] <= voxel_m) draw_square(seen, i, depth_m);  // else the surface is drawn by those next to it
     }
   }
