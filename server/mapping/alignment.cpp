@@ -23,6 +23,12 @@ constexpr float kMatchingSigmas = 3;
 constexpr double kPointsAlike = 10;
 constexpr double kGuessMetres = 0.05, kGuessRadians = 0.05;  ///< What a guess may be off by.
 constexpr int kCoarseRounds = 6, kFineRounds = 6;
+/// Of motion_between(): the farthest that a plane may be, in its first and its last round; pixels between which its direction is taken.
+constexpr float kFarthestFirst = 0.3F, kFarthestLast = 0.1F;
+constexpr int kMotionRounds = 12, kPlaneReach = 4;
+constexpr float kPlaneBend = 0.1F;   ///< Of z: pixels of one plane do not differ by more.
+constexpr float kLeastAlike = 0.9F;  ///< Cosine between the directions of planes that may be one.
+constexpr std::size_t kLeastPaired = 200;
 constexpr double kLastMetres = 1e-4, kLastRadians = 1e-4;  ///< A smaller step ends it.
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -180,7 +186,104 @@ Vector6 difference(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
   return d;
 }
 
+/// What a guess weighs beside points.
+Vector6 expectation() {
+  Vector6 expected;
+  expected << Eigen::Vector3d::Constant(kPointsAlike / (kGuessRadians * kGuessRadians)),
+      Eigen::Vector3d::Constant(kPointsAlike / (kGuessMetres * kGuessMetres));
+  return expected;
+}
+
+/// A pixel of a depth picture and the plane through it, in the axes of its camera.
+struct SeenPlane {
+  Eigen::Vector3f place, normal;
+};
+
+/// False where one of the pixels about it does not count, or where there is no plane.
+bool plane_at(const DepthFrame& frame, const RayTable& rays, const Lens& lens, const Eigen::Vector3f& seen_at,
+              SeenPlane& plane) {
+  if (seen_at.z() < 0.1F) return false;
+  float u = 0, v = 0;
+  lens.project(seen_at.x() / seen_at.z(), seen_at.y() / seen_at.z(), u, v);
+  constexpr auto kMargin = static_cast<float>(kPlaneReach);
+  if (!(u >= kMargin && v >= kMargin && u < static_cast<float>(frame.width) - kMargin - 1 &&
+        v < static_cast<float>(frame.height) - kMargin - 1))
+    return false;
+  const int x = static_cast<int>(u + 0.5F), y = static_cast<int>(v + 0.5F);
+  const auto place_at = [&](int dx, int dy, Eigen::Vector3f& place) {
+    const auto pixel = static_cast<std::size_t>((y + dy) * frame.width + x + dx);
+    const float z = frame.depth_m[pixel];
+    place = {rays.x[pixel] * z, rays.y[pixel] * z, z};
+    return frame.weight[pixel] > 0;
+  };
+  Eigen::Vector3f left, right, above, below;
+  if (!place_at(0, 0, plane.place) || !place_at(-kPlaneReach, 0, left) || !place_at(kPlaneReach, 0, right) ||
+      !place_at(0, -kPlaneReach, above) || !place_at(0, kPlaneReach, below))
+    return false;
+  const float most = kPlaneBend * plane.place.z();
+  if (std::abs(right.z() - left.z()) > most || std::abs(below.z() - above.z()) > most) return false;
+  plane.normal = (right - left).cross(below - above).normalized();
+  return true;
+}
+
+/// What planes of an earlier picture say of the motion since.
+struct MotionWork {
+  const DepthFrame& before;
+  const RayTable& rays;
+  const Lens& lens;
+  std::vector<SeenPlane> planes;  ///< Of the later picture.
+  std::vector<float> sigma_m;
+
+  Sums sums(const Eigen::Isometry3d& pose, float farthest, jobs::WorkerPool& pool) const {
+    std::vector<Sums> parts((planes.size() + kChunk - 1) / kChunk);
+    pool.for_each(parts.size(), [&](std::size_t part) {
+      const std::size_t end = std::min(planes.size(), (part + 1) * kChunk);
+      for (std::size_t i = part * kChunk; i < end; ++i) add(pose.cast<float>(), farthest, i, parts[part]);
+    });
+    Sums all;
+    for (const Sums& part : parts) all.add(part);
+    return all;
+  }
+
+  void add(const Eigen::Isometry3f& pose, float farthest, std::size_t i, Sums& sums) const {
+    const Eigen::Vector3f arm = pose.linear() * planes[i].place, place = arm + pose.translation();
+    SeenPlane plane;
+    if (!plane_at(before, rays, lens, place, plane)) return;
+    const Eigen::Vector3f apart = place - plane.place;
+    if (!(apart.norm() < farthest && plane.normal.dot(pose.linear() * planes[i].normal) > kLeastAlike)) return;
+    ++sums.known;
+    // What is far from its plane is so by the motion first, and by chance or another surface in the end.
+    const float off = plane.normal.dot(apart), slack = (farthest - kFarthestLast) / 3;
+    sums.add_row(arm, plane.normal, off, huber(off / (sigma_m[i] + slack)) / (sigma_m[i] * sigma_m[i]));
+  }
+};
+
 }  // namespace
+
+Eigen::Isometry3d motion_between(const DepthFrame& before, const DepthFrame& now, const RayTable& rays,
+                                 const CameraModel& camera, const SeenPoints& seen, const Eigen::Isometry3d& guess,
+                                 jobs::WorkerPool& pool) {
+  const Lens lens(camera);
+  MotionWork work{before, rays, lens, {}, {}};
+  for (std::size_t i = 0; i < seen.coarse_count; ++i) {
+    SeenPlane plane;
+    if (!plane_at(now, rays, lens, seen.points[i].place, plane)) continue;
+    work.planes.push_back(plane);
+    work.sigma_m.push_back(seen.points[i].sigma_m);
+  }
+  const Matrix6 expected = expectation().asDiagonal();
+  Eigen::Isometry3d motion = guess;
+  for (int round = 0; round < kMotionRounds; ++round) {
+    const float share = static_cast<float>(round) / (kMotionRounds - 1);
+    const Sums sums = work.sums(motion, kFarthestFirst + share * (kFarthestLast - kFarthestFirst), pool);
+    if (sums.known < kLeastPaired) return guess;
+    const Vector6 right = Eigen::Map<const Vector6>(sums.right.data()) - expected * difference(guess, motion);
+    const Vector6 step = (sums.matrix() + expected).ldlt().solve(right);
+    if (!step.allFinite()) return guess;
+    move(motion, step);
+  }
+  return motion;
+}
 
 Alignment fit_at(const VoxelMap& map, const SeenPoints& seen, std::size_t count,
                  const Eigen::Isometry3d& world_from_camera, jobs::WorkerPool& pool) {
@@ -195,9 +298,7 @@ Alignment align(const VoxelMap& map, const SeenPoints& seen, const Eigen::Isomet
                 const AlignmentTerms& terms, jobs::WorkerPool& pool) {
   Alignment found;
   found.world_from_camera = guess;
-  Vector6 expected;
-  expected << Eigen::Vector3d::Constant(kPointsAlike / (kGuessRadians * kGuessRadians)),
-      Eigen::Vector3d::Constant(kPointsAlike / (kGuessMetres * kGuessMetres));
+  const Vector6 expected = expectation();
   Common common;
   Sums last;
   for (const bool is_coarse : {true, false}) {

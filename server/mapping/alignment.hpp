@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "server/jobs/worker_pool.hpp"
+#include "server/mapping/camera.hpp"
+#include "server/mapping/depth_frame.hpp"
 #include "server/mapping/voxel_map.hpp"
 
 namespace spectra::mapping {
@@ -53,5 +55,13 @@ Alignment fit_at(const VoxelMap& map, const SeenPoints& seen, std::size_t count,
 /// tells stays as guessed. The same for any number of threads.
 Alignment align(const VoxelMap& map, const SeenPoints& seen, const Eigen::Isometry3d& guess,
                 const AlignmentTerms& terms, jobs::WorkerPool& pool);
+
+/// How a depth camera moved between two of its pictures (before_from_now), near `guess`: what the first `coarse_count` points see of planes lies on the
+/// planes of the earlier picture into whose pixels they fall, of those within some decimetres that face alike (Rusinkiewicz and Levoy, 3DIM 2001). It
+/// reaches farther than align(), whose map knows nothing beyond its truncation, and is less exact. The guess where too little falls on anything. The
+/// same for any number of threads.
+Eigen::Isometry3d motion_between(const DepthFrame& before, const DepthFrame& now, const RayTable& rays,
+                                 const CameraModel& camera, const SeenPoints& seen, const Eigen::Isometry3d& guess,
+                                 jobs::WorkerPool& pool);
 
 }  // namespace spectra::mapping

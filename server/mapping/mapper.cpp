@@ -161,7 +161,7 @@ std::optional<Eigen::Isometry3d> Mapper::track(const Frame& frame, const DepthFr
       faults.add(FaultKind::NoPose, far_text(moment.time_s));
       return std::nullopt;
     }
-    tracker_->begin(moment.time_s, first.pose);
+    tracker_->begin(moment.time_s, depth, first.pose);
     return first.pose;
   }
   moment.depth = &depth;

@@ -41,8 +41,8 @@ class Tracker {
   Tracker(const Calibration& calibration, const RayTable& rays, const TrackerRules& rules)
       : calibration_(calibration), rays_(rays), rules_(rules) {}
 
-  /// Takes the pose of the first picture as it is.
-  void begin(double time_s, const Eigen::Isometry3d& pose);
+  /// Takes the pose of the first depth picture as it is.
+  void begin(double time_s, const DepthFrame& depth, const Eigen::Isometry3d& pose);
   bool has_begun() const { return !keys_.empty(); }
 
   /// Finds the pose of the depth camera; moments in the order of their time. Nothing when what is seen does not fit the map anywhere near where it
@@ -60,11 +60,12 @@ class Tracker {
   bool is_good(const Alignment& found, double matching) const;
   std::vector<Eigen::Isometry3d> guesses(const VoxelMap& map, const SeenPoints& seen, double time_s,
                                          jobs::WorkerPool& pool) const;
-  void keep(double time_s, const Eigen::Isometry3d& pose);
+  void keep(double time_s, const DepthFrame& depth, const Eigen::Isometry3d& pose);
 
   const Calibration& calibration_;
   const RayTable& rays_;
   const TrackerRules rules_;
+  DepthFrame seen_before_;               ///< The depth picture whose pose is pose_.
   std::vector<Eigen::Isometry3d> keys_;  ///< Poses that were found, some way apart, to come back to.
   Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity(), before_ = Eigen::Isometry3d::Identity();
   double time_s_ = 0, before_s_ = 0;

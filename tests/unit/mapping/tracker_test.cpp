@@ -78,6 +78,23 @@ TEST_F(TrackerTest, FindsPosesFromDepthAlone) {
   EXPECT_LT(mapper.figures().tracking_residual_m, 0.005);
 }
 
+TEST_F(TrackerTest, FollowsMotionsThatReachBeyondWhatTheMapKnows) {
+  // From the second picture on at 0.8 rad/s: walls move by 16 cm between two pictures, the map knows 8 about them.
+  const auto turning_at = [](int i) { return looking_ahead(0.1 - 0.03 * i, 0, 0.02 * i, 0.1 - 0.08 * i); };
+  Trajectory first;
+  first.add(0, turning_at(0));
+  Mapper mapper(calibration_, settings_, pool_);
+  for (int i = 0; i <= 5; ++i) {
+    Frame frame;
+    frame.time_s = 0.1 * i;
+    frame.depth = corner_.depth(calibration_.depth.camera, turning_at(i));
+    mapper.fuse(frame, first, faults_);
+    const PoseAnswer found = mapper.tracked().at(frame.time_s);
+    ASSERT_EQ(found.state, PoseState::Known) << i;
+    EXPECT_LT((found.pose.translation() - turning_at(i).translation()).norm(), 0.01) << i;
+  }
+}
+
 TEST_F(TrackerTest, TakesOnlyTheFirstPoseAsGiven) {
   Trajectory wrong;
   for (int i = 0; i <= 40; ++i) wrong.add(0.2 * i, i == 0 ? pose_at(0) : looking_ahead(0, 0, -3));
