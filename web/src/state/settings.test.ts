@@ -361,6 +361,21 @@ describe('Settings that are fused here', () => {
     expect(store.generation).toBe(3);
   });
 
+  it('are told all five seconds while they go on at a pace that people have', async () => {
+    const { store, settings, asked, fuseHere } = setUp();
+    store.fusionInForce = fusionWith(0.4);
+    fuseHere(shownBy);
+    for (let i = 0; i < 100; i += 1) {
+      settings.setParameter('alpha', i / 100, true);
+      await asked.at(-1)?.answer(3, fusionWith(0.4));
+      await vi.advanceTimersByTimeAsync(300);
+    }
+    expect(asked).toHaveLength(6);
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(asked).toHaveLength(7);
+    expect(asked.at(-1)?.change.params).toMatchObject({ alpha: 99 / 100 });
+  });
+
   it('are told at leisure as well where they are other methods, one after the other', async () => {
     const { store, settings, asked, fuseHere } = setUp();
     store.fusionInForce = fusionWith(0.4);

@@ -16,8 +16,9 @@ import { type Store, THERMAL_VIEW, type ViewMode, viewModeOf, VISIBLE_VIEW } fro
 /** Least time between two changes of the settings. */
 const CHANGE_INTERVAL_MS = 33;
 const BUSY_WAIT_MS = 300;
-/** The same of changes that are shown already: the server is told so that other things keep up. */
-const TELL_INTERVAL_MS = 1000;
+/** Changes that are shown already: the server is told so that other things keep up, once they rest or after a while. */
+const TELL_REST_MS = 1000;
+const TELL_INTERVAL_MS = 5000;
 /** All but the outermost temperatures, where the server has named no others. */
 const FIRST_PERCENTILES: RangeChange = { mode: 'percentile', low: 0.5, high: 99.5 };
 
@@ -78,6 +79,7 @@ export class Settings {
       send: (change) => this.#tell(change),
       merge: mergedChange,
       interval_ms: TELL_INTERVAL_MS,
+      rest_ms: TELL_REST_MS,
       max_in_flight: 1,
     });
   }

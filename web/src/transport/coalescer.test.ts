@@ -3,7 +3,7 @@ import { Coalescer } from './coalescer';
 
 type Change = Record<string, number>;
 
-function setUp(max_in_flight = 1) {
+function setUp(max_in_flight = 1, rest_ms?: number) {
   const sent: Change[] = [];
   const answers: (() => void)[] = [];
   const idle = vi.fn();
@@ -14,6 +14,7 @@ function setUp(max_in_flight = 1) {
     },
     merge: (earlier, later) => ({ ...earlier, ...later }),
     interval_ms: 30,
+    ...(rest_ms === undefined ? {} : { rest_ms }),
     max_in_flight,
     onIdle: idle,
   });
@@ -50,6 +51,25 @@ describe('Coalescer', () => {
     expect(sent.length).toBeGreaterThanOrEqual(9);
     await vi.advanceTimersByTimeAsync(30);
     expect(sent.at(-1)).toEqual({ alpha: 295 });
+  });
+
+  it('sends the first after a rest at once; others wait until changes rest, and no longer than the interval', async () => {
+    const { coalescer, sent, answer } = setUp(1, 10);
+    for (let ms = 0; ms < 90; ms += 5) {
+      coalescer.push({ alpha: ms });
+      await answer();
+      await vi.advanceTimersByTimeAsync(5);
+    }
+    expect(sent).toEqual([{ alpha: 0 }, { alpha: 30 }, { alpha: 60 }]);
+    await answer();
+    await vi.advanceTimersByTimeAsync(4);
+    expect(sent).toHaveLength(3);
+    await vi.advanceTimersByTimeAsync(1);
+    expect(sent.at(-1)).toEqual({ alpha: 85 });
+    await answer();
+    await vi.advanceTimersByTimeAsync(10);
+    coalescer.push({ alpha: 99 });
+    expect(sent.at(-1)).toEqual({ alpha: 99 });
   });
 
   it('does not wait for the interval when flushed', () => {

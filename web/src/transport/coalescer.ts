@@ -6,6 +6,8 @@ export interface CoalescerOptions<T> {
   merge: (earlier: T, later: T) => T;
   /** Least time between two sends; a flush does not wait for it. */
   interval_ms: number;
+  /** What comes sooner after another waits until nothing has come for so long, or for the interval since the first that waits. */
+  rest_ms?: number;
   /** Most unanswered sends; what comes meanwhile is merged. */
   max_in_flight: number;
   /** Called when nothing is waiting and nothing is unanswered. */
@@ -20,6 +22,10 @@ export class Coalescer<T> {
   #pending: T | undefined;
   #inFlight = 0;
   #lastSent = Number.NEGATIVE_INFINITY;
+  #waitingSince = 0;
+  #pushed = Number.NEGATIVE_INFINITY;
+  /** The first that waits came after a rest. */
+  #isRested = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #urgent = false;
   #epoch = 0;
@@ -32,6 +38,12 @@ export class Coalescer<T> {
   }
 
   push(change: T): void {
+    const now = performance.now();
+    if (this.#pending === undefined) {
+      this.#waitingSince = now;
+      this.#isRested = now - this.#pushed >= (this.options.rest_ms ?? 0);
+    }
+    this.#pushed = now;
     this.#pending = this.#pending === undefined ? change : this.options.merge(this.#pending, change);
     this.#pump();
   }
@@ -64,9 +76,15 @@ export class Coalescer<T> {
     return pending;
   }
 
+  get #due(): number {
+    const { interval_ms, rest_ms } = this.options;
+    if (rest_ms === undefined) return this.#lastSent + interval_ms;
+    return this.#isRested ? this.#waitingSince : Math.min(this.#pushed + rest_ms, this.#waitingSince + interval_ms);
+  }
+
   #pump(): void {
     if (this.#pending === undefined || this.#inFlight >= this.options.max_in_flight) return;
-    const wait = this.#lastSent + this.options.interval_ms - performance.now();
+    const wait = this.#due - performance.now();
     if (wait > 0 && !this.#urgent) {
       this.#timer ??= setTimeout(() => {
         this.#timer = undefined;
