@@ -17,6 +17,10 @@ constexpr std::uint64_t kPartVertices = 50;
 /// Each round leaves out what is far at its scale; a far point may hide a less far one. Factors of 8 and more a round, so
 /// that these are enough for all that a float can tell.
 constexpr int kMostRounds = 64;
+/// A triangle far away is a stray in a room of a few vertices, too.
+constexpr std::uint64_t kFewVertices = 3;
+/// What more than one in so many triangles stand up to is no spike but a spire or the tip of a cone.
+constexpr std::uint64_t kSpikeShare = 10;
 constexpr std::size_t kFewestCells = 8;
 constexpr std::size_t kMostCells = 64;
 constexpr std::uint32_t kNoPiece = std::numeric_limits<std::uint32_t>::max();
@@ -107,6 +111,8 @@ class Grid {
 struct Piece {
   Box box;
   std::uint64_t vertex_count = 0;
+  std::uint64_t spike_count = 0;  ///< Triangles of which it holds one corner, and the rest the others.
+  std::uint32_t spike_foot = 0;   ///< The piece in which one of those stands.
   bool has_surface = false;
 
   void include(const Piece& other) {
@@ -121,7 +127,8 @@ class Search {
   Search(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles)
       : positions_(positions),
         triangles_(triangles),
-        count_limit_(std::min<std::uint64_t>(positions.size() / 10, kPartVertices + positions.size() / 1000)),
+        count_limit_(std::max(std::min<std::uint64_t>(positions.size() / 10, kPartVertices + positions.size() / 1000),
+                              positions.size() < 8 * kFewVertices ? 0 : kFewVertices)),
         cell_count_(std::clamp(static_cast<std::size_t>(std::sqrt(static_cast<double>(positions.size()))), kFewestCells,
                                kMostCells)) {}
 
@@ -181,9 +188,19 @@ class Search {
         far_count += is_far[piece[corner]] ? 1 : 0;
       }
       const bool is_spike = far_count == 1;
-      if (is_spike) continue;
+      if (is_spike) {
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+          if (!is_far[piece[corner]]) continue;
+          ++pieces[piece[corner]].spike_count;
+          pieces[piece[corner]].spike_foot = piece[(corner + 1) % 3];
+        }
+        continue;
+      }
       sets.unite(piece[0], piece[1]);
       sets.unite(piece[0], piece[2]);
+    }
+    for (std::uint32_t p = 0; p < pieces.size(); ++p) {
+      if (pieces[p].spike_count * kSpikeShare > triangles_.size()) sets.unite(p, pieces[p].spike_foot);
     }
     for (std::uint32_t p = 0; p < pieces.size(); ++p) {
       if (sets.root(p) == p) continue;

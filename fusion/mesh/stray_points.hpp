@@ -20,9 +20,9 @@ struct StrayPoints {
 /// - a piece of 50 vertices or more, unless it is both less than 1/2000 of the vertices and of a twentieth of the size, or all in
 ///   exactly one place;
 /// - a piece of surface of a quarter of the size of the rest, or one that reaches round it;
-/// - anything when there would be more of them than a tenth of the vertices, or than 50 and a thousandth.
-/// A vertex whose triangles all stand on the rest with their other two corners is one (a spike); any other
-/// triangle holds its corners together. Linear in time; finite positions, indices in range.
+/// - anything when there would be more of them than a tenth of the vertices (three: than an eighth), or than 50 and a thousandth.
+/// A vertex whose triangles all stand on the rest with their other two corners is one (a spike), unless more than a tenth of all triangles
+/// are of it (a spire, the tip of a cone); any other triangle holds its corners together. Linear in time; finite positions, indices in range.
 StrayPoints stray_points(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles);
 
 }  // namespace spectra::mesh

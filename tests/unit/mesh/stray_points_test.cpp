@@ -169,6 +169,12 @@ TEST(StrayPoints, AreNotInScenesOfFewOrUnevenVertices) {
   room.add_box({4, 0, 0}, {4.1F, 6, 3});
   room.add_box({1, 1, 0}, {1.3F, 1.3F, 0.3F});
   EXPECT_EQ(room.strays().count, 0U);
+  Shape lit = room;
+  for (const base::Vec3f corner : {base::Vec3f{2e6F, 0, 0}, {2e6F + 1, 0, 0}, {2e6F, 1, 0}})
+    lit.positions.push_back(corner);
+  lit.triangles.push_back({24, 25, 26});
+  EXPECT_EQ(lit.strays().count, 3U) << "a triangle far away";
+  EXPECT_EQ(lit.strays().core.max.x, 8);
   room.add_patch({5, 2, 0}, 1, 40);
   EXPECT_EQ(room.strays().count, 0U) << "one detailed thing in a room of few vertices";
 
@@ -181,6 +187,32 @@ TEST(StrayPoints, AreNotInScenesOfFewOrUnevenVertices) {
     }
   }
   EXPECT_EQ(terrain.strays().count, 0U);
+}
+
+TEST(StrayPoints, AreNotTheTipsOfConesAndSpires) {
+  // The tip has all triangles of it; another far point is still one.
+  for (const float height : {8.0F, 40.0F}) {
+    Shape cone;
+    constexpr std::uint32_t kRim = 32;
+    cone.positions.push_back({0, 0, height});
+    for (std::uint32_t i = 0; i < kRim; ++i) {
+      const float angle = 6.2831853F * static_cast<float>(i) / kRim;
+      cone.positions.push_back({2 * std::cos(angle), 2 * std::sin(angle), 0});
+      cone.triangles.push_back({0, 1 + i, 1 + (i + 1) % kRim});
+    }
+    EXPECT_EQ(cone.strays().count, 0u);
+    EXPECT_EQ(cone.strays().core.max.z, height);
+    cone.positions.push_back({0, 1e6F, 0});
+    EXPECT_EQ(cone.strays().count, 1u);
+    EXPECT_EQ(cone.strays().core.max.z, height);
+  }
+  Shape church;
+  church.add_box({0, 0, 0}, {20, 10, 10});
+  church.add_box({0, 0, 10}, {5, 10, 15});
+  church.positions.push_back({2.5F, 5, 60});
+  for (const auto& [a, b] : {std::array{12U, 13U}, std::array{13U, 15U}, std::array{15U, 14U}, std::array{14U, 12U}})
+    church.triangles.push_back({a, b, 16});
+  EXPECT_EQ(church.strays().count, 0u);
 }
 
 TEST(StrayPoints, AreNotInDegenerateScenes) {
