@@ -23,6 +23,8 @@ constexpr std::uint8_t kMostHalvings = 24;
 
 /// What is thinner beside its breadth is flat.
 constexpr double kFlat = 0x1p-12;
+/// The same of a whole piece, which nobody takes for a wall that is not quite even.
+constexpr double kFlatPiece = 0x1p-15;
 
 inline std::array<float, 3> coordinates(const base::Vec3f& v) {
   return {v.x, v.y, v.z};
@@ -66,17 +68,17 @@ struct Shape {
   }
 
   /// Whether what the points span there is no flatness or rounding of floats.
-  bool has_side(std::size_t axis) const {
+  bool has_side(std::size_t axis, double flat = kFlat) const {
     std::array<double, 3> sorted = side;
     std::sort(sorted.begin(), sorted.end());
-    return side[axis] > 8 * float_spacing[axis] && side[axis] >= kFlat * sorted[1];
+    return side[axis] > 8 * float_spacing[axis] && side[axis] >= flat * sorted[1];
   }
 
   /// So that no side that is one changes by more than a tenth.
-  StepHalvings for_sides(double step_of_side, double step_m) const {
+  StepHalvings for_sides(double step_of_side, double step_m, double flat = kFlat) const {
     StepHalvings halvings{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (has_side(axis)) halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
+      if (has_side(axis, flat)) halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
     }
     return halvings;
   }

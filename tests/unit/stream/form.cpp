@@ -102,7 +102,7 @@ struct Loss {
 
 /// What became of some vertices.
 Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place>& before,
-             const std::vector<Place>& after) {
+             const std::vector<Place>& after, double flat) {
   Loss loss;
   std::array<double, 3> side{}, rounded_side{}, far{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -122,7 +122,7 @@ Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double float_spacing = far[axis] > 0 ? std::ldexp(1, std::ilogb(far[axis]) - 23) : 0;
-    if (side[axis] == 0 ? rounded_side[axis] == 0 : side[axis] < sorted[1] / 4096 || side[axis] <= 8 * float_spacing)
+    if (side[axis] == 0 ? rounded_side[axis] == 0 : side[axis] < sorted[1] * flat || side[axis] <= 8 * float_spacing)
       continue;
     loss.side_change = std::max(loss.side_change, std::abs(rounded_side[axis] - side[axis]) / side[axis]);
   }
@@ -179,7 +179,7 @@ FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count) {
     for (std::uint32_t v = 0; v < before.size(); ++v) pieces[piece_of(v)].push_back(v);
   }
   for (const auto& [root, vertices] : pieces) {
-    const Loss loss = loss_of(vertices, before, after);
+    const Loss loss = loss_of(vertices, before, after, 0x1p-15);
     ++report.piece_count;
     if (loss.side_change > 0.1) ++report.flattened_piece_count;
     if (loss.is_merged) ++report.merged_piece_count;
@@ -197,7 +197,7 @@ FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count) {
       const double radius = squared(before[ball[count - 1]], before[seed]);
       while (squared(before[ball.back()], before[seed]) > radius) ball.pop_back();
       if (std::sqrt(squared(before[ball.back()], before[seed])) < smallest_radius) continue;
-      const Loss loss = loss_of(ball, before, after);
+      const Loss loss = loss_of(ball, before, after, 0x1p-12);
       ++report.patch_count;
       report.worst_side_change = std::max(report.worst_side_change, loss.side_change);
       if (loss.side_change > 0.1) ++report.flattened_patch_count;

@@ -312,6 +312,18 @@ TEST(PositionSteps, KeepBoxesThatStandOnEachOther) {
   }
 }
 
+TEST(PositionSteps, KeepTheThicknessOfThinPlates) {
+  Parts parts;
+  parts.grid(80, 80, {0, 0, 0}, {6.25F, 0, 0}, {0, 6.25F, 0}, [](int x, int y) { return 0.3 * std::sin(x + 0.7 * y); });
+  const auto first = static_cast<std::uint32_t>(parts.positions.size());
+  parts.box({100, 100, 2}, {110, 107, 2.001F});
+  parts.box({100, 100, 1}, {200, 170, 1.01F});
+  const auto sides = drawn_sides(*scene_of(parts.mesh()), first, 8);
+  ASSERT_EQ(sides.size(), 2U);
+  EXPECT_NEAR(sides[0][2], 0.001, 0.0001);
+  EXPECT_NEAR(sides[1][2], 0.01, 0.001);
+}
+
 TEST(PositionSteps, OfASmallMeshAreNotCoarsenedByWhatIsFarAway) {
   enum class Far { Piece, Spike, Mesh };
   for (const Far what : {Far::Piece, Far::Spike, Far::Mesh}) {
