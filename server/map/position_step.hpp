@@ -22,8 +22,8 @@ namespace spectra::map {
 /// - what they span along an axis is at least four steps (what is thinner than a 4,096th of its breadth, or than eight times
 ///   what floats tell apart there, counts as flat),
 /// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps (of a whole piece what is thinner
-///   than a 32,768th counts as flat); pieces are connected by vertices in
-///   the same place, and what is connected by shared vertices alone is one too, unless it is a triangle.
+///   than a 32,768th counts as flat); pieces are connected by vertices in the same place, and what is connected by shared vertices alone
+///   is one too, unless it is a triangle.
 /// Neighbours get the finer of their steps. Where a ball of neighbours would still have a side off by more than a tenth, the few
 /// vertices that its box stands on are rounded finer by themselves. A scene of few vertices is rounded finer everywhere, for bytes that do not count.
 /// Vertices of no triangle in a scene with triangles are not drawn and have no say.

@@ -6,7 +6,10 @@ export interface CoalescerOptions<T> {
   merge: (earlier: T, later: T) => T;
   /** Least time between two sends; a flush does not wait for it. */
   interval_ms: number;
-  /** What comes sooner after another waits until nothing has come for so long, or for the interval since the first that waits. */
+  /**
+   * Instead of that: what comes sooner after another waits until nothing has come for so long, and no longer than `interval_ms`. What comes after
+   * such a rest is sent at once.
+   */
   rest_ms?: number;
   /** Most unanswered sends; what comes meanwhile is merged. */
   max_in_flight: number;
@@ -22,10 +25,9 @@ export class Coalescer<T> {
   #pending: T | undefined;
   #inFlight = 0;
   #lastSent = Number.NEGATIVE_INFINITY;
-  #waitingSince = 0;
   #pushed = Number.NEGATIVE_INFINITY;
-  /** The first that waits came after a rest. */
-  #isRested = false;
+  /** Until when what waits has to be sent, whatever comes. */
+  #latest = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #urgent = false;
   #epoch = 0;
@@ -39,10 +41,8 @@ export class Coalescer<T> {
 
   push(change: T): void {
     const now = performance.now();
-    if (this.#pending === undefined) {
-      this.#waitingSince = now;
-      this.#isRested = now - this.#pushed >= (this.options.rest_ms ?? 0);
-    }
+    const { interval_ms, rest_ms = 0 } = this.options;
+    if (this.#pending === undefined) this.#latest = now - this.#pushed < rest_ms ? now + interval_ms : now;
     this.#pushed = now;
     this.#pending = this.#pending === undefined ? change : this.options.merge(this.#pending, change);
     this.#pump();
@@ -79,7 +79,7 @@ export class Coalescer<T> {
   get #due(): number {
     const { interval_ms, rest_ms } = this.options;
     if (rest_ms === undefined) return this.#lastSent + interval_ms;
-    return this.#isRested ? this.#waitingSince : Math.min(this.#pushed + rest_ms, this.#waitingSince + interval_ms);
+    return Math.min(this.#pushed + rest_ms, this.#latest);
   }
 
   #pump(): void {
