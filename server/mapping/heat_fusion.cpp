@@ -8,18 +8,14 @@
 #include <numeric>
 
 #include "server/mapping/picture_rows.hpp"
-#include "server/mapping/surface_view.hpp"
-#include "server/mapping/whole_numbers.hpp"
 
 namespace spectra::mapping {
 namespace {
 
 constexpr float kKelvin = 273.15F;
 constexpr float kLeastCosine = 0.2588F;  ///< Of 75 degrees.
-constexpr float kPixelError = 0.7F;      ///< Of where a point falls in the picture, pixels.
 constexpr std::size_t kSpread =
     2;  ///< Pixels over which the lens spreads a point: a thin warm thing is not as warm as it is, at its ridge too.
-constexpr float kReflection = 0.95F;
 constexpr double kExposureSeconds = 0.010;  ///< A pixel of a microbolometer follows what it sees so slowly.
 constexpr double kAfterShutterSeconds = 0.3;
 constexpr float kAfterShutter = 10;   ///< Times the variance.
@@ -95,6 +91,11 @@ std::vector<float> largest_around(const std::vector<float>& values, std::size_t 
   return both;
 }
 
+/// Makes values negative that are marked.
+void take_out(const std::uint8_t* is_marked, std::size_t count, float* values) {
+  for (std::size_t i = 0; i < count; ++i) values[i] = is_marked[i] != 0 ? -1 : values[i];
+}
+
 /// Of a row: how temperatures change with a pixel, less `noise`, at least 0. `above` and `below` are the rows beside it, or the row itself.
 void find_gradient(const float* above, const float* row, const float* below, std::size_t width, float noise,
                    float* to) {
@@ -126,53 +127,11 @@ std::uint16_t middle_of(const std::vector<std::uint16_t>& pixels) {
   return static_cast<std::uint16_t>(low + value);
 }
 
-/// Voxels that a picture tells something of, some at a time, an array a quantity.
-struct SeenHeat {
-  static constexpr std::size_t kRoom = 256;
-  std::size_t count = 0;
-  std::array<const SurfaceVoxel*, kRoom> voxel;
-  alignas(64) std::array<float, kRoom> u, v, z, cosine, celsius, gradient;
-  std::array<float, kRoom> own, scale;  ///< As Look's.
-};
-
-/// What weighs looks. Motions are those within the time of a pixel.
-struct LookWeights {
-  Lens lens;
-  std::array<float, 3> linear, angular;
-  float noise, reflected_celsius, after_shutter;
-
-  void weigh(SeenHeat& seen) const {
-    for (std::size_t i = 0; i < seen.count; ++i) {
-      const float z = seen.z[i], c = seen.cosine[i] < 0.05F ? 0.05F : seen.cosine[i];
-      const float px = (seen.u[i] - lens.cx) / lens.fx, py = (seen.v[i] - lens.cy) / lens.fy, x = px * z, y = py * z;
-      // What moves before the camera in the time of a pixel, pixels: the point's velocity seen from the camera.
-      const float moved_x = -(linear[0] + (angular[1] * z - angular[2] * y)),
-                  moved_y = -(linear[1] + (angular[2] * x - angular[0] * z)),
-                  moved_z = -(linear[2] + (angular[0] * y - angular[1] * x));
-      const float du = lens.fx * (moved_x - px * moved_z) / z, dv = lens.fy * (moved_y - py * moved_z) / z;
-      const float uncertain = kPixelError * seen.gradient[i];
-      const float askew = (1 - c) * (1 - c);
-      const float reflected = kReflection * askew * askew * (1 - c) * (seen.celsius[i] - reflected_celsius);
-      seen.own[i] = noise + uncertain * uncertain + reflected * reflected;
-      seen.scale[i] = z * z / c * (1 + du * du + dv * dv) * after_shutter;
-    }
-  }
-};
-
 }  // namespace
-
-/// What one picture says of one voxel.
-struct HeatFusion::Look {
-  std::int32_t block;
-  std::uint16_t voxel;
-  float celsius;
-  float scale;  ///< z^2 / cos and everything else that the variance is multiplied by.
-  float own;    ///< K^2, without the part that the whole picture has in common.
-};
 
 struct HeatFusion::Prepared {
   std::vector<float> celsius;
-  std::vector<float> gradient;  ///< Kelvin a pixel: the steepest within kSpread.
+  std::vector<float> gradient;  ///< Kelvin a pixel: the steepest within kSpread. Below 0: no look.
   float reflected = 0;
 };
 
@@ -234,19 +193,26 @@ HeatFusion::Prepared HeatFusion::prepare(const Picture16& picture, jobs::WorkerP
   return prepared;
 }
 
-void HeatFusion::find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
-                             jobs::WorkerPool& pool, HeatReport& report) {
+void HeatFusion::find_offset(const VoxelMap& map, double moment_s, jobs::WorkerPool& pool, HeatReport& report) {
   // Everything that is known tells it, by how well it is known.
   constexpr std::size_t kParts = 4;
   std::array<Differences, kParts> parts;
   pool.for_each(kParts, [&](std::size_t part) {
-    for (std::size_t chunk = part; chunk < looks.size(); chunk += kParts) {
-      for (const Look& look : looks[chunk]) {
-        if (map.head(look.block).heat < 0) continue;
-        const HeatBlock& heat = map.heat(look.block);
-        const float variance = heat.variance[look.voxel];
-        if (variance < kMostVariance) {
-          parts[part].add(look.celsius - heat.celsius[look.voxel], 1 / (variance + look.own * look.scale));
+    for (std::size_t chunk = part; chunk < looks_.size(); chunk += kParts) {
+      const HeatSeen& looks = looks_[chunk];
+      std::size_t i = 0;
+      for (const SeenVoxels::Block& block : looks.blocks) {
+        if (map.head(block.index).heat < 0) {
+          i = block.end;
+          continue;
+        }
+        const HeatBlock& heat = map.heat(block.index);
+        for (; i < block.end; ++i) {
+          const float variance = heat.variance[looks.voxel[i]];
+          if (variance < kMostVariance) {
+            parts[part].add(looks.celsius[i] - heat.celsius[looks.voxel[i]],
+                            1 / (variance + looks.own[i] * looks.scale[i]));
+          }
         }
       }
     }
@@ -281,120 +247,90 @@ HeatReport HeatFusion::fuse(VoxelMap& map, const Picture16& picture, const PoseA
     report.is_frozen = true;
     return report;
   }
-  const Prepared prepared = prepare(picture, pool);
-  const SurfaceView view = draw_surfaces(map, calibration_.camera, camera.pose, pool);
+  Prepared prepared = prepare(picture, pool);
+  const CameraModel& model = calibration_.camera;
+  view_ = draw_surfaces(map, model, camera.pose, pool, std::move(view_));
+  if (rules_.edges) {
+    const std::vector<std::uint8_t> is_near_edge =
+        edges_of(view_.depth_m, model, static_cast<float>(map.voxel_m()), pool);
+    take_out(is_near_edge.data(), is_near_edge.size(), prepared.gradient.data());
+  }
   const Eigen::Vector3f linear =
       (camera.pose.linear().transpose() * camera.linear_m_per_s * kExposureSeconds).cast<float>();
   const Eigen::Vector3f angular =
       (camera.pose.linear().transpose() * camera.angular_rad_per_s * kExposureSeconds).cast<float>();
   const bool is_after_shutter = rules_.shutter && moment_s - last_frozen_s_ < kAfterShutterSeconds;
-  const auto noise = static_cast<float>(calibration_.netd_kelvin * calibration_.netd_kelvin);
-  const CameraModel& model = calibration_.camera;
+  const LookKernel kernel{Lens(model),
+                          model.width,
+                          model.height,
+                          prepared.celsius.data(),
+                          prepared.gradient.data(),
+                          rules_.occlusion ? view_.depth_m.data() : nullptr,
+                          static_cast<float>(map.voxel_m()),
+                          rules_.angle ? kLeastCosine : -1,
+                          rules_.weights,
+                          {linear.x(), linear.y(), linear.z()},
+                          {angular.x(), angular.y(), angular.z()},
+                          static_cast<float>(calibration_.netd_kelvin * calibration_.netd_kelvin),
+                          prepared.reflected,
+                          is_after_shutter ? kAfterShutter : 1.0F,
+                          kMostVariance};
+  looks_.resize(view_.voxels.size());
+  pool.for_each(looks_.size(), [&](std::size_t chunk) { find_looks(kernel, view_.voxels[chunk], looks_[chunk]); });
 
-  const LookWeights of_picture{
-      Lens(model),        {linear.x(), linear.y(), linear.z()},   {angular.x(), angular.y(), angular.z()}, noise,
-      prepared.reflected, is_after_shutter ? kAfterShutter : 1.0F};
-  std::vector<std::vector<Look>> looks(view.voxels.size());
-  pool.for_each(looks.size(), [&](std::size_t chunk) {
-    looks[chunk].reserve(view.voxels[chunk].size());
-    SeenHeat some;
-    const auto take = [&] {
-      if (rules_.weights) of_picture.weigh(some);
-      for (std::size_t i = 0; i < some.count; ++i) {
-        const SurfaceVoxel& voxel = *some.voxel[i];
-        Look look{voxel.block, voxel.voxel, some.celsius[i], 1, noise};
-        if (rules_.weights) {
-          if (some.own[i] * some.scale[i] > kMostVariance) continue;
-          look.scale = some.scale[i];
-          look.own = some.own[i];
-        }
-        looks[chunk].push_back(look);
-      }
-      some.count = 0;
-    };
-    for (const SurfaceVoxel& seen : view.voxels[chunk]) {
-      const int x = floor_of(seen.u), y = floor_of(seen.v);
-      if (x < 0 || y < 0 || x + 1 >= model.width || y + 1 >= model.height) continue;
-      if ((rules_.occlusion && !seen.is_reached) || (rules_.angle && seen.cosine < kLeastCosine)) continue;
-      const std::size_t pixel =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(model.width) + static_cast<std::size_t>(x);
-      if (rules_.edges && view.is_near_edge[pixel] != 0) continue;
-      const float a = seen.u - static_cast<float>(x), b = seen.v - static_cast<float>(y);
-      const float* row = &prepared.celsius[pixel];
-      const float* next = row + model.width;
-      const std::size_t i = some.count++;
-      some.celsius[i] = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
-      some.gradient[i] = prepared.gradient[pixel];
-      some.voxel[i] = &seen;
-      some.u[i] = seen.u;
-      some.v[i] = seen.v;
-      some.z[i] = seen.z_m;
-      some.cosine[i] = seen.cosine;
-      if (some.count == SeenHeat::kRoom) take();
-    }
-    take();
-  });
-
-  if (rules_.frame_offset) find_offset(map, looks, moment_s, pool, report);
+  if (rules_.frame_offset) find_offset(map, moment_s, pool, report);
   const auto offset = static_cast<float>(report.offset_kelvin);
   const auto common = static_cast<float>(report.offset_sigma_kelvin * report.offset_sigma_kelvin);
   const auto spread = static_cast<float>(report.spread_kelvin * report.spread_kelvin);
-  for (const auto& chunk : looks) {
-    report.observed += chunk.size();
-    for (const Look& look : chunk) map.add_heat(look.block);
+  for (const HeatSeen& looks : looks_) {
+    report.observed += looks.count;
+    for (const SeenVoxels::Block& block : looks.blocks) map.add_heat(block.index);
   }
   const auto process = static_cast<float>(rules_.process_kelvin * rules_.process_kelvin);
   const auto now = static_cast<float>(moment_s);
   const float trusted =
       report.spread_kelvin > 0 ? static_cast<float>(rules_.trusted_gap_s) : std::numeric_limits<float>::infinity();
-  pool.for_each(looks.size(), [&](std::size_t chunk) {
-    // The looks of a block follow each other.
-    std::int32_t block = -1;
-    float warmest = 0, hottest = -1000, weights = 0, certain = 0, count = 0;
-    const auto note = [&] {
-      if (block < 0) return;
-      BlockHead& head = map.head(block);
+  pool.for_each(looks_.size(), [&](std::size_t chunk) {
+    const HeatSeen& looks = looks_[chunk];
+    std::size_t i = 0;
+    for (const SeenVoxels::Block& block : looks.blocks) {
+      BlockHead& head = map.head(block.index);
+      HeatBlock& heat = map.heat(block.index);
+      const auto count = static_cast<float>(block.end - i);
+      float warmest = 0, hottest = -1000, weights = 0, certain = 0;
+      for (; i < block.end; ++i) {
+        const std::size_t voxel = looks.voxel[i];
+        const float scale = looks.scale[i];
+        weights += 1 / scale;
+        certain += 1 / (scale * std::sqrt(scale * std::sqrt(scale)));
+        float& celsius = heat.celsius[voxel];
+        float& variance = heat.variance[voxel];
+        const float seen = looks.celsius[i] - offset;
+        const float r = scale * (looks.own[i] + (rules_.weights ? common : 0));
+        const float before = celsius;
+        if (std::isinf(variance)) {
+          celsius = seen;
+          variance = r;
+          warmest = kNewHeat;
+        } else {
+          const float elapsed = std::max(0.0F, now - heat.seen_s[voxel]);
+          float predicted = variance + process * std::min(elapsed, trusted);
+          const float innovation = seen - celsius;
+          if (innovation * innovation > kContradiction * (predicted + r + spread))
+            predicted = variance + process * elapsed;
+          const float gain = predicted / (predicted + r);
+          celsius += gain * innovation;
+          variance = (1 - gain) * predicted;
+          warmest = std::max(warmest, std::abs(celsius - before));
+        }
+        hottest = std::max(hottest, celsius);
+        heat.seen_s[voxel] = now;
+      }
       head.heat_weight = kRemembered * head.heat_weight + weights / count;
       head.heat_weight_certain = kRemembered * head.heat_weight_certain + certain / count;
       head.warmed += warmest;
       head.hottest = std::max(head.hottest, hottest);
-    };
-    for (const Look& look : looks[chunk]) {
-      if (look.block != block) {
-        note();
-        block = look.block;
-        warmest = 0;
-        hottest = -1000;
-        weights = certain = count = 0;
-      }
-      weights += 1 / look.scale;
-      certain += 1 / (look.scale * std::sqrt(look.scale * std::sqrt(look.scale)));
-      count += 1;
-      HeatBlock& heat = map.heat(look.block);
-      float& celsius = heat.celsius[look.voxel];
-      float& variance = heat.variance[look.voxel];
-      const float seen = look.celsius - offset;
-      const float r = look.scale * (look.own + (rules_.weights ? common : 0));
-      const float before = celsius;
-      if (std::isinf(variance)) {
-        celsius = seen;
-        variance = r;
-        warmest = kNewHeat;
-      } else {
-        const float elapsed = std::max(0.0F, now - heat.seen_s[look.voxel]);
-        float predicted = variance + process * std::min(elapsed, trusted);
-        const float innovation = seen - celsius;
-        if (innovation * innovation > kContradiction * (predicted + r + spread))
-          predicted = variance + process * elapsed;
-        const float gain = predicted / (predicted + r);
-        celsius += gain * innovation;
-        variance = (1 - gain) * predicted;
-        warmest = std::max(warmest, std::abs(celsius - before));
-      }
-      hottest = std::max(hottest, celsius);
-      heat.seen_s[look.voxel] = now;
     }
-    note();
   });
   return report;
 }

@@ -7,7 +7,9 @@
 
 #include "server/jobs/worker_pool.hpp"
 #include "server/mapping/calibration.hpp"
+#include "server/mapping/look_kernel.hpp"
 #include "server/mapping/picture_file.hpp"
+#include "server/mapping/surface_view.hpp"
 #include "server/mapping/trajectory.hpp"
 #include "server/mapping/voxel_map.hpp"
 
@@ -52,19 +54,19 @@ class HeatFusion {
                   jobs::WorkerPool& pool);
 
  private:
-  struct Look;
   struct Prepared;
 
   Prepared prepare(const Picture16& picture, jobs::WorkerPool& pool) const;
   /// The median of the picture's temperatures.
   float middle_celsius(const Picture16& picture, const std::vector<float>& celsius) const;
   bool is_frozen(const Picture16& picture);
-  void find_offset(const VoxelMap& map, const std::vector<std::vector<Look>>& looks, double moment_s,
-                   jobs::WorkerPool& pool, HeatReport& report);
+  void find_offset(const VoxelMap& map, double moment_s, jobs::WorkerPool& pool, HeatReport& report);
 
   const ThermalCalibration calibration_;
   const HeatRules rules_;
   PictureFloat vignetting_;
+  SurfaceView view_;             ///< Of the last picture, as the following.
+  std::vector<HeatSeen> looks_;  ///< As SurfaceView::voxels.
   std::vector<std::uint16_t> last_picture_;
   double last_frozen_s_ = -1e9;
   double last_offset_kelvin_ = 0, last_offset_sigma_kelvin_ = 0;

@@ -9,7 +9,6 @@
 #include "server/mapping/depth_fusion.hpp"
 #include "server/mapping/picture_rows.hpp"
 #include "server/mapping/surface_kernel.hpp"
-#include "server/mapping/whole_numbers.hpp"
 
 namespace spectra::mapping {
 namespace {
@@ -21,6 +20,10 @@ constexpr std::size_t kEdgeReach = 3, kHoleReach = 2;  ///< Pixels.
 /// 1 where either is 1. Without captured sizes, which bytes that are written might change for all that a compiler knows.
 void add_marks(const std::uint8_t* from, std::size_t count, std::uint8_t* to) {
   for (std::size_t i = 0; i < count; ++i) to[i] |= from[i];
+}
+
+void take_nearer(const float* from, std::size_t count, float* to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] = from[i] < to[i] ? from[i] : to[i];
 }
 
 /// 1 where any value within `reach` is 1, along both axes.
@@ -56,9 +59,11 @@ void mark_jumps(const float* depth_m, const float* before, const float* here, co
   }
 }
 
-std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, int height, float voxel_m,
+}  // namespace
+
+std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, const CameraModel& camera, float voxel_m,
                                    jobs::WorkerPool& pool) {
-  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  const auto w = static_cast<std::size_t>(camera.width), h = static_cast<std::size_t>(camera.height);
   std::vector<std::uint8_t> jumps(depth.size(), 0), something(depth.size());
   std::vector<float> inverse(depth.size());
   for_each_row(h, pool, [&](std::size_t y) {
@@ -79,101 +84,50 @@ std::vector<std::uint8_t> edges_of(const std::vector<float>& depth, int width, i
   return near;
 }
 
-struct Drawing {
-  const VoxelMap& map;
-  const CameraModel& camera;
-  const KernelCamera& kernel;
-
-  /// Finds the voxels of a block beside its surface and draws them into a picture.
-  void draw(std::int32_t index, std::vector<SurfaceVoxel>& out, std::vector<float>& depth_m) const {
-    const auto voxel_m = static_cast<float>(map.voxel_m());
-    constexpr auto kTruncation = static_cast<float>(kTruncationVoxels);
-    const float beside = std::floor(kBesideVoxels / kTruncation * kDistanceOne);
-    SeenVoxels seen;
-    see_voxels(kernel, map.voxels(index), kernel.view.corner(map.head(index).at), voxel_m, beside,
-               kTruncation * voxel_m / kDistanceOne, seen);
-    const std::size_t first = out.size();
-    out.resize(first + seen.count);
-    for (std::size_t i = 0; i < seen.count; ++i) {
-      out[first + i] = {
-          index, static_cast<std::uint16_t>(seen.voxel[i]), false, seen.u[i], seen.v[i], seen.z_m[i], seen.cosine[i]};
-      if (seen.off_m[i] <= voxel_m) draw_square(seen, i, depth_m);  // else the surface is drawn by those next to it
-    }
-  }
-
-  /// The plane of the surface through the pixels that a voxel covers; beyond twice its size it is no longer the surface.
-  void draw_square(const SeenVoxels& seen, std::size_t i, std::vector<float>& depth_m) const {
-    const float u = seen.u[i], v = seen.v[i], z = seen.z_m[i], half = seen.half[i];
-    const float reach = 2 * static_cast<float>(map.voxel_m());
-    const int left = std::max(0, ceil_of(u - half)), right = std::min(camera.width - 1, floor_of(u + half)),
-              top = std::max(0, ceil_of(v - half)), bottom = std::min(camera.height - 1, floor_of(v + half));
-    for (int row = top; row <= bottom; ++row) {
-      float* pixels = &depth_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width)];
-      const float of_row = (static_cast<float>(row) - v) * seen.per_v[i];
-      for (int column = left; column <= right; ++column) {
-        const float slope = of_row + (static_cast<float>(column) - u) * seen.per_u[i];
-        pixels[column] = std::min(pixels[column], z + std::clamp(slope, -reach, reach));
-      }
-    }
-  }
-};
-
-}  // namespace
-
 SurfaceView draw_surfaces(const VoxelMap& map, const CameraModel& camera, const Eigen::Isometry3d& world_from_camera,
-                          jobs::WorkerPool& pool) {
-  SurfaceView drawn;
+                          jobs::WorkerPool& pool, SurfaceView view) {
   const KernelCamera kernel(camera, world_from_camera, map.voxel_m());
-  const BlockView& view = kernel.view;
-  const Lens& lens = kernel.lens;
   const auto voxel_m = static_cast<float>(map.voxel_m());
   const float radius_m = 0.87F * kBlockEdge * voxel_m;
   std::vector<std::int32_t> blocks;
   for (const MapUnit& unit : map.units()) {
     const GridPlace middle{unit.at.x * kUnitBlocks + 2, unit.at.y * kUnitBlocks + 2, unit.at.z * kUnitBlocks + 2};
-    if (!view.is_before(middle, 5 * radius_m, lens, camera)) continue;
+    if (!kernel.view.is_before(middle, 5 * radius_m, kernel.lens, camera)) continue;
     for (const std::int32_t block : unit.blocks) {
       if (block < 0 || !map.head(block).has_surface) continue;
-      if (view.is_before(map.head(block).at, 2 * radius_m, lens, camera)) blocks.push_back(block);
+      if (kernel.view.is_before(map.head(block).at, 2 * radius_m, kernel.lens, camera)) blocks.push_back(block);
     }
   }
   std::sort(blocks.begin(), blocks.end());
-  drawn.depth_m.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), kFarthest);
 
-  const Drawing drawing{map, camera, kernel};
-  constexpr std::size_t kChunk = 64, kUsual = 200;  // Voxels of a block.
+  constexpr std::size_t kChunk = 64;
+  constexpr auto kTruncation = static_cast<float>(kTruncationVoxels);
+  const float beside = std::floor(kBesideVoxels / kTruncation * kDistanceOne);
   const std::size_t chunks = (blocks.size() + kChunk - 1) / kChunk;
-  drawn.voxels.resize(chunks);
+  if (view.voxels.size() < chunks) view.voxels.resize(chunks);
+  for (SeenVoxels& seen : view.voxels) seen.clear();
   // Each thread draws into a picture of its own; the nearest of all is the same whoever has drawn what.
-  std::vector<std::vector<float>> pictures(
-      std::min<std::size_t>(pool.thread_count() + 1, std::max<std::size_t>(1, chunks)));
+  view.drawn_m.resize(std::min<std::size_t>(pool.thread_count() + 1, std::max<std::size_t>(1, chunks)));
   std::atomic<std::size_t> next_chunk{0};
-  pool.for_each(pictures.size(), [&](std::size_t picture) {
-    pictures[picture].assign(drawn.depth_m.size(), kFarthest);
+  pool.for_each(view.drawn_m.size(), [&](std::size_t picture) {
+    std::vector<float>& drawn_m = view.drawn_m[picture];
+    drawn_m.assign(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height), kFarthest);
     for (std::size_t chunk = next_chunk++; chunk < chunks; chunk = next_chunk++) {
+      SeenVoxels& seen = view.voxels[chunk];
       const std::size_t end = std::min(blocks.size(), (chunk + 1) * kChunk);
-      drawn.voxels[chunk].reserve(kUsual * kChunk);
-      for (std::size_t i = chunk * kChunk; i < end; ++i)
-        drawing.draw(blocks[i], drawn.voxels[chunk], pictures[picture]);
+      for (std::size_t i = chunk * kChunk; i < end; ++i) {
+        const std::size_t before = seen.count;
+        see_voxels(kernel, map.voxels(blocks[i]), kernel.view.corner(map.head(blocks[i]).at), voxel_m, beside,
+                   kTruncation * voxel_m / kDistanceOne, seen, drawn_m.data());
+        if (seen.count > before) seen.blocks.push_back({blocks[i], seen.count});
+      }
     }
   });
-  for (const std::vector<float>& picture : pictures) {
-    for (std::size_t i = 0; i < picture.size(); ++i) drawn.depth_m[i] = std::min(drawn.depth_m[i], picture[i]);
+  view.depth_m = view.drawn_m[0];
+  for (std::size_t picture = 1; picture < view.drawn_m.size(); ++picture) {
+    take_nearer(view.drawn_m[picture].data(), view.depth_m.size(), view.depth_m.data());
   }
-  drawn.is_near_edge = edges_of(drawn.depth_m, camera.width, camera.height, voxel_m, pool);
-
-  pool.for_each(chunks, [&](std::size_t chunk) {
-    for (SurfaceVoxel& seen : drawn.voxels[chunk]) {
-      const int x = floor_of(seen.u + 0.5F), y = floor_of(seen.v + 0.5F);
-      if (x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
-      const float before = drawn.depth_m[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width) +
-                                         static_cast<std::size_t>(x)];
-      // A square lies across the line of sight whatever its surface does: what is askew has more depth within a voxel.
-      const float c = std::max(seen.cosine, 0.1F);
-      seen.is_reached = seen.z_m < before + voxel_m * (1.5F + 1.5F * std::sqrt(1 - c * c) / c);
-    }
-  });
-  return drawn;
+  return view;
 }
 
 }  // namespace spectra::mapping

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -176,10 +177,8 @@ TEST_P(BlockKernels, EveryInstructionSetSaysTheSameOfBlocksOfEveryKind) {
 }
 
 /// What see_voxels() is to find, voxel by voxel.
-std::unique_ptr<SeenVoxels> seen_one_by_one(const KernelCamera& camera, const VoxelBlock& block,
-                                            const std::array<float, 3>& corner, float voxel_m, float beside,
-                                            float off_per_step) {
-  auto out = std::make_unique<SeenVoxels>();
+void see_one_by_one(const KernelCamera& camera, const VoxelBlock& block, const std::array<float, 3>& corner,
+                    float voxel_m, float beside, float off_per_step, SeenVoxels& out, std::vector<float>& depth_m) {
   for (int i = 0; i < static_cast<int>(kBlockVoxels); ++i) {
     const auto index = static_cast<std::size_t>(i);
     const float own = block.distance[index];
@@ -214,18 +213,24 @@ std::unique_ptr<SeenVoxels> seen_one_by_one(const KernelCamera& camera, const Vo
           v - half < static_cast<float>(camera.height)))
       continue;
     const float bend = p[2] * p[2] / along;
-    const std::size_t at = out->count++;
-    out->voxel[at] = i;
-    out->u[at] = u;
-    out->v[at] = v;
-    out->z_m[at] = p[2];
-    out->cosine[at] = std::min(1.0F, along / std::sqrt(dot(n, n) * dot(p, p)));
-    out->per_u[at] = n[0] * bend * (1 / camera.lens.fx);
-    out->per_v[at] = n[1] * bend * (1 / camera.lens.fy);
-    out->half[at] = half;
-    out->off_m[at] = std::abs(own) * off_per_step;
+    ++out.count;
+    out.voxel.push_back(static_cast<std::uint16_t>(i));
+    out.u.push_back(u);
+    out.v.push_back(v);
+    out.z_m.push_back(p[2]);
+    out.cosine.push_back(std::min(1.0F, along / std::sqrt(dot(n, n) * dot(p, p))));
+    if (std::abs(own) * off_per_step > voxel_m) continue;
+    const float per_u = n[0] * bend * (1 / camera.lens.fx), per_v = n[1] * bend * (1 / camera.lens.fy);
+    for (int row = 0; row < camera.height; ++row) {
+      for (int column = 0; column < camera.width; ++column) {
+        const auto x_at = static_cast<float>(column), y_at = static_cast<float>(row);
+        if (x_at < u - half || x_at > u + half || y_at < v - half || y_at > v + half) continue;
+        const float grows = std::clamp((y_at - v) * per_v + (x_at - u) * per_u, -2 * voxel_m, 2 * voxel_m);
+        float& pixel = depth_m[static_cast<std::size_t>(row * camera.width + column)];
+        pixel = std::min(pixel, p[2] + grows);
+      }
+    }
   }
-  return out;
 }
 
 TEST_P(BlockKernels, EveryInstructionSetSeesTheVoxelsThatTheFormulaSays) {
@@ -237,27 +242,37 @@ TEST_P(BlockKernels, EveryInstructionSetSeesTheVoxelsThatTheFormulaSays) {
     before_->weight[i] = i % 11 == 0 ? 0 : 50;
   }
   const KernelCamera camera(camera_, Eigen::Isometry3d::Identity(), kVoxel);
-  std::vector<std::unique_ptr<SeenVoxels>> all;
-  all.push_back(seen_one_by_one(camera, *before_, corner_, 0.01F, 12287, 0.04F / kDistanceOne));
+  const std::vector<float> nothing(static_cast<std::size_t>(camera_.width * camera_.height),
+                                   std::numeric_limits<float>::infinity());
+  // After those of another block.
+  SeenVoxels first;
+  std::vector<float> first_drawn = nothing;
+  const std::array<std::array<float, 3>, 2> corners{corner_, {corner_[0] - 0.08F, corner_[1], corner_[2] + 0.02F}};
+  std::array<std::size_t, 2> ends{};
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    see_one_by_one(camera, *before_, corners[k], 0.01F, 12287, 0.04F / kDistanceOne, first, first_drawn);
+    ends[k] = first.count;
+  }
+  ASSERT_GT(ends[0], 100U);
+  ASSERT_GT(ends[1], ends[0] + 50);
+  ASSERT_GT(std::count_if(first_drawn.begin(), first_drawn.end(), [](float z) { return std::isfinite(z); }), 50);
   for (const std::int64_t target : fusion::test::instruction_sets()) {
     const fusion::test::UsingInstructionSet using_it(target);
-    all.push_back(std::make_unique<SeenVoxels>());
-    see_voxels(camera, *before_, corner_, 0.01F, 12287, 0.04F / kDistanceOne, *all.back());
-  }
-  const SeenVoxels& first = *all.front();
-  ASSERT_GT(first.count, 100U);
-  for (const auto& other : all) {
-    ASSERT_EQ(other->count, first.count);
+    SeenVoxels seen;
+    std::vector<float> drawn = nothing;
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      see_voxels(camera, *before_, corners[k], 0.01F, 12287, 0.04F / kDistanceOne, seen, drawn.data());
+      ASSERT_EQ(seen.count, ends[k]) << fusion::test::name_of(target);
+    }
+    ASSERT_EQ(drawn, first_drawn) << fusion::test::name_of(target);
     for (std::size_t i = 0; i < first.count; ++i) {
-      ASSERT_EQ(other->voxel[i], first.voxel[i]);
-      const auto values = [i](const SeenVoxels& s) {
-        return std::array{s.u[i], s.v[i], s.z_m[i], s.cosine[i], s.per_u[i], s.per_v[i], s.half[i], s.off_m[i]};
-      };
-      ASSERT_EQ(values(*other), values(first)) << i;
+      ASSERT_EQ(seen.voxel[i], first.voxel[i]);
+      const auto values = [i](const SeenVoxels& s) { return std::array{s.u[i], s.v[i], s.z_m[i], s.cosine[i]}; };
+      ASSERT_EQ(values(seen), values(first)) << fusion::test::name_of(target) << " " << i;
     }
   }
   // On the plane: z = 0.95 + 0.01 (3.6 + 0.3 x - 0.2 y) with x, y in voxels from the corner.
-  for (std::size_t i = 0; i < first.count && !GetParam(); ++i) {
+  for (std::size_t i = 0; i < ends[0] && !GetParam(); ++i) {
     const float x = (first.u[i] - camera.lens.cx) / camera.lens.fx * first.z_m[i];
     const float y = (first.v[i] - camera.lens.cy) / camera.lens.fy * first.z_m[i];
     EXPECT_NEAR(first.z_m[i], corner_[2] + 0.036F + 0.3F * (x - corner_[0]) - 0.2F * (y - corner_[1]), 0.004F);
