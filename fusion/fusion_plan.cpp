@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -31,6 +32,25 @@ const PaletteTable& telling_palette() {
     return rows;
   }();
   return table;
+}
+
+/// What the sensor could not tell has no interval of its own: where it alone is highlighted, the extreme beyond which it
+/// lies stands for it.
+void add_beyond(const FusionPlan& plan, const TemperatureSummary& data, std::vector<TemperatureInterval>& highlighted) {
+  const double minimum = double{data.minimum};
+  const double maximum = double{data.maximum};
+  if (!(minimum < maximum)) return;
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr std::array<float, 2> kBeyond = {-kInfinity, kInfinity};
+  std::array<std::uint8_t, 2> marked{};
+  plan.mark(kBeyond, {}, marked);
+  const auto [under, over] = marked;
+  if (under != 0 && data.under_range_count > 0 && (highlighted.empty() || highlighted.front().low > minimum)) {
+    highlighted.insert(highlighted.begin(), {minimum, minimum});
+  }
+  if (over != 0 && data.over_range_count > 0 && (highlighted.empty() || highlighted.back().high < maximum)) {
+    highlighted.push_back({maximum, maximum});
+  }
 }
 
 }  // namespace
@@ -68,6 +88,7 @@ base::Result<FusionPlan> FusionPlan::prepare(const FusionSettings& settings, con
   }
   plan.settings_ = std::make_shared<const FusionSettings>(settings);
   plan.params_in_force_ = std::make_shared<const ParameterValues>(std::move(in_force));
+  if (!plan.compares_with_baseline_) add_beyond(plan, scene.summary, prepared.highlighted);
   plan.highlighted_ = std::make_shared<const std::vector<TemperatureInterval>>(std::move(prepared.highlighted));
   return plan;
 }

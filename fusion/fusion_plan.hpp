@@ -71,8 +71,9 @@ class FusionPlan {
   const ParameterValues& params_in_force() const { return *params_in_force_; }
 
   /// The temperatures that the method shows otherwise than by the visible colour, ascending and disjoint, within the
-  /// data's extremes; empty for a method that treats all temperatures alike, and for one that compares with the
-  /// baseline: what that shows is no interval of temperatures.
+  /// data's extremes, one of which stands for what is beyond the sensor's range where that alone is highlighted; empty
+  /// for a method that treats all temperatures alike, and for one that compares with the baseline: what that shows is no
+  /// interval of temperatures.
   const std::vector<TemperatureInterval>& highlighted() const { return *highlighted_; }
 
   /// The temperatures are compared with the vertices' baseline.

@@ -29,7 +29,8 @@ struct HistogramReply {
   std::optional<double> mean;
   /// nullopt = null.
   std::optional<double> sigma;
-  /// Intervals [low, high] that the current method highlights, degC.
+  /// Intervals [low, high] that the current method highlights, degC; one of the lowest or the highest alone: what
+  /// is beyond the sensor's range there.
   std::vector<std::array<double, 2>> highlighted;
   /// Share of the surface (of points: of the vertices) that the current method highlights; absent for a method that
   /// shows all temperatures alike.

@@ -44,6 +44,18 @@ TEST(Highlighted, ThresholdsReachToTheExtremes) {
   EXPECT_TRUE(highlighted("colour_mapped_threshold", {{"threshold", 30.0}}, {10, 30}).empty());
 }
 
+TEST(Highlighted, AnExtremeStandsForWhatIsBeyondTheSensorsRangeWhereThatAloneIs) {
+  constexpr float kBeyond = std::numeric_limits<float>::infinity();
+  // Mean 20, sigma 2: 1.5 sigma reach beyond both extremes.
+  EXPECT_TRUE(highlighted("histogram_distribution", {}, {18, 22}).empty());
+  EXPECT_EQ(highlighted("histogram_distribution", {}, {18, 22, -kBeyond}), (Intervals{{18, 18}}));
+  EXPECT_EQ(highlighted("histogram_distribution", {}, {18, 22, kBeyond, -kBeyond}), (Intervals{{18, 18}, {22, 22}}));
+  EXPECT_TRUE(highlighted("histogram_distribution", {{"invert", true}}, {18, 22, kBeyond}).size() == 1);
+  EXPECT_EQ(highlighted("colour_mapped_threshold", {{"threshold", 25.0}}, {18, 22, kBeyond, -kBeyond}),
+            (Intervals{{22, 22}}));
+  EXPECT_EQ(highlighted("colour_mapped_threshold", {{"threshold", 20.0}}, {18, 22, kBeyond}), (Intervals{{20, 22}}));
+}
+
 TEST(Highlighted, HighlightingHasOneIntervalPerSide) {
   const std::vector<float> temperature = {10, 30};
   EXPECT_EQ(highlighted("thermal_highlighting", {{"low", 15.0}, {"high", 25.0}}, temperature),

@@ -289,7 +289,10 @@ export interface HistogramReply {
   counts: number[];
   mean: number | null;
   sigma: number | null;
-  /** Intervals [low, high] that the current method highlights, degC. */
+  /**
+   * Intervals [low, high] that the current method highlights, degC; one of the lowest or the highest alone: what is beyond
+   * the sensor's range there.
+   */
   highlighted: [number, number][];
   /**
    * Share of the surface (of points: of the vertices) that the current method highlights; absent for a method that shows
