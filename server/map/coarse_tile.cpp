@@ -10,6 +10,7 @@
 #include "fusion/base/box.hpp"
 #include "fusion/mesh/position_index.hpp"
 #include "fusion/mesh/surface.hpp"
+#include "server/map/position_step.hpp"
 #include "server/map/seen_error.hpp"
 #include "server/map/thinning.hpp"
 #include "server/map/tile_place.hpp"
@@ -294,10 +295,23 @@ float sum_above(float a, double b) {
   return sum < static_cast<double>(kLargest) ? std::nextafter(static_cast<float>(sum), kLargest) : kLargest;
 }
 
+/// How far vertices are moved because the tile reaches too far for the steps that they ask for; 0 where it does not.
+double rounding_of_reach_m(const Tile& tile, float step_m) {
+  int asked = 0;
+  for (const StepHalvings& halvings : tile.step_halvings) {
+    for (const std::uint8_t axis : halvings) asked = std::max(asked, int{axis});
+  }
+  const int halvings = halvings_of_tile(tile, double{step_m});
+  return halvings < asked ? std::sqrt(0.75) * std::ldexp(double{step_m}, -halvings) : 0;
+}
+
 /// How far the tile is from its children, and how what it shows differs from the full mesh. Returns samples of that.
 std::vector<FullSample> measure(Tile& tile, const std::vector<Child>& children, const Merged& mesh,
                                 const mesh::Surface& fine, const Thinning& thinning, const CoarseOptions& options) {
   tile.geometric_error_m = sum_above(tile.geometric_error_m, thinning.distance_m);
+  if (const double rounding_m = rounding_of_reach_m(tile, options.position_step_m); rounding_m > 0) {
+    tile.geometric_error_m = sum_above(tile.geometric_error_m, rounding_m);
+  }
   std::vector<FullSample> samples;
   for (const Child& child : children) {
     const bool is_leaf = child.node.is_leaf();

@@ -67,6 +67,15 @@ std::shared_ptr<Tile> tile_of(const mesh::MultispectralMesh& mesh) {
   return tile;
 }
 
+/// The tiles of the leaves of a tree that nobody else has yet.
+std::vector<std::shared_ptr<Tile>> new_leaves(const ChangedTree& tree) {
+  std::vector<std::shared_ptr<Tile>> leaves;
+  for (const auto& node : tree.made) {
+    if (node->is_leaf()) leaves.push_back(std::const_pointer_cast<Tile>(node->tile));
+  }
+  return leaves;
+}
+
 base::Vec3f moved(const base::Vec3f& p, const base::Vec3d& by) {
   return {static_cast<float>(double{p.x} + by.x), static_cast<float>(double{p.y} + by.y),
           static_cast<float>(double{p.z} + by.z)};
@@ -366,8 +375,7 @@ bool LivingMap::is_there_already(const BlockPut& put) const {
 void LivingMap::put_first(BlockPut put, jobs::WorkerPool& pool, const base::Progress& progress) {
   const FreedMemoryGoesBack scope;
   constants_ = {.origin = put.scene.mesh.origin,
-                .grid = MapGrid::around(put.scene.mesh.positions(), put.scene.mesh.triangles(), put.scene.core_bounds,
-                                        options_.first_level)};
+                .grid = MapGrid::around(put.scene.mesh.positions(), put.scene.core_bounds, options_.first_level)};
   std::vector<BlockPut> only;
   only.push_back(std::move(put));
   change(std::move(only), {}, pool, progress);
@@ -431,20 +439,43 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
   // Memory of a large mesh is needed for the rest.
   added.clear();
   put.clear();
-  if (is_first) {
-    // Nobody else has these tiles yet.
-    std::vector<std::shared_ptr<Tile>> leaves;
-    for (const auto& node : changed.made) {
-      if (node->is_leaf()) leaves.push_back(std::const_pointer_cast<Tile>(node->tile));
-    }
-    const PositionSteps steps(leaves, pool);
-    constants_->position_step_m = steps.largest_step_m();
-    pool.for_each(leaves.size(), [&](std::size_t i) { steps.apply(*leaves[i]); });
-  }
+  if (is_first) choose_steps(changed, pool);
   base::report(progress, kTilingPhase, leaves_share * kStepsShare);
   take(std::move(changed), pool, progress);
   // What comes next may lie somewhere else altogether.
   if (blocks_.empty()) constants_.reset();
+}
+
+void LivingMap::choose_steps(ChangedTree& first, jobs::WorkerPool& pool) {
+  std::vector<std::shared_ptr<Tile>> leaves = new_leaves(first);
+  std::optional<PositionSteps> steps(std::in_place, leaves, pool);
+  const int first_leaf_level = sizes().first_leaf_level;
+  if (const auto lost = first_leaf_level > 0 ? steps->lost_form(leaves) : std::nullopt) {
+    constants_->grid = grid_for(*lost, leaves);
+    first = cut_anew(first.root, constants_->grid, sizes(), labels_, pool);
+    leaves = new_leaves(first);
+    steps.emplace(leaves, pool, std::nullopt, std::ldexp(constants_->grid.edge_m(), -first_leaf_level));
+  }
+  constants_->position_step_m = steps->largest_step_m();
+  pool.for_each(leaves.size(), [&](std::size_t i) { steps->apply(*leaves[i]); });
+}
+
+MapGrid LivingMap::grid_for(const LostForm& lost, std::span<const std::shared_ptr<Tile>> leaves) const {
+  const double cell_m = std::ldexp(lost.largest_tile_m, -kLeafLevelsAbove);
+  MapGrid all = constants_->grid.with_cells_of(cell_m, options_.first_level);
+  if (all.edge_m() <= std::ldexp(cell_m, options_.first_level)) return all;
+  // One tile may be all that lies beyond the cube.
+  const MapGrid near = MapGrid::from(lost.bounds.min, cell_m, options_.first_level);
+  const std::array<double, 3> low = near.corner_m();
+  const auto is_within = [&](const base::Vec3f& p) {
+    const auto along = [&](float at, double from) { return double{at} >= from && double{at} < from + near.edge_m(); };
+    return along(p.x, low[0]) && along(p.y, low[1]) && along(p.z, low[2]);
+  };
+  std::size_t beyond_count = 0;
+  for (const auto& leaf : leaves) {
+    for (std::uint32_t v = 0; v < leaf->owned_count; ++v) beyond_count += is_within(leaf->positions[v]) ? 0u : 1u;
+  }
+  return beyond_count <= options_.leaf_vertex_count && is_within(lost.bounds.max) ? near : all;
 }
 
 void LivingMap::take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress) {

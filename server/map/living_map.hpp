@@ -20,6 +20,7 @@
 #include "server/map/map_grid.hpp"
 #include "server/map/map_tree.hpp"
 #include "server/map/map_version.hpp"
+#include "server/map/position_step.hpp"
 #include "server/map/scene_snapshot.hpp"
 
 namespace spectra::map {
@@ -133,6 +134,9 @@ class LivingMap {
   /// Of a block that comes in, its positions relative to the origin of the map from then on.
   std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
   ReplacedVertices replaced_vertices(BlockNumber block) const;
+  /// Of the first block, and the tiles for it: where some reach too far for the steps that form asks for there, all are cut anew in smaller cells.
+  void choose_steps(ChangedTree& first, jobs::WorkerPool& pool);
+  MapGrid grid_for(const LostForm& lost, std::span<const std::shared_ptr<Tile>> leaves) const;
   /// The tree with what has changed.
   void take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress);
   TileSizes sizes() const;

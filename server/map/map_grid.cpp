@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
-
-#include "fusion/mesh/surface.hpp"
 
 namespace spectra::map {
 namespace {
@@ -14,12 +11,8 @@ constexpr std::size_t kSampleSize = 4096;
 /// The part of the positions at either end of an axis that may be far from all others, and how much is added beyond the rest.
 constexpr double kFarShare = 0.002;
 constexpr double kMargin = 0.25;
-/// More steps than a tile has from end to end.
-constexpr double kStepsOfTile = 0x1p23;
-/// Where one tile of all would have coarser steps than the usual edge, a cell is so many edges (64 of them a tile with steps of a quarter of
-/// one), unless so small a part of all that the cube would end before it.
-constexpr double kEdgesOfCell = 0x1p15;
-constexpr double kSmallestCell = 0x1p-11;
+/// How often a cell may be halved, the cube with it, and what filled it is still within the cube.
+constexpr double kMostHalvingsOfCell = 11;
 
 struct Interval {
   double low = 0, high = 0;
@@ -43,27 +36,16 @@ Interval within(const Interval& interval, double core_low, double core_high) {
   return part.low <= part.high ? part : interval;
 }
 
-/// The median of some edges; 0 without any.
-double usual_edge_m(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
-  std::vector<double> squared;
-  const std::size_t stride = triangles.size() / kSampleSize + 1;
-  for (std::size_t t = 0; t < triangles.size(); t += stride) {
-    const auto& [a, b, c] = triangles[t];
-    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) {
-      const double edge = mesh::squared_distance(positions[from], positions[to]);
-      if (edge > 0 && std::isfinite(edge)) squared.push_back(edge);
-    }
-  }
-  if (squared.empty()) return 0;
-  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
-  std::nth_element(squared.begin(), middle, squared.end());
-  return std::sqrt(*middle);
+/// A third of the way along, in binary 0.0101..: near no border of any level.
+double cells_before(int level) {
+  double count = 0;
+  for (int l = 1; l < level; l += 2) count = 4 * count + 1;
+  return count;
 }
 
 }  // namespace
 
-MapGrid MapGrid::around(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles,
-                        const std::optional<base::Bounds>& core, int level) {
+MapGrid MapGrid::around(std::span<const base::Vec3f> positions, const std::optional<base::Bounds>& core, int level) {
   std::array<Interval, 3> box{};
   if (!positions.empty()) {
     const std::size_t stride = (positions.size() + kSampleSize - 1) / kSampleSize;
@@ -82,22 +64,32 @@ MapGrid MapGrid::around(std::span<const base::Vec3f> positions, std::span<const 
   }
   double extent = 0;
   for (const Interval& side : box) extent = std::max(extent, side.high - side.low);
-  double cell_m = extent > 0 ? extent : 1;
-  const double edge_m = usual_edge_m(positions, triangles);
-  if (edge_m > 0 && std::exp2(std::ceil(std::log2(cell_m / kStepsOfTile))) > edge_m) {
-    cell_m = std::min(cell_m, std::max(kEdgesOfCell * edge_m, kSmallestCell * cell_m));
-  }
+  const double cell_m = extent > 0 ? extent : 1;
   MapGrid grid;
   grid.edge_m_ = std::ldexp(cell_m, level);
-  // A third of the way along, in binary 0.0101..: near no border of any level.
-  double cells_before = 0;
-  for (int l = 1; l < level; l += 2) cells_before = 4 * cells_before + 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // What is thin along an axis is not cut along it soon; elsewhere cuts begin at the side, because many maps have a raster.
     const bool is_thin = box[axis].high - box[axis].low < cell_m / 3;
     const double middle = box[axis].low + (box[axis].high - box[axis].low) / 2;
-    grid.corner_m_[axis] = (is_thin ? middle - cell_m / 3 : box[axis].low) - cell_m * cells_before;
+    grid.corner_m_[axis] = (is_thin ? middle - cell_m / 3 : box[axis].low) - cell_m * cells_before(level);
   }
+  return grid;
+}
+
+MapGrid MapGrid::with_cells_of(double most_m, int level) const {
+  const double cell_m = std::ldexp(edge_m_, -level);
+  const double halvings = std::clamp(std::ceil(std::log2(cell_m / most_m)), 0.0, kMostHalvingsOfCell);
+  MapGrid grid = *this;
+  grid.edge_m_ = std::ldexp(edge_m_, -static_cast<int>(halvings));
+  for (double& corner : grid.corner_m_) corner += (cell_m - std::ldexp(grid.edge_m_, -level)) * cells_before(level);
+  return grid;
+}
+
+MapGrid MapGrid::from(const base::Vec3f& low, double cell_m, int level) {
+  MapGrid grid;
+  grid.edge_m_ = std::ldexp(cell_m, level);
+  const double before_m = cell_m * cells_before(level);
+  grid.corner_m_ = {double{low.x} - before_m, double{low.y} - before_m, double{low.z} - before_m};
   return grid;
 }
 

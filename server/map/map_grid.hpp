@@ -21,11 +21,14 @@ class MapGrid {
   MapGrid(const std::array<double, 3>& corner_m, double edge_m) : corner_m_(corner_m), edge_m_(edge_m) {}
 
   /// So that most of some positions just fill one cell of `level`; the few that are far from
-  /// all others, or outside of `core`, are not heeded. Smaller where a tile of that cell would have steps coarser than the usual edge of
-  /// `triangles`. The cell's place in the cube is such that what grows beyond it soon has a common cell with it again. Of no positions: a
-  /// cell of one metre around 0.
-  static MapGrid around(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles,
-                        const std::optional<base::Bounds>& core, int level);
+  /// all others, or outside of `core`, are not heeded. The cell's place in the cube is such that what grows beyond it soon has a common cell with
+  /// it again. Of no positions: a cell of one metre around 0.
+  static MapGrid around(std::span<const base::Vec3f> positions, const std::optional<base::Bounds>& core, int level);
+
+  /// The same with cells of `level` no larger than so much, or than a 2,048th of what they are: there the cube would end before what is in it.
+  MapGrid with_cells_of(double most_m, int level) const;
+  /// With cells of `level` of that size, `low` in the first of those that with_cells_of() would fill.
+  static MapGrid from(const base::Vec3f& low, double cell_m, int level);
 
   /// The middle of a cell (metres), where it is cut.
   std::array<double, 3> middle_of(const protocol::TileId& cell) const;

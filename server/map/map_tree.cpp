@@ -42,12 +42,12 @@ struct TouchedLeaf {
 class TreeChange {
  public:
   TreeChange(const MapGrid& grid, const TileSizes& sizes, std::span<const BlockNumber> removed,
-             const BlockLabels& labels, const std::function<void(double)>& made_share)
+             const BlockLabels& labels, std::function<void(double)> made_share)
       : grid_(grid),
         sizes_(sizes),
         removed_(removed.begin(), removed.end()),
         labels_(labels),
-        made_share_(made_share) {}
+        made_share_(std::move(made_share)) {}
 
   ChangedTree run(const std::shared_ptr<const MapNode>& root, std::span<const BlockMesh> added,
                   jobs::WorkerPool& pool) {
@@ -77,6 +77,22 @@ class TreeChange {
       result.root = root;
       return result;
     }
+    return cut(root, std::move(incoming), pool);
+  }
+
+  ChangedTree run_anew(const std::shared_ptr<const MapNode>& root, jobs::WorkerPool& pool) {
+    total_before_ = total_ = root->content;
+    std::vector<Element> incoming;
+    for (const auto& leaf : leaves_of(root)) {
+      const std::vector<Element> part = elements_of_leaf(*leaf);
+      incoming.insert(incoming.end(), part.begin(), part.end());
+    }
+    return cut(nullptr, std::move(incoming), pool);
+  }
+
+ private:
+  ChangedTree cut(const std::shared_ptr<const MapNode>& root, std::vector<Element> incoming, jobs::WorkerPool& pool) {
+    ChangedTree result;
     auto top = std::make_shared<MapNode>();
     result.root = top;
     cut(std::move(top), root, std::move(incoming), pool);
@@ -85,7 +101,6 @@ class TreeChange {
     return result;
   }
 
- private:
   static Piece piece_of(const BlockMesh& block) {
     return {.positions = block.mesh->positions(),
             .visible = block.mesh->visible(),
@@ -386,7 +401,7 @@ class TreeChange {
   const TileSizes& sizes_;
   const std::set<BlockNumber> removed_;
   const BlockLabels& labels_;
-  const std::function<void(double)>& made_share_;
+  const std::function<void(double)> made_share_;
   CellContent total_;         ///< Of the whole map, in the end.
   CellContent total_before_;  ///< The same before the change.
 
@@ -411,6 +426,11 @@ ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGr
                          const BlockLabels& labels, jobs::WorkerPool& pool,
                          const std::function<void(double)>& made_share) {
   return TreeChange(grid, sizes, removed, labels, made_share).run(root, added, pool);
+}
+
+ChangedTree cut_anew(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
+                     const BlockLabels& labels, jobs::WorkerPool& pool) {
+  return TreeChange(grid, sizes, {}, labels, {}).run_anew(root, pool);
 }
 
 std::vector<std::shared_ptr<const MapNode>> leaves_of(const std::shared_ptr<const MapNode>& root) {

@@ -89,6 +89,10 @@ ChangedTree changed_tree(const std::shared_ptr<const MapNode>& root, const MapGr
                          const BlockLabels& labels, jobs::WorkerPool& pool,
                          const std::function<void(double)>& made_share = {});
 
+/// The same content in the cells of another grid.
+ChangedTree cut_anew(const std::shared_ptr<const MapNode>& root, const MapGrid& grid, const TileSizes& sizes,
+                     const BlockLabels& labels, jobs::WorkerPool& pool);
+
 /// All leaves of a tree, coarse before fine.
 std::vector<std::shared_ptr<const MapNode>> leaves_of(const std::shared_ptr<const MapNode>& root);
 

@@ -110,7 +110,7 @@ class Pieces {
 }  // namespace
 
 PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
-                             std::optional<float> largest_step_m) {
+                             std::optional<float> largest_step_m, double largest_tile_m) {
   largest_step_m_ = largest_step_m.value_or(usual_step_m(leaves, pool));
   gather(leaves);
   if (points_.empty()) return;
@@ -125,7 +125,7 @@ PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs
   most_halvings_ = kMostHalvings;
   const bool has_triangles =
       std::any_of(leaves.begin(), leaves.end(), [](const auto& leaf) { return !leaf->triangles.empty(); });
-  if (has_triangles) limit_to_one_tile();
+  if (has_triangles) limit_to_one_tile(largest_tile_m);
   keep_sides(pool);
   coincident_ = {};
   small_pieces_ = {};
@@ -323,30 +323,33 @@ void PositionSteps::ask_neighbours(jobs::WorkerPool& pool) {
   });
 }
 
-void PositionSteps::limit_to_one_tile() {
+void PositionSteps::limit_to_one_tile(double largest_tile_m) {
   std::vector<base::Vec3f> corners;
   for (const Cell& cell : cells_) {
     corners.push_back(cell.bounds.min);
     corners.push_back(cell.bounds.max);
   }
-  const double extent = longest_side(bounds_of(corners));
+  const double extent = std::min(longest_side(bounds_of(corners)), 2 * largest_tile_m);
   const double most = std::floor(std::log2(static_cast<double>(largest_step_m_) * 0x1.fffffcp23 / extent));
   // A triangle to a stray vertex coarsens the tiles that have it, no others.
   if (!(most >= 1 && most < kMostHalvings)) return;
   most_halvings_ = static_cast<std::uint8_t>(most);
   for (Cell& cell : cells_) {
-    for (std::uint8_t& halvings : cell.halvings) halvings = std::min(halvings, most_halvings_);
+    for (std::uint8_t& halvings : cell.halvings) {
+      is_limited_ = is_limited_ || halvings > most_halvings_;
+      halvings = std::min(halvings, most_halvings_);
+    }
   }
 }
 
-StepHalvings PositionSteps::halvings_at(const base::Vec3f& position) const {
+std::uint32_t PositionSteps::point_at(const base::Vec3f& position) const {
   const auto p = coordinates(position);
   const Node* node = &nodes_[0];
   while (node->axis != kNoAxis) node = &nodes_[node->below + (p[node->axis] < node->split ? 0 : 1)];
   const Cell& cell = cells_[node->below];
   std::uint32_t i = cell.begin;
   while (i + 1 < cell.end && points_[i].position != position) ++i;
-  return halvings_[i];
+  return i;
 }
 
 void PositionSteps::apply(Tile& tile) const {
@@ -357,7 +360,7 @@ void PositionSteps::apply(Tile& tile) const {
   bool is_any = false;
   for (std::size_t v = 0; v < halvings.size(); ++v) {
     if (!is_drawn[v]) continue;
-    halvings[v] = halvings_at(tile.positions[v]);
+    halvings[v] = halvings_[point_at(tile.positions[v])];
     is_any = is_any || halvings[v] != StepHalvings{};
   }
   if (is_any) tile.step_halvings = std::move(halvings);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +13,18 @@
 #include "server/map/scene_snapshot.hpp"
 
 namespace spectra::map {
+
+/// A tile has fewer steps than that from end to end: floats tell twice as many apart, and Draco adds half a step before it rounds.
+inline constexpr double kStepsOfTile = 0x1p23;
+
+/// How often a step may be halved until it is the finest that a tile can have, which reaches so far; negative: so often it is doubled.
+int halvings_of_tile(const Tile& tile, double step_m);
+
+/// What tiles reach too far for.
+struct LostForm {
+  double largest_tile_m = 0;  ///< Tiles that reach no farther would have the steps that it asks for.
+  base::Bounds bounds;        ///< Of all of it.
+};
 
 /// How finely the positions of a scene are rounded where: a power of two in metres for every place and axis, so that all
 /// lattices are parts of one. A position alone decides its step: whatever tiles and levels hold a vertex, it is rounded to
@@ -30,12 +43,16 @@ namespace spectra::map {
 class PositionSteps {
  public:
   /// Of the full mesh; the same for any number of threads. `largest_step_m`: that of the map it becomes part of, a power of two.
-  /// Must not be called from a job of the pool.
+  /// `largest_tile_m`: as far as leaves reach at most, where that is less than all of them together. Must not be called from a job of the pool.
   PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
-                std::optional<float> largest_step_m = std::nullopt);
+                std::optional<float> largest_step_m = std::nullopt,
+                double largest_tile_m = std::numeric_limits<double>::infinity());
 
   /// The coarsest step that any vertex may have; a power of two.
   float largest_step_m() const { return largest_step_m_; }
+
+  /// What loses its form in these leaves, because some reach so far that they cannot have the steps that it asks for.
+  std::optional<LostForm> lost_form(std::span<const std::shared_ptr<Tile>> leaves) const;
 
   /// Fills in the step_halvings of a tile whose vertices are vertices of the scene. Thread-safe for different tiles.
   void apply(Tile& tile) const;
@@ -61,6 +78,7 @@ class PositionSteps {
     std::uint32_t below = 0;
   };
   struct Branch;
+  class Losses;
   struct Neighbourhood;
   /// One look at all balls, at the halvings of the round before.
   struct SidesRound {
@@ -111,8 +129,9 @@ class PositionSteps {
   void keep_end(const Neighbourhood& around, std::span<const std::uint32_t> ball, std::size_t axis, float end,
                 int direction, float least, float most, std::vector<StepHalvings>& wanted);
   /// No step is finer than a tile of half the scene can have: neighbours would differ on their border.
-  void limit_to_one_tile();
-  StepHalvings halvings_at(const base::Vec3f& position) const;
+  void limit_to_one_tile(double largest_tile_m);
+  /// Which of points_ is in a place.
+  std::uint32_t point_at(const base::Vec3f& position) const;
   /// Calls `visit(cell)` for the cells that reach into a box.
   template <class Visit>
   void for_each_cell(const std::array<double, 3>& low, const std::array<double, 3>& high, Visit visit);
@@ -124,6 +143,7 @@ class PositionSteps {
 
   float largest_step_m_ = 0;
   std::uint8_t most_halvings_ = 0;  ///< That any vertex may have.
+  bool is_limited_ = false;         ///< Some would be rounded finer by more.
   std::vector<Point> points_;
   std::vector<Node> nodes_;
   std::vector<Cell> cells_;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "server/map/position_step.hpp"
 #include "server/stream/stream_quality.hpp"
 
 namespace spectra::stream {
@@ -19,9 +20,6 @@ double most_steps(float step_m) {
   significand >>= std::countr_zero(significand);
   return std::ldexp(1, 24 - static_cast<int>(std::bit_width(significand - 1)));
 }
-
-// Draco adds half a step before it rounds, and needs a bit for that.
-constexpr double kMostStepsOfTile = 0x1p23;
 
 // How the coordinates of one tile are rounded.
 class Rounding {
@@ -50,7 +48,7 @@ class Rounding {
     for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, double{high[axis]} - double{low[axis]});
     constexpr int kSmallestExponent = -124;
     most_halvings_ =
-        halvings_within(extent, std::ilogb(step_m) - kSmallestExponent, std::min(most_steps_, kMostStepsOfTile));
+        halvings_within(extent, std::ilogb(step_m) - kSmallestExponent, std::min(most_steps_, map::kStepsOfTile));
   }
 
   bool is_drawn(std::size_t v) const { return drawn_[v]; }
@@ -91,7 +89,7 @@ bool is_told_apart(const base::Bounds& box, double step_m, double most_steps) {
     const auto low = static_cast<double>(box.min.*member), high = static_cast<double>(box.max.*member);
     const double furthest = std::max(std::abs(low), std::abs(high));
     if (!(furthest <= step_m * (most_steps - 2))) return false;
-    if (!(high - low <= step_m * (std::min(most_steps, kMostStepsOfTile) - 2))) return false;
+    if (!(high - low <= step_m * (std::min(most_steps, map::kStepsOfTile) - 2))) return false;
   }
   return true;
 }

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "fusion/files/ply_reader.hpp"
-#include "server/map/scene_snapshot.hpp"
+#include "fusion/files/scene_survey.hpp"
+#include "server/map/scene_store.hpp"
 #include "server/stream/tile_encoder.hpp"
 #include "server/stream/viewer_stream.hpp"
 #include "tests/unit/stream/form.hpp"
@@ -23,9 +24,10 @@ void measure(const std::string& path, std::size_t seed_count) {
     std::printf("%-30s refused\n", name.c_str());
     return;
   }
+  files::survey(loaded.value());
   jobs::WorkerPool pool(2);
-  const auto scene = map::SceneSnapshot::build(std::move(loaded.value().mesh), 1, pool, map::kLeafVertexCount,
-                                               map::LevelsOfDetail::All);
+  map::SceneStore scenes;
+  const auto scene = scenes.replace(std::move(loaded).value(), pool, map::LevelsOfDetail::All);
   std::size_t root_bytes = 0, leaf_bytes = 0, bytes = 0, uniform_bytes = 0, uniform_leaf_bytes = 0;
   for (const auto& tile : scene->tiles()) {
     const auto geometry = stream::encoded_tile(*tile, scene->suggested_position_step_m(), 7);
@@ -44,7 +46,7 @@ void measure(const std::string& path, std::size_t seed_count) {
       leaf_bytes += size;
       uniform_leaf_bytes += uniform_size;
     }
-    if (tile->id.level == 0) root_bytes += size;
+    if (tile == scene->tiles().front()) root_bytes = size;
   }
   const stream::testing::FormReport form = stream::testing::form_of(*scene, seed_count);
   std::printf(

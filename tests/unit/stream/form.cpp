@@ -145,8 +145,8 @@ FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count) {
   };
   std::set<std::uint32_t> torn;
   for (const auto& tile : scene.tiles()) {
-    // The root is drawn alone.
-    if (tile->id.level == 0 && scene.tiles().size() > 1) continue;
+    // The first one is drawn alone.
+    if (tile == scene.tiles().front() && scene.tiles().size() > 1) continue;
     std::vector<bool> is_drawn(tile->positions.size(), tile->triangles.empty());
     for (const auto& triangle : tile->triangles) {
       for (const std::uint32_t v : triangle) is_drawn[v] = true;

@@ -356,6 +356,50 @@ TEST(PositionSteps, OfASmallMeshAreNotCoarsenedByWhatIsFarAway) {
   }
 }
 
+/// As a server has it.
+std::shared_ptr<const map::SceneSnapshot> served(const Parts& parts) {
+  files::LoadedScene loaded;
+  loaded.mesh = parts.mesh();
+  loaded.core_bounds = mesh::stray_points(loaded.mesh.positions(), loaded.mesh.triangles()).core;
+  jobs::WorkerPool pool(2);
+  map::SceneStore scenes;
+  return scenes.replace(std::move(loaded), pool, map::LevelsOfDetail::All);
+}
+
+TEST(PositionSteps, KeepTheFormOfHousesFarFromEachOther) {
+  for (const float distance_m : {5e5F, 2e6F}) {
+    Parts parts;
+    for (const float x : {0.0F, distance_m}) {
+      parts.box({x, 0, 0}, {x + 8, 6, 3});
+      parts.box({x + 4, 0, 0}, {x + 4.08F, 4, 2.5F});
+      parts.box({x + 1, 1, 0}, {x + 1.4F, 1.3F, 0.3F});
+    }
+    const auto scene = served(parts);
+    const FormReport form = form_of(*scene, 48);
+    EXPECT_EQ(form.piece_count, 6U);
+    EXPECT_TRUE(form.is_kept()) << distance_m << ": " << described(form);
+    // What stands for both of them from afar says that it is coarser.
+    const double reach_m = double{distance_m} / map::kStepsOfTile;
+    EXPECT_GT(double{scene->tiles().front()->geometric_error_m}, reach_m);
+  }
+}
+
+TEST(PositionSteps, KeepARoomAmongHundredsOfFarTriangles) {
+  Parts parts;
+  parts.box({0, 0, 0}, {8, 6, 3});
+  parts.box({4, 0, 0}, {4.08F, 4, 2.5F});
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> anywhere(-2e6F, 2e6F);
+  for (int i = 0; i < 600; ++i) {
+    const float x = anywhere(random), y = anywhere(random);
+    parts.triangles.push_back({parts.add(x, y, 0), parts.add(x + 1, y, 0), parts.add(x, y + 1, 0)});
+  }
+  const auto sides = drawn_sides(*served(parts), 8, 8);  // The wall, and then triangles.
+  ASSERT_FALSE(sides.empty());
+  EXPECT_NEAR(sides[0][0], 0.08, 0.008);
+  EXPECT_NEAR(sides[0][1], 4, 0.4);
+}
+
 TEST(PositionSteps, KnowTheLastVerticesWhereOthersLieInTheSamePlace) {
   // Patches, and behind all of them fans of as many vertices in the first place of each.
   constexpr int kPatches = 200, kSide = 17, kFan = 100;
