@@ -392,6 +392,69 @@ export function addLayoutTests(browser, scratch) {
     await server.stop();
   });
 
+  test('Long temperatures are whole, told apart and beside each other, and a reading leaves open notes readable', async () => {
+    const head = (vertices, faces) =>
+      `ply\nformat ascii 1.0\nelement vertex ${vertices}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n` +
+      `property uchar green\nproperty uchar blue\nproperty float temperature\nelement face ${faces}\n` +
+      'property list uchar int vertex_indices\nend_header\n';
+    const sheet = (temperature) => {
+      const [vertices, faces] = [[], []];
+      for (let i = 0; i < 400; i += 1) {
+        const [x, y] = [i % 20, Math.floor(i / 20)];
+        vertices.push(
+          `${x / 10} ${y / 10} 0 ${90 + 5 * x} 120 ${90 + 5 * y} ${temperature(Math.exp(-((x - 9) ** 2 + (y - 9) ** 2)))}`,
+        );
+        if (x < 19 && y < 19) faces.push(`3 ${i} ${i + 1} ${i + 21}`, `3 ${i} ${i + 21} ${i + 20}`);
+      }
+      return `${head(vertices.length, faces.length)}${vertices.join('\n')}\n${faces.join('\n')}\n`;
+    };
+    const scenes = {
+      'far below zero': { at: (spot) => -200 + 30 * spot, bar: /low −200\.0.*high −170\.\d/ },
+      'to a million': { at: (spot) => 20 + 993_742.6 * spot, bar: /low 20\.0.*high 993\d{3}\.\d/ },
+      'about a million': { at: (spot) => 1e6 + 20 * spot, bar: /low 1000000 .*high 10000(19|20) / },
+    };
+    for (const [name, { at, bar }] of Object.entries(scenes)) {
+      const file = join(scratch, 'long.ply');
+      writeFileSync(file, sheet(at));
+      const server = await startServer([file]);
+      const { page } = await openClient(browser, server.url, { width: 1280, height: 720 });
+      await settled(page);
+      await page.locator('aside.panel').waitFor();
+      assert.match((await page.locator('footer').innerText()).replace(/\s+/g, ' '), bar, name);
+      for (const method of ['histogram_distribution', 'colour_mapped_threshold']) {
+        await page.evaluate((id) => globalThis.spectra.settings.setMethod(id), method);
+        await settled(page);
+        for (const [width, height] of [
+          [360, 740],
+          [740, 360],
+          [1280, 720],
+        ]) {
+          await page.setViewportSize({ width, height });
+          await page.waitForFunction((wide) => globalThis.spectra.viewport.size[0] === wide, width);
+          await drawn(page);
+          await page.evaluate(async () => {
+            const { width, height } = document.querySelector('canvas').getBoundingClientRect();
+            for (let i = 0; i < 400; i += 1) {
+              const at = { x: ((i % 20) + 0.5) * (width / 20), y: (Math.floor(i / 20) + 0.5) * (height / 20) };
+              if (await globalThis.spectra.viewport.pick(at.x, at.y)) return globalThis.spectra.pin(at);
+            }
+          });
+          await page.locator('.card').waitFor();
+          await drawn(page);
+          assert.deepEqual((await boxes(page)).problems, [], `${name}, ${method}, ${width} x ${height}`);
+          await page.locator('footer .notes').click();
+          await drawn(page);
+          assert.deepEqual((await boxes(page)).problems, [], `${name}, ${method}, ${width} x ${height}, notes`);
+          await page.locator('footer .notes').click();
+          await page.locator('.card').waitFor();
+        }
+      }
+      await screenshot(page, `long-${name.replaceAll(' ', '-')}`);
+      await page.close();
+      await server.stop();
+    }
+  });
+
   test('On a phone too, the marks tell the hottest of all that is seen', async () => {
     const server = await demoServer();
     const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });

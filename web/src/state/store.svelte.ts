@@ -247,9 +247,11 @@ export class Store {
     this.otherMethods.length > 0 &&
       ((!this.connected && this.hereSince === null) || (this.lateSince !== null && this.now - this.lateSince > PENDING_AFTER_MS)),
   );
-  /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual. */
+  /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual, as without a scene. */
   readonly silentFor_s = $derived(
-    this.connected && this.heardAt !== null && this.now - this.heardAt > QUIET_MS ? (this.now - this.heardAt) / 1000 : null,
+    this.connected && this.scene !== null && this.heardAt !== null && this.now - this.heardAt > QUIET_MS
+      ? (this.now - this.heardAt) / 1000
+      : null,
   );
   /** How exact the picture is; nobody can say that of a picture of a link that is lost or silent, or of a scene that is another one by now. */
   readonly accuracy = $derived(

@@ -61,12 +61,13 @@ describe('Numbers', () => {
   });
 
   it('have a power of ten where a fill value would be 37 digits wide', () => {
-    expect([1e36, 9.96e35, 3.3e30, -1e9, 1_250_000, 999_999].map((t) => plain(celsius(t)))).toEqual([
+    expect([1e36, 9.96e35, 3.3e30, -1e9, 12_500_000, 1_250_000, 999_999].map((t) => plain(celsius(t)))).toEqual([
       '1e36 °C',
       '1e36 °C',
       '3.3e30 °C',
       '−1e9 °C',
-      '1.3e6 °C',
+      '1.3e7 °C',
+      '1250000 °C',
       '999999.0 °C',
     ]);
     expect(figures(6.664912760815277e35, 3)).toBe('6.7e35');

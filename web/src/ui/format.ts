@@ -11,16 +11,18 @@ function signed(text: string): string {
 }
 
 /** From here on a number is written with a power of ten: a fill value in the data, say, would be 37 digits wide. */
-const LARGEST_WRITTEN_OUT = 1e6;
+const LARGEST_WRITTEN_OUT = 1e7;
+/** From here on no decimals are written. */
+const LARGEST_WITH_DECIMALS = 1e6;
 
 function huge(value: number): string {
   return signed(value.toExponential(1).replace('.0', '').replace('+', ''));
 }
 
-/** Fixed decimals, with a real minus sign; of huge numbers two figures: 1.2e36. */
+/** Fixed decimals, with a real minus sign; of large numbers none (1000020), of huge ones two figures: 1.2e36. */
 export function fixed(value: number, decimals: number): string {
   if (Math.abs(value) >= LARGEST_WRITTEN_OUT) return huge(value);
-  const text = value.toFixed(decimals);
+  const text = value.toFixed(Math.abs(value) >= LARGEST_WITH_DECIMALS ? 0 : decimals);
   return signed(Number(text) === 0 ? text.replace('-', '') : text);
 }
 

@@ -25,6 +25,12 @@ export function isTiny(width: number, height: number): boolean {
   return width < 280 || height < 220;
 }
 
+/** Width of the axis: numbers of the scale, the strip, and the same numbers with a word where it is not narrow, beside each other. */
+export function axisWidthFor(numbers: readonly string[], isNarrow: boolean): number {
+  const longest = Math.max(...numbers.map(({ length }) => length));
+  return isNarrow ? 92 + 15 * Math.max(0, longest - 5) : 164 + 15 * Math.max(0, longest - 7);
+}
+
 /** How much larger the controls are on a screen of very many pixels; app.css has the same bound. */
 export function controlZoom(width: number): number {
   return width >= 2800 ? 1.5 : 1;

@@ -107,6 +107,8 @@ describe('columnWidth', () => {
     expect(columnWidth(['20', '30'], ['10.6', '40.3'])).toBeLessThanOrEqual(40);
     expect(columnWidth(['310'], ['316.3', '301.0'])).toBeGreaterThan(40);
     expect(columnWidth(['2e35', '8e35'], ['1e36'])).toBeGreaterThanOrEqual(40);
+    // A minus sign is wider than a digit.
+    expect(columnWidth([], ['\u2212200.0'])).toBeGreaterThan(columnWidth([], ['1200.0']));
   });
 });
 

@@ -16,8 +16,8 @@ export function roundTicks(lo: number, hi: number, wanted: number): { values: nu
 
 /** About as wide as a text is on the axis, in pixels, in the widest of the usual fonts. */
 export function textWidth(text: string, isBold: boolean): number {
-  const points = text.length - text.replaceAll('.', '').length;
-  return (text.length - points) * (isBold ? 8 : 7.3) + points * 4.4;
+  const points = text.split('.').length - 1;
+  return (text.length - points) * (isBold ? 8 : 7.3) + points * 4.4 + (text.split('\u2212').length - 1) * 2.3;
 }
 
 /** Width of the column left of the strip, so that it holds these numbers, the tick beside them, and the arrow beside the bold ones. */
