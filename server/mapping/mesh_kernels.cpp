@@ -54,10 +54,6 @@ using HalfTag = hn::Rebind<float, DoubleTag>;
 using HalfIntTag = hn::Rebind<std::int32_t, DoubleTag>;
 using Doubles = hn::Vec<DoubleTag>;
 
-HWY_INLINE Doubles doubles_of(const float* from) {
-  return hn::PromoteTo(DoubleTag(), hn::LoadU(HalfTag(), from));
-}
-
 HWY_INLINE Doubles doubles_of(const std::int32_t* from) {
   return hn::PromoteTo(DoubleTag(), hn::LoadU(HalfIntTag(), from));
 }
@@ -71,16 +67,25 @@ void places(CrossedEdges& edges, double voxel_m, CrossedEdges::Array<float>& sha
   // Lanes beyond the last edge divide, too.
   for (std::size_t i = edges.count; i % hn::Lanes(d) != 0; ++i) {
     edges.first.distance[i] = 1;
-    edges.second.distance[i] = 0;
+    edges.second.distance[i] = -1;
   }
+  auto is_on_voxel = hn::MaskFromVec(hn::Zero(df));
   for (std::size_t i = 0; i < edges.count; i += hn::Lanes(d)) {
     const Doubles first = doubles_of(&edges.first.distance[i]), second = doubles_of(&edges.second.distance[i]);
     const Doubles share = hn::Div(first, hn::Sub(first, second));
     hn::StoreU(hn::DemoteTo(df, share), df, &shares[i]);
     const Doubles axis = doubles_of(&edges.axis[i]);
     const auto place = [&](const std::int32_t* voxel, double along, float* to) HWY_ATTR {
-      const Doubles step = hn::IfThenElseZero(hn::Eq(axis, hn::Set(d, along)), share);
-      hn::StoreU(hn::DemoteTo(df, hn::Mul(hn::Add(doubles_of(voxel), step), size)), df, to);
+      const auto is_along = hn::Eq(axis, hn::Set(d, along));
+      const Doubles here = doubles_of(voxel);
+      const auto metres = [&](Doubles step) HWY_ATTR {
+        return hn::DemoteTo(df, hn::Mul(hn::Add(here, hn::IfThenElseZero(is_along, step)), size));
+      };
+      const auto at = metres(share);
+      hn::StoreU(at, df, to);
+      // Across the edge it is where both voxels are.
+      const auto is_first = hn::Eq(at, metres(zero)), is_second = hn::Eq(at, metres(one));
+      is_on_voxel = hn::Or(is_on_voxel, hn::AndNot(hn::And(is_first, is_second), hn::Or(is_first, is_second)));
     };
     place(&edges.x[i], 0, &edges.x_m[i]);
     place(&edges.y[i], 1, &edges.y_m[i]);
@@ -91,7 +96,7 @@ void places(CrossedEdges& edges, double voxel_m, CrossedEdges::Array<float>& sha
     const Doubles of_second = hn::IfThenElse(has_first, hn::IfThenElseZero(has_second, share), one);
     const Doubles of_first = hn::Sub(one, of_second);
     const auto has_any = hn::Or(has_first, has_second);
-    const auto level = [&](const float* of_a, const float* of_b, std::int32_t* to) HWY_ATTR {
+    const auto level = [&](const std::int32_t* of_a, const std::int32_t* of_b, std::int32_t* to) HWY_ATTR {
       const Doubles mixed = hn::Add(hn::Mul(of_first, doubles_of(of_a)), hn::Mul(of_second, doubles_of(of_b)));
       const Doubles rounded = hn::Add(hn::Mul(mixed, hn::Set(d, 1.0 / 256)), hn::Set(d, 0.5));
       const Doubles within = hn::IfThenElse(has_any, hn::Min(hn::Set(d, 255.0), rounded), hn::Set(d, -1.0));
@@ -101,6 +106,7 @@ void places(CrossedEdges& edges, double voxel_m, CrossedEdges::Array<float>& sha
     level(&edges.first.green[i], &edges.second.green[i], &edges.green[i]);
     level(&edges.first.blue[i], &edges.second.blue[i], &edges.blue[i]);
   }
+  edges.has_one_on_voxel = !hn::AllFalse(df, is_on_voxel);
 }
 
 void temperatures(CrossedEdges& edges, float least_sigma_kelvin, const CrossedEdges::Array<float>& shares) {

@@ -24,10 +24,9 @@ struct CrossedEdges {
   template <class T>
   using Array = std::array<T, kRoom>;
 
-  /// The voxel at an end.
+  /// The voxel at an end, as VoxelBlock and HeatBlock have it.
   struct Ends {
-    Array<float> distance;
-    Array<float> colour_weight, red, green, blue;  ///< As VoxelBlock has them.
+    Array<std::int32_t> distance, colour_weight, red, green, blue;
     Array<float> celsius, variance, own_variance, seen_s;
     ///< Variance: infinite where there is no temperature. Own: of its error (BlockHead::heat_certainty).
   };
@@ -40,6 +39,7 @@ struct CrossedEdges {
   Array<float> x_m, y_m, z_m;
   Array<std::int32_t> red, green, blue;        ///< -1: neither end has a colour.
   Array<float> celsius, sigma_kelvin, seen_s;  ///< NaN: neither has a temperature.
+  bool has_one_on_voxel;                       ///< Some vertex may be where a voxel is.
 };
 
 /// Finds the vertices. Temperature and variance go by what each end knows; sigma is at least `least_sigma_kelvin`. Every instruction set gives the

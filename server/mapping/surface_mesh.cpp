@@ -18,40 +18,108 @@ namespace {
 constexpr int kEdge = kBlockEdge + 1;        ///< Voxels that the cells of a block need, each way.
 constexpr int kUnitCorners = kUnitEdge + 1;  ///< The same of a unit.
 constexpr base::Rgb8 kNoColour{128, 128, 128};
-constexpr std::uint32_t kNoVertex = 0xffffffff;
 
 /// The vertices of a unit by the edge of the grid that they lie on: of every voxel those along x, y and z. Kept from unit to unit, as it is
-/// large, mostly empty, and emptied by going through what was put in.
-struct VertexTable {
-  std::vector<std::uint32_t> index =
-      std::vector<std::uint32_t>(std::size_t{3} * kUnitCorners * kUnitCorners * kUnitCorners, kNoVertex);
-  std::vector<std::uint32_t> used;  ///< Places in `index` that hold a vertex.
-
-  std::uint32_t& of(std::size_t place, std::uint32_t next) {
-    if (index[place] == kNoVertex) {
-      index[place] = next;
-      used.push_back(static_cast<std::uint32_t>(place));
-    }
-    return index[place];
+/// large and mostly empty.
+class VertexTable {
+ public:
+  /// The vertex of a place; `next` where there is none yet.
+  std::uint32_t of(std::size_t place, std::uint32_t next) {
+    const std::uint32_t known = entries_[place], entry = known > begin_ ? known : begin_ + next + 1;
+    entries_[place] = entry;
+    end_ = std::max(end_, entry);
+    return entry - begin_ - 1;
   }
+  /// What is there counts no more.
   void clear() {
-    for (const std::uint32_t place : used) index[place] = kNoVertex;
-    used.clear();
+    begin_ = end_;
+    if (begin_ < kLast) return;
+    std::fill(entries_.begin(), entries_.end(), 0);
+    begin_ = end_ = 0;
   }
+
+ private:
+  static constexpr std::uint32_t kLast = 0xf0000000;  ///< Far more than the vertices of a unit are left.
+  std::vector<std::uint32_t> entries_ =
+      std::vector<std::uint32_t>(std::size_t{3} * kUnitCorners * kUnitCorners * kUnitCorners, 0);
+  std::uint32_t begin_ = 0, end_ = 0;  ///< Entries above begin_, up to end_, are vertices, by their number and 1.
 };
+
+/// The triangles of a cell, whose vertices are numbered in the order in which they come. Most cells have at most kUsualVertices and
+/// kUsualTriangles; up to there the first ones stand in the place of those that are not, so that nothing depends on how many there are.
+struct CellCase {
+  static constexpr std::size_t kUsualVertices = 6, kUsualTriangles = 4;
+  std::size_t vertex_count = 0, triangle_count = 0;
+  std::array<std::uint8_t, 12> edges{};                     ///< Of each vertex.
+  std::array<std::array<std::uint8_t, 3>, 12> triangles{};  ///< Vertices.
+};
+
+const std::array<CellCase, 256>& cell_cases() {
+  static const std::array<CellCase, 256> cases = [] {
+    std::array<CellCase, 256> all;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      CellCase& cell = all[i];
+      for (const auto& triangle : cube_cases()[i]) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const auto end = cell.edges.begin() + static_cast<std::ptrdiff_t>(cell.vertex_count);
+          const auto found = std::find(cell.edges.begin(), end, triangle[k]);
+          if (found == end) cell.edges[cell.vertex_count++] = triangle[k];
+          cell.triangles[cell.triangle_count][k] = static_cast<std::uint8_t>(found - cell.edges.begin());
+        }
+        ++cell.triangle_count;
+      }
+      std::fill(cell.edges.begin() + static_cast<std::ptrdiff_t>(cell.vertex_count), cell.edges.end(), cell.edges[0]);
+    }
+    return all;
+  }();
+  return cases;
+}
+
+/// A voxel at 0..8 each as one number, to which one more of an axis can be added.
+constexpr std::size_t kAcross = 4;  ///< Bits an axis.
+constexpr std::size_t voxel_code(std::size_t x, std::size_t y, std::size_t z) {
+  return x | y << kAcross | z << 2 * kAcross;
+}
+/// The same of an edge from a voxel along an axis.
+constexpr std::size_t edge_code(std::size_t voxel_code, std::size_t axis) {
+  return voxel_code | axis << 3 * kAcross;
+}
+/// Of each voxel_code(): which of the eight blocks, and the index within it.
+struct VoxelOfCode {
+  std::uint16_t block = 0, index = 0;
+};
+constexpr std::array<VoxelOfCode, voxel_code(8, 8, 8) + 1> kVoxelOfCode = [] {
+  std::array<VoxelOfCode, voxel_code(8, 8, 8) + 1> all{};
+  for (std::size_t z = 0; z < kEdge; ++z) {
+    for (std::size_t y = 0; y < kEdge; ++y) {
+      for (std::size_t x = 0; x < kEdge; ++x) {
+        all[voxel_code(x, y, z)] = {static_cast<std::uint16_t>(x >> 3 | (y >> 3) << 1 | (z >> 3) << 2),
+                                    static_cast<std::uint16_t>((x & 7) | (y & 7) << 3 | (z & 7) << 6)};
+      }
+    }
+  }
+  return all;
+}();
+
+/// Of blocks without any.
+const HeatBlock& no_heat() {
+  static const std::unique_ptr<const HeatBlock> none = [] {
+    auto block = std::make_unique<HeatBlock>();
+    block->celsius.fill(0);
+    block->variance.fill(std::numeric_limits<float>::infinity());
+    block->seen_s.fill(0);
+    return block;
+  }();
+  return *none;
+}
 
 /// Which voxels of a block, and of its neighbours as far as its cells need them, are known and which are inside: bits along x.
 struct Neighbourhood {
   std::array<const VoxelBlock*, 8> voxels{};  ///< The block and those beyond, by bits of x, y, z; null: none.
-  std::array<const HeatBlock*, 8> heat{};
-  std::array<float, 8> certainty{};        ///< BlockHead::heat_certainty.
-  std::array<const BlockBits*, 8> bits{};  ///< All 0 where there is no block.
+  std::array<const HeatBlock*, 8> heat{};     ///< no_heat() where there is none.
+  std::array<float, 8> certainty{};           ///< BlockHead::heat_certainty.
+  std::array<const BlockBits*, 8> bits{};     ///< All 0 where there is no block.
   std::array<std::uint16_t, kEdge * kEdge> known{}, inside{};
-
-  /// The block, by its number in the eight, and the index within it of a voxel at 0..8 each.
-  static std::pair<std::size_t, std::size_t> voxel(int x, int y, int z) {
-    return {static_cast<std::size_t>(x >> 3 | (y >> 3) << 1 | (z >> 3) << 2), index_within({x, y, z}, 3)};
-  }
 
   /// False: no surface can be in it.
   bool gather() {
@@ -78,7 +146,10 @@ struct MeshingRoom {
   VertexTable vertices;
   std::array<BlockBits, std::size_t{kBlocks} * kBlocks * kBlocks> bits;
   std::array<bool, std::size_t{kBlocks} * kBlocks * kBlocks> has_bits{};
+  std::array<std::uint16_t, CrossedEdges::kRoom> places{};  ///< Of the edges of a block: edge_code().
   CrossedEdges edges{};
+  std::size_t triangle_count = 0;  ///< Of a block, as the following.
+  std::array<base::Triangle, kBlockVoxels * 12> triangles{};
   UnitMesh mesh;
 };
 
@@ -91,9 +162,10 @@ class Mesher {
         room_(room),
         mesh_(room.mesh) {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
-      const int from = edges_[e].from;
-      const int place = ((from >> 2) * kUnitCorners + (from >> 1 & 1)) * kUnitCorners + (from & 1);
-      offsets_[e] = static_cast<std::size_t>(3 * place + edges_[e].axis);
+      const std::size_t from = edges_[e].from;
+      const std::size_t place = ((from >> 2) * kUnitCorners + (from >> 1 & 1)) * kUnitCorners + (from & 1);
+      offsets_[e] = 3 * place + edges_[e].axis;
+      codes_[e] = edge_code(voxel_code(from & 1, from >> 1 & 1, from >> 2), edges_[e].axis);
     }
   }
 
@@ -109,6 +181,7 @@ class Mesher {
     for (auto* values : {&mesh_.celsius, &mesh_.sigma_kelvin, &mesh_.seen_s}) values->clear();
     mesh_.edges.clear();
     mesh_.triangles.clear();
+    has_one_on_voxel_ = false;
     for (const std::int32_t block : unit.blocks) {
       if (block >= 0) add_block(block);
     }
@@ -136,7 +209,7 @@ class Mesher {
       const std::int32_t index = found[i];
       const auto k = static_cast<int>(i);
       around_.voxels[i] = index < 0 ? nullptr : &map_.voxels(index);
-      around_.heat[i] = index < 0 || map_.head(index).heat < 0 ? nullptr : &map_.heat(index);
+      around_.heat[i] = index < 0 || map_.head(index).heat < 0 ? &no_heat() : &map_.heat(index);
       around_.certainty[i] = index < 0 ? 1.0F : map_.head(index).heat_certainty();
       around_.bits[i] =
           bits_of(around_.voxels[i], {in_unit.x + (k & 1), in_unit.y + (k >> 1 & 1), in_unit.z + (k >> 2)});
@@ -145,12 +218,14 @@ class Mesher {
     origin_ = {in_unit.x * kBlockEdge, in_unit.y * kBlockEdge, in_unit.z * kBlockEdge};
     room_.edges.count = 0;
     first_vertex_ = static_cast<std::uint32_t>(mesh_.edges.size());
-    const std::size_t first_triangle = mesh_.triangles.size();
+    room_.triangle_count = 0;
     for (int z = 0; z < kBlockEdge; ++z) {
       for (int y = 0; y < kBlockEdge; ++y) add_cells(y, z);
     }
     add_vertices();
-    drop_narrow(first_triangle);
+    // A surface through a voxel itself draws edges together.
+    if (has_one_on_voxel_) drop_narrow();
+    mesh_.triangles.insert(mesh_.triangles.end(), room_.triangles.begin(), triangles_end());
   }
 
   /// Those of a block, found once a unit; `at` in blocks of the unit.
@@ -183,65 +258,86 @@ class Mesher {
       for (std::size_t k = 0; k < 4; ++k) corners |= (around_.inside[rows[k]] >> x & 3U) << 2 * k;
       const std::size_t cell =
           3 * static_cast<std::size_t>(((origin_.z + z) * kUnitCorners + origin_.y + y) * kUnitCorners + origin_.x + x);
-      for (const auto& edges : cases_[corners]) {
-        base::Triangle triangle{};
-        for (std::size_t i = 0; i < 3; ++i) triangle[i] = vertex(cell, edges[i], x, y, z);
-        mesh_.triangles.push_back(triangle);
-      }
+      const std::size_t code =
+          voxel_code(static_cast<std::size_t>(x), static_cast<std::size_t>(y), static_cast<std::size_t>(z));
+      const CellCase& cut = cases_[corners];
+      std::array<std::uint32_t, 12> vertices;
+      const auto find_vertex = [&](std::size_t k) { vertices[k] = vertex(cell, code, cut.edges[k]); };
+      for (std::size_t k = 0; k < CellCase::kUsualVertices; ++k) find_vertex(k);
+      for (std::size_t k = CellCase::kUsualVertices; k < cut.vertex_count; ++k) find_vertex(k);
+      base::Triangle* triangles = &room_.triangles[room_.triangle_count];
+      const auto put = [&](std::size_t t) {
+        const auto& corner = cut.triangles[t];
+        triangles[t] = {vertices[corner[0]], vertices[corner[1]], vertices[corner[2]]};
+      };
+      for (std::size_t t = 0; t < CellCase::kUsualTriangles; ++t) put(t);
+      for (std::size_t t = CellCase::kUsualTriangles; t < cut.triangle_count; ++t) put(t);
+      room_.triangle_count += cut.triangle_count;
     }
   }
 
   /// The vertex on an edge of a cell.
-  std::uint32_t vertex(std::size_t cell, std::size_t edge, int x, int y, int z) {
-    CrossedEdges& crossed = room_.edges;
-    const auto next = first_vertex_ + static_cast<std::uint32_t>(crossed.count);
+  std::uint32_t vertex(std::size_t cell, std::size_t code, std::size_t edge) {
+    std::size_t& count = room_.edges.count;
+    const auto next = first_vertex_ + static_cast<std::uint32_t>(count);
     const std::uint32_t index = room_.vertices.of(cell + offsets_[edge], next);
-    if (index == next) add_edge({x, y, z}, edges_[edge]);
+    // Written over by the next one if it is not new.
+    room_.places[count] = static_cast<std::uint16_t>(code + codes_[edge]);
+    count += index == next ? 1 : 0;
     return index;
   }
 
-  void add_edge(GridPlace cell, const CubeEdge& edge) {
-    CrossedEdges& crossed = room_.edges;
-    const GridPlace from{cell.x + (edge.from & 1), cell.y + (edge.from >> 1 & 1), cell.z + (edge.from >> 2)};
-    const std::size_t i = crossed.count++;
-    crossed.x[i] = base_.x * kBlockEdge + from.x;
-    crossed.y[i] = base_.y * kBlockEdge + from.y;
-    crossed.z[i] = base_.z * kBlockEdge + from.z;
-    crossed.axis[i] = edge.axis;
-    read_end(from, i, crossed.first);
-    read_end({from.x + (edge.axis == 0 ? 1 : 0), from.y + (edge.axis == 1 ? 1 : 0), from.z + (edge.axis == 2 ? 1 : 0)},
-             i, crossed.second);
+  std::array<base::Triangle, kBlockVoxels * 12>::iterator triangles_end() {
+    return room_.triangles.begin() + static_cast<std::ptrdiff_t>(room_.triangle_count);
   }
 
-  void read_end(GridPlace voxel, std::size_t i, CrossedEdges::Ends& end) const {
-    const auto [block, v] = Neighbourhood::voxel(voxel.x, voxel.y, voxel.z);
-    const VoxelBlock& voxels = *around_.voxels[block];
-    end.distance[i] = voxels.distance[v];
-    end.colour_weight[i] = voxels.colour_weight[v];
-    end.red[i] = voxels.red[v];
-    end.green[i] = voxels.green[v];
-    end.blue[i] = voxels.blue[v];
-    const HeatBlock* heat = around_.heat[block];
-    end.celsius[i] = heat == nullptr ? 0 : heat->celsius[v];
-    end.variance[i] = heat == nullptr ? std::numeric_limits<float>::infinity() : heat->variance[v];
-    end.own_variance[i] = heat == nullptr ? 0 : heat->variance[v] * around_.certainty[block];
-    end.seen_s[i] = heat == nullptr ? 0 : heat->seen_s[v];
+  /// What is known of the two voxels of each edge.
+  void read_ends() {
+    CrossedEdges& crossed = room_.edges;
+    const auto read = [&](VoxelOfCode at, std::size_t i, CrossedEdges::Ends& end) {
+      const VoxelBlock& voxels = *around_.voxels[at.block];
+      end.distance[i] = voxels.distance[at.index];
+      end.colour_weight[i] = voxels.colour_weight[at.index];
+      end.red[i] = voxels.red[at.index];
+      end.green[i] = voxels.green[at.index];
+      end.blue[i] = voxels.blue[at.index];
+      const HeatBlock& heat = *around_.heat[at.block];
+      end.celsius[i] = heat.celsius[at.index];
+      end.variance[i] = heat.variance[at.index];
+      end.own_variance[i] = heat.variance[at.index] * around_.certainty[at.block];
+      end.seen_s[i] = heat.seen_s[at.index];
+    };
+    for (std::size_t i = 0; i < crossed.count; ++i) {
+      const std::size_t axis = room_.places[i] >> 3 * kAcross, code = room_.places[i] ^ edge_code(0, axis);
+      constexpr std::size_t kMask = (std::size_t{1} << kAcross) - 1;
+      crossed.x[i] = base_.x * kBlockEdge + static_cast<std::int32_t>(code & kMask);
+      crossed.y[i] = base_.y * kBlockEdge + static_cast<std::int32_t>(code >> kAcross & kMask);
+      crossed.z[i] = base_.z * kBlockEdge + static_cast<std::int32_t>(code >> 2 * kAcross);
+      crossed.axis[i] = static_cast<std::int32_t>(axis);
+      read(kVoxelOfCode[code], i, crossed.first);
+      read(kVoxelOfCode[code + (std::size_t{1} << kAcross * axis)], i, crossed.second);
+    }
   }
 
   /// Those of the edges that were found in a block.
   void add_vertices() {
     CrossedEdges& crossed = room_.edges;
+    read_ends();
     find_vertices(crossed, map_.voxel_m(), rules_.least_sigma_kelvin);
+    has_one_on_voxel_ = has_one_on_voxel_ || crossed.has_one_on_voxel;
+    mesh_.edges.resize(first_vertex_ + crossed.count);
+    mesh_.positions.resize(first_vertex_ + crossed.count);
+    mesh_.colours.resize(first_vertex_ + crossed.count);
     for (std::size_t i = 0; i < crossed.count; ++i) {
       // Places that are 2^21 voxels apart never meet in a unit or beside it.
       const auto place = [](std::int32_t voxel) { return static_cast<std::uint64_t>(voxel) & 0x1fffff; };
-      mesh_.edges.push_back(static_cast<std::uint64_t>(crossed.axis[i]) << 62 ^
-                            (place(crossed.x[i]) << 42 | place(crossed.y[i]) << 21 | place(crossed.z[i])));
-      mesh_.positions.push_back({crossed.x_m[i], crossed.y_m[i], crossed.z_m[i]});
+      mesh_.edges[first_vertex_ + i] = static_cast<std::uint64_t>(crossed.axis[i]) << 62 ^
+                                       (place(crossed.x[i]) << 42 | place(crossed.y[i]) << 21 | place(crossed.z[i]));
+      mesh_.positions[first_vertex_ + i] = {crossed.x_m[i], crossed.y_m[i], crossed.z_m[i]};
       const auto level = [](std::int32_t value) { return static_cast<std::uint8_t>(value); };
-      mesh_.colours.push_back(crossed.red[i] < 0
-                                  ? kNoColour
-                                  : base::Rgb8{level(crossed.red[i]), level(crossed.green[i]), level(crossed.blue[i])});
+      mesh_.colours[first_vertex_ + i] =
+          crossed.red[i] < 0 ? kNoColour
+                             : base::Rgb8{level(crossed.red[i]), level(crossed.green[i]), level(crossed.blue[i])};
     }
     const auto append = [&](const CrossedEdges::Array<float>& from, std::vector<float>& to) {
       to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(crossed.count));
@@ -251,24 +347,23 @@ class Mesher {
     append(crossed.seen_s, mesh_.seen_s);
   }
 
-  /// A surface through a voxel itself draws edges together: takes out triangles without area, from one on.
-  void drop_narrow(std::size_t first) {
-    const auto is_narrow = [&](const base::Triangle& t) {
+  /// Takes out triangles of the block without area.
+  void drop_narrow() {
+    const auto kept = std::remove_if(room_.triangles.begin(), triangles_end(), [&](const base::Triangle& t) {
       const auto& at = mesh_.positions;
       return at[t[0]] == at[t[1]] || at[t[1]] == at[t[2]] || at[t[2]] == at[t[0]];
-    };
-    const auto kept =
-        std::remove_if(mesh_.triangles.begin() + static_cast<std::ptrdiff_t>(first), mesh_.triangles.end(), is_narrow);
-    has_left_out_ = has_left_out_ || kept != mesh_.triangles.end();
-    mesh_.triangles.erase(kept, mesh_.triangles.end());
+    });
+    has_left_out_ = has_left_out_ || kept != triangles_end();
+    room_.triangle_count = static_cast<std::size_t>(kept - room_.triangles.begin());
   }
 
   const VoxelMap& map_;
   const MeshRules& rules_;
   const std::uint16_t least_weight_;
   const std::array<CubeEdge, 12>& edges_ = cube_edges();
-  const CubeCases& cases_ = cube_cases();
+  const std::array<CellCase, 256>& cases_ = cell_cases();
   std::array<std::size_t, 12> offsets_{};  ///< Of an edge of a cell, in VertexTable.
+  std::array<std::size_t, 12> codes_{};    ///< voxel_code() of its first voxel, from the cell's on.
   MeshingRoom& room_;
   std::array<const MapUnit*, 8> units_{};  ///< The unit and those beyond, by bits of x, y, z; null: none.
   Neighbourhood around_;
@@ -276,6 +371,7 @@ class Mesher {
   GridPlace origin_;                ///< Of the block within its unit, in voxels.
   std::uint32_t first_vertex_ = 0;  ///< Of the block.
   UnitMesh& mesh_;
+  bool has_one_on_voxel_ = false;  ///< Some vertex of the unit so far may be where a voxel is.
   bool has_left_out_ = false;
 };
 

@@ -78,8 +78,8 @@ TEST(MeshKernels, EveryInstructionSetFindsTheVerticesThatTheFormulaSays) {
       edges->axis[i] = below(3);
       for (auto* end : {&edges->first, &edges->second}) {
         // Some without a colour, some without a temperature.
-        end->colour_weight[i] = static_cast<float>(below(3) == 0 ? 0 : below(256));
-        for (auto* channel : {&end->red, &end->green, &end->blue}) (*channel)[i] = static_cast<float>(below(65536));
+        end->colour_weight[i] = below(3) == 0 ? 0 : below(256);
+        for (auto* channel : {&end->red, &end->green, &end->blue}) (*channel)[i] = below(65536);
         const bool is_warm = below(3) > 0;
         end->celsius[i] = is_warm ? 0.01F * static_cast<float>(below(5000)) : 0;
         end->variance[i] = is_warm ? 1e-4F * static_cast<float>(1 + below(10000)) : kInfinite;
@@ -87,8 +87,8 @@ TEST(MeshKernels, EveryInstructionSetFindsTheVerticesThatTheFormulaSays) {
         end->seen_s[i] = is_warm ? 0.1F * static_cast<float>(below(1000)) : 0;
       }
       const bool is_first_inside = below(2) == 0;
-      edges->first.distance[i] = static_cast<float>(is_first_inside ? -1 - below(32767) : below(32768));
-      edges->second.distance[i] = static_cast<float>(is_first_inside ? below(32768) : -1 - below(32767));
+      edges->first.distance[i] = is_first_inside ? -1 - below(32767) : below(32768);
+      edges->second.distance[i] = is_first_inside ? below(32768) : -1 - below(32767);
     }
     for (const std::int64_t target : fusion::test::instruction_sets()) {
       const fusion::test::UsingInstructionSet using_it(target);
