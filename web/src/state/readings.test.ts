@@ -227,6 +227,28 @@ describe('Readings of a scene that changes', () => {
     expect(all()).toHaveLength(2);
   });
 
+  it('are asked for again once finer detail has been drawn', async () => {
+    const { store, readings, asked, picture } = setUp();
+    const all = () => probes(asked) as typeof asked;
+    readings.hover({ x: 7, y: 8 });
+    await later();
+    await all()[0]!.answer({ ...PROBE, temperature: 57 });
+    picture.under = [4, 5, 6];
+    readings.differs(7);
+    readings.drawn(6);
+    readings.differs(8);
+    readings.drawn(7);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(all()).toHaveLength(1);
+    readings.drawn(8);
+    readings.drawn(9);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect(all()).toHaveLength(2);
+    expect(all()[1]!.params).toEqual({ position: [4, 5, 6] });
+    await all()[1]!.answer({ ...PROBE, temperature: 19 });
+    expect(store.hover?.probe.temperature).toBe(19);
+  });
+
   it('are asked for again where the pointer rests once the camera does, and are none on its way', async () => {
     const { store, readings, asked, picture } = setUp();
     const all = () => probes(asked) as typeof asked;

@@ -148,6 +148,11 @@ export class Readings {
   pictureIsOf(revision: number, picture: number): void {
     if (revision === this.#shownRevision) return;
     this.#shownRevision = revision;
+    this.differs(picture);
+  }
+
+  /** From the picture of this number on, which is yet to be drawn, another surface is seen: a finer one, say. */
+  differs(picture: number): void {
     this.#newPicture = picture;
   }
 

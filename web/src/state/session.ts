@@ -428,7 +428,9 @@ export class Session {
   #bringIn(): boolean {
     const { bytes, next_ms, complete } = this.#intake.bringIn(performance.now());
     if (complete !== null) this.#completed(complete);
-    if (this.tiles.updateSelection() || bytes > 0) {
+    const isOther = this.tiles.updateSelection();
+    if (isOther || complete !== null) this.readings.differs(this.viewport.nextPicture);
+    if (isOther || bytes > 0) {
       this.store.shown = this.tiles.counts();
       this.store.costs = this.tiles.costs();
       this.#look.pictureChanged();
