@@ -141,6 +141,45 @@ export function addLinkTests(browser) {
     await link.stop();
   });
 
+  test('A palette and a range that are not in the picture yet are said not to be, as long as nothing shows them', async () => {
+    const server = await demoServer();
+    const link = await startLink(server.port);
+    const { page, problems } = await openClient(browser, link.url);
+    await settled(page);
+    await page.keyboard.press('1');
+    await settled(page);
+    const sign = page.locator('[data-pending-settings]');
+    const tiles = await shownTiles(page);
+    const colours = async (name) => sample(await screenshot(page, name)).filter((_, index) => index % 7 === 0);
+    for (const [name, set] of [
+      ['palette', () => globalThis.spectra.settings.setPalette('black_hot')],
+      ['range', () => globalThis.spectra.settings.setRange(15, 60, true)],
+    ]) {
+      const before = await colours(`pending-${name}-before`);
+      link.rate = 4_000;
+      await page.evaluate(set);
+      await sign.waitFor({ timeout: 10_000 });
+      assert.equal(await page.locator('[data-pending-method]').count(), 0);
+      assert.equal(await shownTiles(page), tiles);
+      const during = await colours(`pending-${name}`);
+      const changed = during.filter((pixel, index) => pixel !== before[index]).length / during.length;
+      assert.ok(changed < 0.1, `${changed} of the picture has changed`);
+      link.rate = 60_000;
+      // A coarse picture shows them: that it is behind is said all the same.
+      await page.waitForFunction((all) => globalThis.spectra.store.shown.tiles < all, tiles, { polling: 'raf' });
+      await drawn(page);
+      await page.waitForTimeout(200);
+      assert.equal(await sign.count(), 0, `${name}: the coarse picture shows it`);
+      assert.notEqual(await page.evaluate(() => globalThis.spectra.store.behindSince), null);
+      link.rate = Infinity;
+      await settled(page);
+      assert.equal(await sign.count(), 0);
+    }
+    assert.deepEqual(problems, []);
+    await page.close();
+    await link.stop();
+  });
+
   test('Another view that is chosen while the first picture loads is said to be still to come, also when the link is cut then', async () => {
     const server = await demoServer();
     await ready(server);

@@ -11,7 +11,6 @@ import {
   type StreamComplete,
   streamComplete,
   streamStats,
-  type Vec3,
 } from '../protocol/messages';
 import type { Insets, UpAxis, View } from '../view/first_view';
 import { FrameIntake } from '../tiles/frame_intake';
@@ -487,7 +486,8 @@ export class Session {
   #sayError(): void {
     const { store, viewport } = this;
     const isVisible = viewport.visibility();
-    this.#words.pictureIs(viewport.nextPicture, { error: this.tiles.drawnError(isVisible), methods: this.#methods(isVisible) });
+    const generations = [...this.tiles.drawnGenerations(isVisible)];
+    this.#words.pictureIs(viewport.nextPicture, { error: this.tiles.drawnError(isVisible), methods: this.#methods(generations) });
     const { error, methods } = this.#words.afterPicture(viewport.pictures);
     if (String(Object.values(error ?? {})) !== String(Object.values(store.drawnError ?? {}))) {
       store.drawnError = error;
@@ -495,12 +495,14 @@ export class Session {
       this.#markers.update();
     }
     if (String(methods) !== String(store.shownMethods)) store.shownMethods = methods;
+    const newest = Math.max(...generations.filter((generation) => generation !== null));
+    store.isOfOldSettings = newest >= 0 && newest < this.settings.answeredGeneration;
   }
 
   /** Which methods the picture shows; a tile of which that is not known shows what all of it showed when it was last complete. */
-  #methods(isVisible: (centre: Vec3, radius: number) => boolean): string[] {
+  #methods(generations: readonly (number | null)[]): string[] {
     const { pictureMethod } = this.store;
-    const methods = [...this.tiles.drawnGenerations(isVisible)].map(
+    const methods = generations.map(
       (generation) => (generation === null ? null : this.settings.methodOf(generation)) ?? pictureMethod,
     );
     if (this.fusing.isHere) methods.push(pictureMethod);

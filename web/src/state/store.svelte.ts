@@ -147,6 +147,8 @@ export class Store {
   pictureMethod = $state<string | null>(null);
   /** Methods that parts of the picture show now. */
   shownMethods = $state.raw<readonly string[]>([]);
+  /** Nothing that is drawn has the settings that the server has answered last. */
+  isOfOldSettings = $state(false);
   /** What the last finished change cost: bytes received and time until all of it was on the screen. */
   lastUpdate = $state.raw<{ bytes: number; ms: number } | null>(null);
   /** How what is on the screen may differ from the full mesh; null = there is nothing. */
@@ -246,6 +248,14 @@ export class Store {
   readonly methodIsPending = $derived(
     this.otherMethods.length > 0 &&
       ((!this.connected && this.hereSince === null) || (this.lateSince !== null && this.now - this.lateSince > PENDING_AFTER_MS)),
+  );
+  /** The picture shows the method that is named, but for longer than a moment nothing of what else has been set: its colours are not the palette's, say. */
+  readonly settingsArePending = $derived(
+    this.connected &&
+      !this.methodIsPending &&
+      (this.isOfOldSettings || this.wanted !== null) &&
+      this.behindSince !== null &&
+      this.now - this.behindSince > PENDING_AFTER_MS,
   );
   /** For how long nothing has been heard of a server that says something every second; null where that is no longer than usual, as without a scene. */
   readonly silentFor_s = $derived(

@@ -3,12 +3,12 @@ import { celsius, duration } from './format';
 
 /** What is in the picture, and of when: a picture that is sent on must not be taken for what it is not. */
 function captions({ store }: Session): string[] {
-  const { connected, lostFor_s, methodIsPending, otherMethods, methods, method, scene } = store;
+  const { connected, lostFor_s, methodIsPending, settingsArePending, otherMethods, methods, method, scene } = store;
   const shown = otherMethods.map((id) => methods.find((one) => one.id === id)?.label ?? id);
   const seen = new Date(Date.now() - (connected ? 0 : lostFor_s * 1000)).toISOString().replace('T', ' ').slice(0, 19);
   return [
     scene?.name ?? '',
-    `${method?.label ?? ''}${methodIsPending ? `, in parts still ${shown.join(' and ')}` : ''}`,
+    `${method?.label ?? ''}${methodIsPending ? `, in parts still ${shown.join(' and ')}` : settingsArePending ? ', settings of before' : ''}`,
     `${seen} UTC`,
     ...(connected ? [] : [`Link lost: ${duration(lostFor_s)} old when saved`]),
     ...(store.hatchAbove_kelvin === null ? [] : [`Hatched: less sure than ${store.hatchAbove_kelvin} °C`]),
