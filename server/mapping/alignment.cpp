@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "server/mapping/depth_fusion.hpp"
 #include "server/mapping/map_sampler.hpp"
@@ -94,23 +95,25 @@ struct Work {
   std::size_t count;
   AlignmentTerms terms;
   bool has_normal;  ///< Else only counted.
+  /// Of each point, of the round before: most points are in the same one in the next.
+  std::vector<SampledCell>& cells;
 
   Sums sums(const Eigen::Isometry3d& pose, const Common& common, jobs::WorkerPool& pool) const {
     std::vector<Sums> parts((count + kChunk - 1) / kChunk);
     pool.for_each(parts.size(), [&](std::size_t part) {
       MapSampler sampler(map);
       const std::size_t end = std::min(count, (part + 1) * kChunk);
-      for (std::size_t i = part * kChunk; i < end; ++i) add(sampler, pose, common, seen.points[i], parts[part]);
+      for (std::size_t i = part * kChunk; i < end; ++i) add(sampler, pose, common, i, parts[part]);
     });
     Sums all;
     for (const Sums& part : parts) all.add(part);
     return all;
   }
 
-  void add(MapSampler& sampler, const Eigen::Isometry3d& pose, const Common& common, const SeenPoint& point,
-           Sums& sums) const {
+  void add(MapSampler& sampler, const Eigen::Isometry3d& pose, const Common& common, std::size_t i, Sums& sums) const {
+    const SeenPoint& point = seen.points[i];
     const Eigen::Vector3d arm = pose.linear() * point.place.cast<double>();
-    if (!sampler.seek(pose.translation() + arm)) return;
+    sampler.seek(pose.translation() + arm, cells[i]);
     const auto truncation = static_cast<float>(kTruncationVoxels * map.voxel_m());
     const auto voxel = static_cast<float>(map.voxel_m());
     Sampled field;
@@ -161,6 +164,14 @@ struct Work {
   }
 };
 
+/// Cells that know nothing, in memory that is used again: until the next call of this thread.
+std::vector<SampledCell>& fresh_cells(std::size_t count) {
+  thread_local std::vector<SampledCell> cells;
+  cells.clear();
+  cells.resize(count);
+  return cells;
+}
+
 void count_into(const Sums& sums, std::size_t count, Alignment& found) {
   found.point_count = count;
   found.known_count = sums.known;
@@ -199,42 +210,65 @@ struct SeenPlane {
   Eigen::Vector3f place, normal;
 };
 
-/// False where one of the pixels about it does not count, or where there is no plane.
-bool plane_at(const DepthFrame& frame, const RayTable& rays, const Lens& lens, const Eigen::Vector3f& seen_at,
-              SeenPlane& plane) {
-  if (seen_at.z() < 0.1F) return false;
-  float u = 0, v = 0;
-  lens.project(seen_at.x() / seen_at.z(), seen_at.y() / seen_at.z(), u, v);
-  constexpr auto kMargin = static_cast<float>(kPlaneReach);
-  if (!(u >= kMargin && v >= kMargin && u < static_cast<float>(frame.width) - kMargin - 1 &&
-        v < static_cast<float>(frame.height) - kMargin - 1))
-    return false;
-  const int x = static_cast<int>(u + 0.5F), y = static_cast<int>(v + 0.5F);
-  const auto place_at = [&](int dx, int dy, Eigen::Vector3f& place) {
-    const auto pixel = static_cast<std::size_t>((y + dy) * frame.width + x + dx);
-    const float z = frame.depth_m[pixel];
-    place = {rays.x[pixel] * z, rays.y[pixel] * z, z};
-    return frame.weight[pixel] > 0;
-  };
-  Eigen::Vector3f left, right, above, below;
-  if (!place_at(0, 0, plane.place) || !place_at(-kPlaneReach, 0, left) || !place_at(kPlaneReach, 0, right) ||
-      !place_at(0, -kPlaneReach, above) || !place_at(0, kPlaneReach, below))
-    return false;
-  const float most = kPlaneBend * plane.place.z();
-  if (std::abs(right.z() - left.z()) > most || std::abs(below.z() - above.z()) > most) return false;
-  plane.normal = (right - left).cross(below - above).normalized();
-  return true;
-}
+/// A plane that was looked for at a pixel.
+struct PlaneAtPixel {
+  std::size_t pixel = std::numeric_limits<std::size_t>::max();
+  bool is_plane = false;
+  SeenPlane plane;
+};
+
+/// Pixels of a depth picture that count, metres; 0: it does not.
+struct CountedDepth {
+  const std::vector<float>& depth_m;
+  const RayTable& rays;
+  Lens lens;
+
+  /// The plane where a camera sees a place; `last`: one that was found before. Null where one of the pixels about it does not count, or where
+  /// there is no plane.
+  const SeenPlane* plane_at(const Eigen::Vector3f& seen_at, PlaneAtPixel& last) const {
+    if (seen_at.z() < 0.1F) return nullptr;
+    float u = 0, v = 0;
+    lens.project(seen_at.x() / seen_at.z(), seen_at.y() / seen_at.z(), u, v);
+    constexpr auto kMargin = static_cast<float>(kPlaneReach);
+    if (!(u >= kMargin && v >= kMargin && u < static_cast<float>(rays.width) - kMargin - 1 &&
+          v < static_cast<float>(rays.height) - kMargin - 1))
+      return nullptr;
+    const auto x = static_cast<std::size_t>(u + 0.5F), y = static_cast<std::size_t>(v + 0.5F);
+    const std::size_t pixel = y * static_cast<std::size_t>(rays.width) + x;
+    if (pixel != last.pixel) {
+      last.pixel = pixel;
+      last.is_plane = find_plane(pixel, last.plane);
+    }
+    return last.is_plane ? &last.plane : nullptr;
+  }
+
+  bool find_plane(std::size_t pixel, SeenPlane& plane) const {
+    const auto place_at = [&](std::size_t at, Eigen::Vector3f& place) {
+      const float z = depth_m[at];
+      place = {rays.x[at] * z, rays.y[at] * z, z};
+      return z > 0;
+    };
+    constexpr auto kReach = static_cast<std::size_t>(kPlaneReach);
+    const std::size_t down = kReach * static_cast<std::size_t>(rays.width);
+    Eigen::Vector3f left, right, above, below;
+    if (!place_at(pixel, plane.place) || !place_at(pixel - kReach, left) || !place_at(pixel + kReach, right) ||
+        !place_at(pixel - down, above) || !place_at(pixel + down, below))
+      return false;
+    const float most = kPlaneBend * plane.place.z();
+    if (std::abs(right.z() - left.z()) > most || std::abs(below.z() - above.z()) > most) return false;
+    plane.normal = (right - left).cross(below - above).normalized();
+    return true;
+  }
+};
 
 /// What planes of an earlier picture say of the motion since.
 struct MotionWork {
-  const DepthFrame& before;
-  const RayTable& rays;
-  const Lens& lens;
+  CountedDepth before;
   std::vector<SeenPlane> planes;  ///< Of the later picture.
   std::vector<float> sigma_m;
+  std::vector<PlaneAtPixel> pairs;  ///< Of the earlier one, of the round before: most are the same in the next.
 
-  Sums sums(const Eigen::Isometry3d& pose, float farthest, jobs::WorkerPool& pool) const {
+  Sums sums(const Eigen::Isometry3d& pose, float farthest, jobs::WorkerPool& pool) {
     std::vector<Sums> parts((planes.size() + kChunk - 1) / kChunk);
     pool.for_each(parts.size(), [&](std::size_t part) {
       const std::size_t end = std::min(planes.size(), (part + 1) * kChunk);
@@ -245,32 +279,40 @@ struct MotionWork {
     return all;
   }
 
-  void add(const Eigen::Isometry3f& pose, float farthest, std::size_t i, Sums& sums) const {
+  void add(const Eigen::Isometry3f& pose, float farthest, std::size_t i, Sums& sums) {
     const Eigen::Vector3f arm = pose.linear() * planes[i].place, place = arm + pose.translation();
-    SeenPlane plane;
-    if (!plane_at(before, rays, lens, place, plane)) return;
-    const Eigen::Vector3f apart = place - plane.place;
-    if (!(apart.norm() < farthest && plane.normal.dot(pose.linear() * planes[i].normal) > kLeastAlike)) return;
+    const SeenPlane* plane = before.plane_at(place, pairs[i]);
+    if (plane == nullptr) return;
+    const Eigen::Vector3f apart = place - plane->place;
+    if (!(apart.norm() < farthest && plane->normal.dot(pose.linear() * planes[i].normal) > kLeastAlike)) return;
     ++sums.known;
     // What is far from its plane is so by the motion first, and by chance or another surface in the end.
-    const float off = plane.normal.dot(apart), slack = (farthest - kFarthestLast) / 3;
-    sums.add_row(arm, plane.normal, off, huber(off / (sigma_m[i] + slack)) / (sigma_m[i] * sigma_m[i]));
+    const float off = plane->normal.dot(apart), slack = (farthest - kFarthestLast) / 3;
+    sums.add_row(arm, plane->normal, off, huber(off / (sigma_m[i] + slack)) / (sigma_m[i] * sigma_m[i]));
   }
 };
 
 }  // namespace
 
-Eigen::Isometry3d motion_between(const DepthFrame& before, const DepthFrame& now, const RayTable& rays,
-                                 const CameraModel& camera, const SeenPoints& seen, const Eigen::Isometry3d& guess,
-                                 jobs::WorkerPool& pool) {
+std::vector<float> counted_depth(const DepthFrame& frame, std::vector<float> depth_m) {
+  depth_m.resize(frame.depth_m.size());
+  for (std::size_t i = 0; i < depth_m.size(); ++i) depth_m[i] = frame.weight[i] > 0 ? frame.depth_m[i] : 0;
+  return depth_m;
+}
+
+Eigen::Isometry3d motion_between(const std::vector<float>& before_m, const std::vector<float>& now_m,
+                                 const RayTable& rays, const CameraModel& camera, const SeenPoints& seen,
+                                 const Eigen::Isometry3d& guess, jobs::WorkerPool& pool) {
   const Lens lens(camera);
-  MotionWork work{before, rays, lens, {}, {}};
+  MotionWork work{{before_m, rays, lens}, {}, {}, {}};
+  const CountedDepth now{now_m, rays, lens};
   for (std::size_t i = 0; i < seen.coarse_count; ++i) {
-    SeenPlane plane;
-    if (!plane_at(now, rays, lens, seen.points[i].place, plane)) continue;
-    work.planes.push_back(plane);
+    PlaneAtPixel own;
+    if (now.plane_at(seen.points[i].place, own) == nullptr) continue;
+    work.planes.push_back(own.plane);
     work.sigma_m.push_back(seen.points[i].sigma_m);
   }
+  work.pairs.resize(work.planes.size());
   const Matrix6 expected = expectation().asDiagonal();
   Eigen::Isometry3d motion = guess;
   for (int round = 0; round < kMotionRounds; ++round) {
@@ -289,7 +331,9 @@ Alignment fit_at(const VoxelMap& map, const SeenPoints& seen, std::size_t count,
                  const Eigen::Isometry3d& world_from_camera, jobs::WorkerPool& pool) {
   Alignment found;
   found.world_from_camera = world_from_camera;
-  const Work work{map, seen, std::min(count, seen.points.size()), {}, false};
+  count = std::min(count, seen.points.size());
+  std::vector<SampledCell>& cells = fresh_cells(count);
+  const Work work{map, seen, count, {}, false, cells};
   count_into(work.sums(world_from_camera, {}, pool), work.count, found);
   return found;
 }
@@ -301,9 +345,10 @@ Alignment align(const VoxelMap& map, const SeenPoints& seen, const Eigen::Isomet
   const Vector6 expected = expectation();
   Common common;
   Sums last;
+  std::vector<SampledCell>& cells = fresh_cells(seen.points.size());
   for (const bool is_coarse : {true, false}) {
     const std::size_t count = is_coarse ? seen.coarse_count : seen.points.size();
-    const Work work{map, seen, count, terms, true};
+    const Work work{map, seen, count, terms, true, cells};
     for (int round = 0; round < (is_coarse ? kCoarseRounds : kFineRounds); ++round) {
       last = work.sums(found.world_from_camera, common, pool);
       ++found.rounds;

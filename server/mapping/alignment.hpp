@@ -56,12 +56,15 @@ Alignment fit_at(const VoxelMap& map, const SeenPoints& seen, std::size_t count,
 Alignment align(const VoxelMap& map, const SeenPoints& seen, const Eigen::Isometry3d& guess,
                 const AlignmentTerms& terms, jobs::WorkerPool& pool);
 
-/// How a depth camera moved between two of its pictures (before_from_now), near `guess`: what the first `coarse_count` points see of planes lies on the
-/// planes of the earlier picture into whose pixels they fall, of those within some decimetres that face alike (Rusinkiewicz and Levoy, 3DIM 2001). It
-/// reaches farther than align(), whose map knows nothing beyond its truncation, and is less exact. The guess where too little falls on anything. The
-/// same for any number of threads.
-Eigen::Isometry3d motion_between(const DepthFrame& before, const DepthFrame& now, const RayTable& rays,
-                                 const CameraModel& camera, const SeenPoints& seen, const Eigen::Isometry3d& guess,
-                                 jobs::WorkerPool& pool);
+/// The depth of the pixels that count, metres; 0: it does not. `depth_m`: memory to use again.
+std::vector<float> counted_depth(const DepthFrame& frame, std::vector<float> depth_m = {});
+
+/// How a depth camera moved between two of its pictures (before_from_now), of each of which counted_depth() is given, near `guess`: what the first
+/// `coarse_count` points see of planes lies on the planes of the earlier picture into whose pixels they fall, of those within some decimetres that face
+/// alike (Rusinkiewicz and Levoy, 3DIM 2001). It reaches farther than align(), whose map knows nothing beyond its truncation, and is less exact. The
+/// guess where too little falls on anything. The same for any number of threads.
+Eigen::Isometry3d motion_between(const std::vector<float>& before_m, const std::vector<float>& now_m,
+                                 const RayTable& rays, const CameraModel& camera, const SeenPoints& seen,
+                                 const Eigen::Isometry3d& guess, jobs::WorkerPool& pool);
 
 }  // namespace spectra::mapping

@@ -30,16 +30,17 @@ Eigen::Isometry3d part_of(const Eigen::Isometry3d& motion, double share) {
 void Tracker::begin(double time_s, const DepthFrame& depth, const Eigen::Isometry3d& pose) {
   keys_.clear();
   has_speed_ = is_lost_ = false;
-  keep(time_s, depth, pose);
+  seen_now_m_ = counted_depth(depth, std::move(seen_now_m_));
+  keep(time_s, pose);
   has_speed_ = false;
 }
 
-void Tracker::keep(double time_s, const DepthFrame& depth, const Eigen::Isometry3d& pose) {
+void Tracker::keep(double time_s, const Eigen::Isometry3d& pose) {
   has_speed_ = time_s - time_s_ < kLongestSpeedSeconds && time_s > time_s_;
   before_ = pose_;
   before_s_ = time_s_;
   pose_ = pose;
-  seen_before_ = depth;
+  std::swap(seen_before_m_, seen_now_m_);
   time_s_ = time_s;
   const bool is_new = std::none_of(keys_.begin(), keys_.end(), [&](const Eigen::Isometry3d& key) {
     return (key.translation() - pose.translation()).norm() < kKeyMetres && turn_between(key, pose) < kKeyRadians;
@@ -104,10 +105,11 @@ std::optional<Eigen::Isometry3d> Tracker::find(const VoxelMap& map, const Tracke
   last_ = {};
   if (seen.points.size() >= rules_.least_points) {
     const double matching = is_lost_ ? rules_.again_matching : rules_.least_matching;
+    seen_now_m_ = counted_depth(*moment.depth, std::move(seen_now_m_));
     if (!is_lost_) {
       Eigen::Isometry3d guess = expected(moment.time_s);
       const Eigen::Isometry3d moved =
-          pose_ * motion_between(seen_before_, *moment.depth, rays_, calibration_.depth.camera, seen,
+          pose_ * motion_between(seen_before_m_, seen_now_m_, rays_, calibration_.depth.camera, seen,
                                  pose_.inverse() * guess, pool);
       const auto matching_at = [&](const Eigen::Isometry3d& pose) {
         return fit_at(map, seen, seen.coarse_count, pose, pool).matching_count;
@@ -124,7 +126,7 @@ std::optional<Eigen::Isometry3d> Tracker::find(const VoxelMap& map, const Tracke
     }
     if (is_good(last_, matching)) {
       again_ = is_lost_ ? again_ + 1 : 0;
-      keep(moment.time_s, *moment.depth, last_.world_from_camera);
+      keep(moment.time_s, last_.world_from_camera);
       if (!is_lost_ || again_ >= rules_.again_count) {
         is_lost_ = false;
         return last_.world_from_camera;

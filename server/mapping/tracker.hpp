@@ -60,12 +60,14 @@ class Tracker {
   bool is_good(const Alignment& found, double matching) const;
   std::vector<Eigen::Isometry3d> guesses(const VoxelMap& map, const SeenPoints& seen, double time_s,
                                          jobs::WorkerPool& pool) const;
-  void keep(double time_s, const DepthFrame& depth, const Eigen::Isometry3d& pose);
+  /// Of the moment whose depth is seen_now_m_.
+  void keep(double time_s, const Eigen::Isometry3d& pose);
 
   const Calibration& calibration_;
   const RayTable& rays_;
   const TrackerRules rules_;
-  DepthFrame seen_before_;               ///< The depth picture whose pose is pose_.
+  /// counted_depth() of the picture whose pose is pose_, and of the newest.
+  std::vector<float> seen_before_m_, seen_now_m_;
   std::vector<Eigen::Isometry3d> keys_;  ///< Poses that were found, some way apart, to come back to.
   Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity(), before_ = Eigen::Isometry3d::Identity();
   double time_s_ = 0, before_s_ = 0;
