@@ -300,15 +300,25 @@ MapVersion LivingMap::version(std::uint32_t revision) {
   fusion::TemperatureAccumulator accumulator;
   for (const auto& leaf : version.leaves) accumulator.merge(leaf->facts->temperature);
   version.summary = accumulator.summary();
-  if (!percentiles_ || percentiles_->minimum != version.summary.minimum ||
-      percentiles_->maximum != version.summary.maximum) {
-    percentiles_ = fusion::Histogram{version.summary.minimum, version.summary.maximum,
-                                     std::vector<std::uint64_t>(fusion::kPercentileBins)};
-    for (const auto& leaf : version.leaves) fusion::add_to_histogram(owned_temperature(*leaf->tile), *percentiles_);
+  if (percentiles_ && (percentiles_->minimum != version.summary.minimum ||
+                       percentiles_->maximum != version.summary.maximum)) {
+    percentiles_.reset();
   }
-  version.percentiles = *percentiles_;
-  if (is_reference_good(version)) version.reference = reference_;
+  if (is_reference_good(version)) {
+    version.reference = reference_;
+  } else {
+    // It becomes the reference, and a greeting must not wait for its percentiles.
+    count_percentiles(version);
+  }
+  version.percentiles = percentiles_;
   return version;
+}
+
+void LivingMap::count_percentiles(const MapVersion& version) {
+  if (percentiles_) return;
+  percentiles_ = fusion::Histogram{version.summary.minimum, version.summary.maximum,
+                                   std::vector<std::uint64_t>(fusion::kPercentileBins)};
+  for (const auto& leaf : version.leaves) fusion::add_to_histogram(owned_temperature(*leaf->tile), *percentiles_);
 }
 
 bool LivingMap::is_reference_good(const MapVersion& version) {
@@ -317,7 +327,8 @@ bool LivingMap::is_reference_good(const MapVersion& version) {
   if (static_cast<double>(changed_vertex_count_) >= vertex_count) return false;
   if (static_cast<double>(looked_at_vertex_count_) < kReferenceLook * vertex_count) return true;
   looked_at_vertex_count_ = 0;
-  return !have_quantiles_moved(reference_->histogram(fusion::kPercentileBins), version.percentiles);
+  count_percentiles(version);
+  return !have_quantiles_moved(reference_->histogram(fusion::kPercentileBins), *percentiles_);
 }
 
 std::vector<files::Note> LivingMap::notes() const {
@@ -480,7 +491,7 @@ MapGrid LivingMap::grid_for(const LostForm& lost, std::span<const std::shared_pt
 
 void LivingMap::take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress) {
   if (percentiles_) {
-    // Good as long as the extremes stay; apply() looks at that.
+    // Good as long as the extremes stay; version() looks at that.
     fusion::Histogram gone = *percentiles_;
     std::fill(gone.counts.begin(), gone.counts.end(), 0);
     for (const auto& leaf : changed.dropped_leaves) {

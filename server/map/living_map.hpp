@@ -123,6 +123,7 @@ class LivingMap {
  private:
   std::shared_ptr<const SceneSnapshot> snapshot(std::uint32_t revision);
   MapVersion version(std::uint32_t revision);
+  void count_percentiles(const MapVersion& version);
   /// Automatic values found with the reference are still what this version would ask for, nearly.
   bool is_reference_good(const MapVersion& version);
   std::vector<files::Note> notes() const;
@@ -154,7 +155,7 @@ class LivingMap {
   CoarseLevels coarse_;
 
   // Of the last version.
-  std::optional<fusion::Histogram> percentiles_;
+  std::optional<fusion::Histogram> percentiles_;  ///< Kept while the extremes stay; else counted when they are needed.
   std::shared_ptr<const fusion::SceneTemperature> reference_;
   std::uint64_t changed_vertex_count_ = 0;    ///< Since the reference was taken.
   std::uint64_t looked_at_vertex_count_ = 0;  ///< Changed since its quantiles were looked at.

@@ -22,12 +22,11 @@ using base::Vec3f;
 
 using Leaves = std::vector<std::shared_ptr<const MapNode>>;
 
-/// What is computed of all vertices of a scene: the histogram of percentiles at once, because a greeting must not wait for
-/// it; when first asked for histograms by number of bins, of which the last few are kept, because a slider may visit
-/// thousands, and the hues.
+/// What is computed of all vertices of a scene when first asked for: histograms by number of bins, of which the last few are
+/// kept, because a slider may visit thousands, and the hues. The histogram of percentiles may be there already.
 class FactSource {
  public:
-  FactSource(Leaves leaves, const fusion::TemperatureSummary& summary, fusion::Histogram percentiles)
+  FactSource(Leaves leaves, const fusion::TemperatureSummary& summary, std::optional<fusion::Histogram> percentiles)
       : leaves_(std::move(leaves)), summary_(summary), percentiles_(std::move(percentiles)) {}
 
   fusion::Hues hues() {
@@ -42,7 +41,7 @@ class FactSource {
   }
 
   fusion::Histogram histogram(std::uint32_t bins) {
-    if (bins == fusion::kPercentileBins) return percentiles_;
+    if (percentiles_ && bins == percentiles_->counts.size()) return *percentiles_;
     const std::lock_guard lock(mutex_);
     const auto found = std::find_if(recent_.begin(), recent_.end(),
                                     [&](const fusion::Histogram& h) { return h.counts.size() == bins; });
@@ -66,7 +65,7 @@ class FactSource {
 
   const Leaves leaves_;
   const fusion::TemperatureSummary summary_;
-  const fusion::Histogram percentiles_;
+  const std::optional<fusion::Histogram> percentiles_;
   std::mutex mutex_;
   std::list<fusion::Histogram> recent_;
   std::optional<fusion::Hues> hues_;

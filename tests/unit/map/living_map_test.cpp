@@ -368,6 +368,34 @@ TEST_F(LivingMapTest, AutomaticValuesFollowWhenTheyHaveMovedFarEnough) {
   EXPECT_NE(last->reference_temperature(), before->reference_temperature());
 }
 
+TEST_F(LivingMapTest, HistogramsAreThoseOfTheVersionWhateverItsExtremes) {
+  const auto counted = [](const SceneSnapshot& scene) {
+    const fusion::TemperatureSummary& summary = scene.temperature().summary;
+    fusion::Histogram all{summary.minimum, summary.maximum, std::vector<std::uint64_t>(fusion::kPercentileBins)};
+    for (const auto& tile : scene.tiles()) {
+      if (tile->child_mask == 0) {
+        fusion::add_to_histogram(std::span(tile->temperature_celsius).first(tile->owned_count), all);
+      }
+    }
+    return all;
+  };
+  const auto expect_counted = [&](const SceneSnapshot& scene) {
+    const fusion::Histogram told = scene.temperature().histogram(fusion::kPercentileBins), all = counted(scene);
+    EXPECT_EQ(told.minimum, all.minimum);
+    EXPECT_EQ(told.maximum, all.maximum);
+    EXPECT_EQ(told.counts, all.counts);
+  };
+  const auto block = [](std::uint32_t i, float warmer) {
+    return put("b" + std::to_string(i), terrain(i, 39.0F * static_cast<float>(i), warmer));
+  };
+  std::vector<BlockPut> blocks;
+  for (std::uint32_t i = 0; i < 10; ++i) blocks.push_back(block(i, 0));
+  expect_counted(*apply(std::move(blocks)));
+  // Extremes that move so little that automatic values stay, and come back; then what leaves them; then what moves all.
+  for (const float warmer : {0.01F, 0.02F, 0.01F, 0.0F, 20.0F, 0.0F}) expect_counted(*apply(block(9, warmer)));
+  for (std::uint32_t i = 0; i < 9; ++i) expect_counted(*apply(block(i, 0.001F)));
+}
+
 TEST_F(LivingMapTest, RefusesWhatCannotBeOneMap) {
   apply(put("mesh", terrain(1, 0)));
   const auto code = [&](const BlockShape& shape, const std::vector<std::string>& removed = {}) {
