@@ -60,6 +60,39 @@ describe('the progress of a picture', () => {
     expect(store.behindSince).toBeNull();
   });
 
+  it('of a map that grows all the time is behind of what has come since alone', () => {
+    const { store, clock, progress } = setUp();
+    const grows = (revision: number, at: number) => {
+      clock.now = at;
+      store.scene = { revision } as Scene;
+      progress.begin();
+    };
+    const shows = (scene_revision: number, picture: number) => {
+      progress.completed({ generation: 0, scene_revision } as StreamComplete, picture);
+      progress.drawn(picture);
+    };
+    grows(1, 1000);
+    grows(2, 1500);
+    progress.received(400);
+    grows(3, 1900);
+    expect(store.behindSince).toBe(1000);
+    clock.now = 2000;
+    shows(2, 1);
+    expect([store.behindSince, store.pictureMethod, store.lastUpdate]).toEqual([1900, 'blend', null]);
+    // Settings are no other scene.
+    clock.now = 2100;
+    progress.begin(true);
+    grows(4, 2200);
+    shows(3, 2);
+    expect(store.behindSince).toBe(2200);
+    progress.received(70);
+    clock.now = 2500;
+    shows(4, 3);
+    expect([store.behindSince, store.lastUpdate]).toEqual([null, { bytes: 70, ms: 300 }]);
+    grows(5, 3000);
+    expect(store.behindSince).toBe(3000);
+  });
+
   it('is not at its end while the scene is another one than that of the picture', () => {
     const { store, progress } = setUp();
     store.link = { phase: 'open' };

@@ -13,7 +13,8 @@ interface Tiles {
 
 /** How far the picture is behind what was asked for, what it cost, and what the link brings meanwhile; in the store. */
 export class Progress {
-  #bytesBefore = 0;
+  /** What the picture is behind of, the oldest first: from when on, of which revision of the scene, and how many bytes had come by then. */
+  #missing: { at: number; revision: number; bytes: number }[] = [];
   #window: { at: number; bytes: number }[] = [];
   /** Settings that are shown here and are in no picture yet, by the number of the picture that they will be in. */
   #here: { picture: number; method: string; at: number }[] = [];
@@ -36,9 +37,10 @@ export class Progress {
     if (this.store.scene === null) return this.#notBehind();
     const isBehind = this.store.behindSince !== null;
     this.#mayBeRefused = mayBeRefused && (!isBehind || this.#mayBeRefused);
-    if (isBehind) return;
-    this.store.behindSince = this.now();
-    this.#bytesBefore = this.store.received_bytes;
+    const { revision } = this.store.scene ?? { revision: 0 };
+    if ((this.#missing.at(-1)?.revision ?? -1) >= revision) return;
+    this.#missing.push({ at: this.now(), revision, bytes: this.store.received_bytes });
+    this.store.behindSince = this.#missing[0]!.at;
   }
 
   received(bytes: number): void {
@@ -55,8 +57,12 @@ export class Progress {
     const { store } = this;
     store.complete = message;
     store.pictureRevision = message.scene_revision;
-    if (message.generation < store.generation || store.isOfOldScene || this.isBusy()) return;
-    this.#caughtUp();
+    if (message.generation < store.generation || this.isBusy()) return;
+    if (!store.isOfOldScene) return this.#caughtUp();
+    // Of a map that grows all the time: it is behind of what has come since alone.
+    this.#missing = this.#missing.filter(({ revision }) => revision > message.scene_revision);
+    store.behindSince = this.#missing[0]?.at ?? null;
+    this.#methodIsShown();
   }
 
   /** A method is shown by what is here, in the picture of this number. */
@@ -107,15 +113,20 @@ export class Progress {
 
   #caughtUp(): void {
     const { store } = this;
-    if (store.behindSince !== null) {
-      store.lastUpdate = { bytes: store.received_bytes - this.#bytesBefore, ms: this.now() - store.behindSince };
-    }
+    const oldest = this.#missing[0];
+    if (oldest !== undefined) store.lastUpdate = { bytes: store.received_bytes - oldest.bytes, ms: this.now() - oldest.at };
     this.#notBehind();
     store.progress = 1;
+    this.#methodIsShown();
+  }
+
+  #methodIsShown(): void {
+    const { store } = this;
     if (store.hereSince === null && store.factsSince === null) store.pictureMethod = store.fusionInForce?.method ?? null;
   }
 
   #notBehind(): void {
+    this.#missing = [];
     this.store.behindSince = null;
     this.#mayBeRefused = false;
   }

@@ -24,7 +24,7 @@ const grid = (size: number): Vec3[] =>
 
 function setUp(choices = new UpChoices(null)) {
   const tiles: GeometrySummary[] = [];
-  const seen = { view: null as View | null, views: 0, up: null as UpAxis | null, reach: [0, 0] as [number, number], aspect: 1.5 };
+  const seen = { view: null as View | null, views: 0, isTravel: false, movesInFull: true, up: null as UpAxis | null, reach: [0, 0] as [number, number], aspect: 1.5 };
   const look = new FirstLook(
     {
       get pose() {
@@ -34,9 +34,13 @@ function setUp(choices = new UpChoices(null)) {
       get aspect() {
         return seen.aspect;
       },
+      get movesInFull() {
+        return seen.movesInFull;
+      },
       setUpAxis: () => undefined,
-      setView: (view) => {
+      setView: (view, isTravel) => {
         seen.view = view;
+        seen.isTravel = isTravel;
         seen.views += 1;
       },
       setReach: (nearest, farthest) => {
@@ -198,6 +202,24 @@ describe('FirstLook', () => {
     // Back to the first view is to all that there is by now.
     look.reset();
     expect(distance()).toBeGreaterThan(50 * first);
+  });
+
+  it('follows a live map at once where moving would cost detail', () => {
+    const { look, tiles, seen } = setUp();
+    const grow = (size: number) => {
+      tiles[0] = tile(grid(size));
+      look.sceneIs(scene({ live: true, bounds: { min: [0, 0, 0], max: [size, size, 0] } }));
+      look.pictureChanged();
+    };
+    grow(2);
+    grow(3);
+    expect(seen.isTravel).toBe(true);
+    seen.movesInFull = false;
+    grow(4);
+    expect(seen.isTravel).toBe(false);
+    // Who asks for it sees the way.
+    look.reset();
+    expect(seen.isTravel).toBe(true);
   });
 
   it('follows what finer tiles show where the coarsest is that of before', () => {

@@ -18,6 +18,8 @@ import type { UpChoices } from './up_choices';
 export interface Looking {
   readonly pose: CameraPose;
   readonly aspect: number;
+  /** Pictures lose nothing while the camera moves. */
+  readonly movesInFull: boolean;
   setUpAxis(up: UpAxis): void;
   setView(view: View, animated: boolean): void;
   setReach(nearest: number, farthest: number): void;
@@ -130,7 +132,8 @@ export class FirstLook {
     const step = FOLLOWED_SHARE * between(next.eye, next.target);
     if (between(before.eye, next.eye) <= step && between(before.target, next.target) <= step) return;
     this.#decided = { points, facing };
-    this.#look(true);
+    // Where moving costs detail, the picture would be coarse again and again for as long as the map grows.
+    this.#look(this.viewport.movesInFull);
   }
 
   #pointsOf(geometries: GeometrySummary[]): Vec3[] {

@@ -127,6 +127,11 @@ export class Viewport {
     return this.#drawn > 0 && this.#frame === 0 && !this.#isMoving && !this.#isHeldUp && this.#drawn === this.#sent;
   }
 
+  get movesInFull(): boolean {
+    const { resolution, levels } = this.#pace.moving;
+    return resolution === 1 && levels === 0;
+  }
+
   /** How pictures are drawn while the camera moves; null at rest. */
   get notch(): Notch | null {
     return this.#isMoving ? this.#pace.moving : null;
