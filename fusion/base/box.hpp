@@ -16,6 +16,12 @@ inline void include(Bounds& bounds, const Vec3f& p) {
   bounds.max = {std::max(bounds.max.x, p.x), std::max(bounds.max.y, p.y), std::max(bounds.max.z, p.z)};
 }
 
+/// Whether two boxes have a point in common; their sides count.
+inline bool overlap(const Bounds& a, const Bounds& b) {
+  return a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.y <= b.max.y && b.min.y <= a.max.y && a.min.z <= b.max.z &&
+         b.min.z <= a.max.z;
+}
+
 /// Smallest box of some positions; of none: min above max.
 Bounds bounds_of(std::span<const Vec3f> positions);
 

@@ -300,8 +300,8 @@ MapVersion LivingMap::version(std::uint32_t revision) {
   fusion::TemperatureAccumulator accumulator;
   for (const auto& leaf : version.leaves) accumulator.merge(leaf->facts->temperature);
   version.summary = accumulator.summary();
-  if (percentiles_ && (percentiles_->minimum != version.summary.minimum ||
-                       percentiles_->maximum != version.summary.maximum)) {
+  if (percentiles_ &&
+      (percentiles_->minimum != version.summary.minimum || percentiles_->maximum != version.summary.maximum)) {
     percentiles_.reset();
   }
   if (is_reference_good(version)) {

@@ -79,7 +79,7 @@ struct MapVersion {
   std::vector<std::shared_ptr<const Tile>> tiles;  ///< Those that are seen, coarse before fine.
   float position_step_m = 0;
   fusion::TemperatureSummary summary;
-  std::optional<fusion::Histogram> percentiles;               ///< Of kPercentileBins bins; absent: counted when asked for.
+  std::optional<fusion::Histogram> percentiles;  ///< Of kPercentileBins bins; absent: counted when asked for.
   std::shared_ptr<const fusion::SceneTemperature> reference;  ///< Null: what is told of this version itself.
 };
 

@@ -42,7 +42,14 @@ void SendingOrder::clear() {
 }
 
 TileSlot* SendingOrder::head(const ViewerTiles& tiles, const Demand& demand) {
-  while (head_ < slots_.size() && tiles.is_satisfied(*slots_[head_], demand)) ++head_;
+  const auto is_due = [&](std::size_t i) {
+    return !tiles.is_satisfied(*slots_[i], demand) && !tiles.is_waiting(*slots_[i], demand);
+  };
+  if (head_ < slots_.size() && is_due(head_)) return slots_[head_].get();
+  while (first_ < slots_.size() && tiles.is_satisfied(*slots_[first_], demand)) ++first_;
+  // What waits may have waited for the last one.
+  head_ = first_;
+  while (head_ < slots_.size() && !is_due(head_)) ++head_;
   return head_ < slots_.size() ? slots_[head_].get() : nullptr;
 }
 

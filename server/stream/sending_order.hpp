@@ -24,19 +24,20 @@ class SendingOrder {
   /// Coarse before fine.
   const std::vector<std::shared_ptr<TileSlot>>& slots() const { return slots_; }
 
-  /// Moves to the first slot that is not as demanded; null when there is none. What was passed is not looked at again
-  /// before rewind().
+  /// Moves to the first slot that is not as demanded and waits for no other; null when there is none. What is as demanded is not
+  /// looked at again before rewind().
   TileSlot* head(const ViewerTiles& tiles, const Demand& demand);
   /// Where head() has come to.
   std::size_t head_index() const { return head_; }
   /// Any slot may have changed.
-  void rewind() { head_ = 0; }
+  void rewind() { head_ = first_ = 0; }
 
  private:
   void choose_previews(const ViewTree& tree, double most_vertices);
 
   std::vector<std::shared_ptr<TileSlot>> slots_;
-  std::size_t head_ = 0;  // Everything before it is satisfied.
+  std::size_t first_ = 0;  ///< Everything before it is satisfied.
+  std::size_t head_ = 0;   ///< Everything before it is satisfied, or waits.
   std::uint64_t choice_count_ = 0;
 };
 

@@ -60,6 +60,7 @@ std::optional<OutgoingFrame> ViewerStream::next_frame(double now_s) {
   const std::lock_guard lock(mutex_);
   wake_pending_ = false;
   if (!may_work()) return std::nullopt;
+  tiles_.remove_succeeded(demand_);
   if (tiles_.has_removals()) return next_removal(now_s);
   if (head() == nullptr) refine();
   while (TileSlot* slot = head()) {

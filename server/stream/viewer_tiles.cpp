@@ -5,6 +5,9 @@
 #include <set>
 #include <utility>
 
+#include "fusion/base/box.hpp"
+#include "server/map/tile_place.hpp"
+
 namespace spectra::stream {
 
 using protocol::TileFrameHeader;
@@ -35,31 +38,42 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
       if (known->second->tile == tile) {
         slot = known->second;
       } else {
-        slot->held.revision = known->second->held.revision;
-        slot->held.wire_revision = known->second->held.wire_revision;
-        slot->held.child_mask = known->second->held.child_mask;
-        slot->held.bytes = known->second->held.bytes;
-        slot->held.earlier_colour_epoch =
-            known->second->is_drawable() ? known->second->held.colour_epoch : known->second->held.earlier_colour_epoch;
-        slot->held.had_raw_layers = known->second->has_raw_layers() || known->second->held.had_raw_layers;
+        succeed(*slot, *known->second);
         abandon(*known->second);
       }
       known_slots.erase(known);
+    } else if (const auto left = leaving_.find(tile->id); left != leaving_.end()) {
+      slot->held = left->second.held;
+      leaving_.erase(left);
     }
     slot->tile = tile;
     slot->node = node;
     slots_.push_back(std::move(slot));
   }
   for (const auto& [id, slot] : known_slots) {
-    remove_from_viewer(*slot);
+    if (slot->held.wire_revision != 0) {
+      TileSlot left;
+      succeed(left, *slot);
+      leaving_.insert_or_assign(id, Leaving{slot->tile->bounds, left.held, std::nullopt});
+    }
     abandon(*slot);
   }
+}
+
+void ViewerTiles::succeed(TileSlot& slot, const TileSlot& before) {
+  slot.held.revision = before.held.revision;
+  slot.held.wire_revision = before.held.wire_revision;
+  slot.held.child_mask = before.held.child_mask;
+  slot.held.bytes = before.held.bytes;
+  slot.held.earlier_colour_epoch = before.is_drawable() ? before.held.colour_epoch : before.held.earlier_colour_epoch;
+  slot.held.had_raw_layers = before.has_raw_layers() || before.held.had_raw_layers;
 }
 
 void ViewerTiles::clear() {
   for (const auto& slot : slots_) slot->is_gone = true;
   slots_.clear();
   removals_.clear();
+  leaving_.clear();
   prepared_bytes_ = 0;
   tree_ = {};
 }
@@ -168,6 +182,39 @@ bool ViewerTiles::are_children_drawable(const TileSlot& slot) const {
                      [this](std::size_t child) { return slots_[child]->is_drawable(); });
 }
 
+bool ViewerTiles::is_there(const TileSlot& slot, const Demand& demand) {
+  if (slot.is_drawable() || slot.held.earlier_colour_epoch != 0 || slot.held.had_raw_layers) return true;
+  if (slot.failed.geometry_epoch == demand.geometry_epoch || slot.failed.colour_epoch == demand.colour_epoch)
+    return true;
+  return !demand.fused && slot.held.geometry_epoch == demand.geometry_epoch && !slot.lacks_raw_layers(demand);
+}
+
+bool ViewerTiles::is_lacking(const TileSlot& slot, const Demand& demand) const {
+  return !is_there(slot, demand) &&
+         !is_made_up_beneath(slot, [&](const TileSlot& tile) { return is_there(tile, demand); });
+}
+
+bool ViewerTiles::is_anything_beneath(const TileSlot& slot) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return std::any_of(children.begin(), children.end(), [&](std::size_t index) {
+    const TileSlot& child = *slots_[index];
+    return child.held.wire_revision != 0 || is_anything_beneath(child);
+  });
+}
+
+bool ViewerTiles::is_waiting(const TileSlot& slot, const Demand& demand) const {
+  if (slot.held.geometry_epoch == demand.geometry_epoch) return false;
+  const auto is_lacking_of = [&](const std::vector<std::size_t>& nodes) {
+    return std::any_of(nodes.begin(), nodes.end(), [&](std::size_t index) {
+      return slots_[index]->wish.is_wanted && is_lacking(*slots_[index], demand);
+    });
+  };
+  const ViewTree::Node& node = tree_.nodes()[slot.node];
+  if (!slot.wish.is_target && is_lacking_of(node.children) && is_anything_beneath(slot)) return true;
+  return slot.held.wire_revision != 0 && node.parent && is_lacking_of(tree_.nodes()[*node.parent].children) &&
+         !is_lacking(slot, demand);
+}
+
 ViewerMemory ViewerTiles::memory() const {
   std::vector<RememberedTile> tiles;
   for (const auto& slot : slots_) {
@@ -270,6 +317,7 @@ void ViewerTiles::keep_colours(std::uint64_t from_epoch, std::uint64_t to_epoch,
 
 void ViewerTiles::forget_all_held() {
   removals_.clear();
+  leaving_.clear();
   for (const auto& slot : slots_) {
     put_down(*slot);
     slot->forget_held();
@@ -295,14 +343,62 @@ void ViewerTiles::remove_from_viewer(TileSlot& slot) {
   count_prepared(slot);
 }
 
+void ViewerTiles::remove_succeeded(const Demand& demand) {
+  if (leaving_.empty()) return;
+  const auto is_to_come = [&](const TileSlot& slot) {
+    if (!slot.wish.is_target) return false;
+    return !is_satisfied(slot, demand) || (!demand.fused && slot.lacks_raw_layers(demand));
+  };
+  std::set<TileId> to_come, outdated_masks;
+  for (const auto& slot : slots_) {
+    if (is_to_come(*slot)) to_come.insert(slot->tile->id);
+    const bool is_held = slot->wish.is_wanted && slot->held.wire_revision != 0;
+    if (is_held && slot->held.child_mask != slot->tile->child_mask) outdated_masks.insert(slot->tile->id);
+  }
+  // Without it the tile that names it would be drawn instead of its other children.
+  const auto is_named = [&](TileId id) {
+    while (id.level > 0) {
+      id = map::parent_of(id);
+      if (outdated_masks.contains(id)) return true;
+    }
+    return false;
+  };
+  for (auto left = leaving_.begin(); left != leaving_.end();) {
+    auto& [id, leaving] = *left;
+    if (!leaving.successors) {
+      leaving.successors.emplace();
+      for (const auto& slot : slots_) {
+        if (to_come.contains(slot->tile->id) && base::overlap(slot->tile->bounds, leaving.bounds)) {
+          leaving.successors->insert(slot->tile->id);
+        }
+      }
+    }
+    std::erase_if(*leaving.successors, [&](const TileId& successor) { return !to_come.contains(successor); });
+    if (leaving.successors->empty() && !is_named(id)) {
+      push_removal(id, leaving.held.wire_revision);
+      left = leaving_.erase(left);
+    } else {
+      ++left;
+    }
+  }
+}
+
+void ViewerTiles::remove_leaving() {
+  for (const auto& [id, leaving] : leaving_) push_removal(id, leaving.held.wire_revision);
+  leaving_.clear();
+}
+
 void ViewerTiles::remove_surplus(std::uint64_t most_bytes) {
   std::uint64_t bytes = 0;
+  for (const auto& [id, leaving] : leaving_) bytes += leaving.held.bytes;
   std::vector<TileSlot*> unused;
   for (const auto& slot : slots_) {
     bytes += slot->wish.is_wanted ? decoded_bytes(*slot->tile) : slot->held.bytes;
     if (!slot->wish.is_wanted && slot->held.wire_revision != 0) unused.push_back(slot.get());
   }
   if (bytes <= most_bytes) return;
+  for (const auto& [id, leaving] : leaving_) bytes -= leaving.held.bytes;
+  remove_leaving();
   std::sort(unused.begin(), unused.end(),
             [](const TileSlot* a, const TileSlot* b) { return a->wish.last_wanted < b->wish.last_wanted; });
   for (TileSlot* slot : unused) {

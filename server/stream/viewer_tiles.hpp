@@ -6,7 +6,10 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -118,6 +121,12 @@ struct TileSlot {
            held.geometry_epoch == demand.geometry_epoch && raw[layer].held_epoch != epoch &&
            raw[layer].failed_epoch != epoch;
   }
+  bool lacks_raw_layers(const Demand& demand) const {
+    for (std::size_t layer = 0; layer < RawDemand::kRawCount; ++layer) {
+      if (lacks_raw(layer, demand)) return true;
+    }
+    return false;
+  }
   void forget_held();
   /// The viewer has no raw layers, nor are any ready for it.
   void forget_raw();
@@ -157,6 +166,11 @@ class ViewerTiles {
   /// viewer has of an earlier scene is good enough to be hidden behind them.
   bool is_satisfied(const TileSlot& slot, const Demand& demand) const;
 
+  /// True when it would put something coarse, or nothing, in the place of what the viewer sees of an earlier version of the map, until
+  /// others have come: it comes after those. A coarse tile beneath which there is something and something is lacking; a tile that takes
+  /// the place of one of before while a new one is lacking beside it, which may have a part of that place.
+  bool is_waiting(const TileSlot& slot, const Demand& demand) const;
+
   /// What the viewer has been given and not been told to remove.
   ViewerMemory memory() const;
   /// Takes a viewer at its word about what it holds from an earlier stream; see ViewerStream::resume(). Colours are current with
@@ -169,6 +183,10 @@ class ViewerTiles {
   void forget_all_held();
 
   void remove_from_viewer(TileSlot& slot);
+  /// Removes tiles that are no longer part of the scene and whose places are drawn by those of now, as far as these are wanted.
+  void remove_succeeded(const Demand& demand);
+  /// The same, whatever is drawn in their places.
+  void remove_leaving();
   /// Removes tiles that are not wanted, the longest unwanted first, until what is wanted and what is held beside it
   /// takes at most so many bytes, decoded.
   void remove_surplus(std::uint64_t most_bytes);
@@ -182,6 +200,20 @@ class ViewerTiles {
   protocol::TileFrameHeader take_removal();
 
  private:
+  /// A tile that is no longer part of the scene: the viewer draws it until its place is drawn by others.
+  struct Leaving {
+    base::Bounds bounds;
+    TileSlot::Held held;
+    std::optional<std::set<protocol::TileId>>
+        successors;  ///< Those that are still to come; nothing before they are known.
+  };
+
+  /// A tile of which the viewer holds something takes the place of one of before.
+  static void succeed(TileSlot& slot, const TileSlot& before);
+  /// The viewer has something to draw of it, be it of an earlier version, or there will never be anything.
+  static bool is_there(const TileSlot& slot, const Demand& demand);
+  bool is_lacking(const TileSlot& slot, const Demand& demand) const;
+  bool is_anything_beneath(const TileSlot& slot) const;
   /// Whenever what is prepared of a slot or held of it has changed.
   void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;
@@ -202,6 +234,7 @@ class ViewerTiles {
   ViewTree tree_;
   std::vector<std::shared_ptr<TileSlot>> slots_;
   std::deque<protocol::TileFrameHeader> removals_;
+  std::map<protocol::TileId, Leaving> leaving_;
   std::size_t prepared_bytes_ = 0;
   double next_look_s_ = std::numeric_limits<double>::infinity();
 };

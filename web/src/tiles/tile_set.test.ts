@@ -72,6 +72,27 @@ describe('TileSet, of a scene that changes by itself', () => {
     return [top!, ...details];
   }
 
+  it('leaves the children that are there until the tile that names others can be drawn', () => {
+    const [, one, other] = fine();
+    const visible = () => [one!, other!].map((tile) => tile.visible);
+    const leaf = { revision: 2, generation: 4, child_mask: 0 };
+    // It is to be a leaf.
+    tiles.addGeometry(frame(root, leaf), geometry());
+    tiles.updateSelection();
+    expect(visible()).toEqual([true, true]);
+    tiles.addColours(frame(root, leaf), colours(4));
+    tiles.updateSelection();
+    expect([...visible(), made.at(-1)!.visible]).toEqual([false, false, true]);
+  });
+
+  it('goes by the newest mask where a child of the one before is gone', () => {
+    const [, one] = fine();
+    tiles.addGeometry(frame(root, { revision: 2, generation: 4, child_mask: 1 }), geometry());
+    tiles.remove(children[1]!);
+    tiles.updateSelection();
+    expect([one!.visible, drawn()]).toEqual([true, 1]);
+  });
+
   it('leaves detail where it is until its own successor has come', () => {
     const [top, one, other] = fine();
     tiles.isVersion(5);

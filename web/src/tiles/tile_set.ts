@@ -106,6 +106,8 @@ interface TileNode {
   /** By octant. */
   readonly children: (TileNode | undefined)[];
   child_mask: number;
+  /** That which has come since, with a geometry that cannot be drawn yet. */
+  waitingMask: number | null;
   shown: Shown | null;
   /** Geometry whose colours have not come yet. */
   waitingGeometry: { revision: number; geometry: DecodedGeometry; error: DrawnError } | null;
@@ -343,7 +345,6 @@ export class TileSet {
 
   addGeometry(frame: TileFrame, geometry: DecodedGeometry): void {
     const node = this.#node(frame.tile);
-    this.#setChildMask(node, frame.child_mask);
     const { shown } = node;
     if (shown !== null && !this.#isStale(shown) && frame.revision < shown.revision) return;
     if (isOlder(frame, node.waitingGeometry)) return;
@@ -356,6 +357,7 @@ export class TileSet {
       rounding_celsius: 0,
     };
     node.waitingGeometry = { revision: frame.revision, geometry, error };
+    this.#setChildMask(node, frame.child_mask);
     this.#join(node);
   }
 
@@ -570,6 +572,7 @@ export class TileSet {
       received: { temperature: 0, visible: 0, colours: 0 },
       children: new Array<TileNode | undefined>(8).fill(undefined),
       child_mask: 0,
+      waitingMask: null,
       shown: null,
       waitingGeometry: null,
       waitingColours: null,
@@ -588,9 +591,8 @@ export class TileSet {
   }
 
   #setChildMask(node: TileNode, child_mask: number): void {
-    if (node.child_mask === child_mask) return;
-    node.child_mask = child_mask;
-    this.#changed(node);
+    node.waitingMask = child_mask;
+    if (node.child_mask !== child_mask) this.#changed(node);
   }
 
   /** Brings together what has come of a tile, as far as it fits together. */
@@ -719,6 +721,7 @@ export class TileSet {
     node.waitingRaw = null;
     node.waitingSigma = null;
     node.child_mask = 0;
+    node.waitingMask = null;
     node.isDrawn = false;
     node.isEnd = false;
     this.#drawn.delete(node);
@@ -741,6 +744,12 @@ export class TileSet {
     this.#selectionDirty = true;
     for (let at: TileNode | null = node; at !== null; at = at.parent) {
       at.coverRank = coverRankOf(at);
+      // Children in the mask of before are drawn until the tile can be that which names others.
+      if (at.waitingMask !== null && (at.waitingGeometry === null || at.coverRank === NOTHING)) {
+        at.child_mask = at.waitingMask;
+        at.waitingMask = null;
+        at.coverRank = coverRankOf(at);
+      }
       const bestRank = Math.max(at.coverRank, this.#answerOf(at.shown));
       if (bestRank === at.bestRank) return;
       at.bestRank = bestRank;

@@ -24,7 +24,15 @@ const grid = (size: number): Vec3[] =>
 
 function setUp(choices = new UpChoices(null)) {
   const tiles: GeometrySummary[] = [];
-  const seen = { view: null as View | null, views: 0, isTravel: false, movesInFull: true, up: null as UpAxis | null, reach: [0, 0] as [number, number], aspect: 1.5 };
+  const seen = {
+    view: null as View | null,
+    views: 0,
+    isTravel: false,
+    movesInFull: true,
+    up: null as UpAxis | null,
+    reach: [0, 0] as [number, number],
+    aspect: 1.5,
+  };
   const look = new FirstLook(
     {
       get pose() {
