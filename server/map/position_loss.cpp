@@ -61,7 +61,7 @@ class PositionSteps::Losses {
   }
 
   /// `points` are in different places.
-  void look_at(std::span<const std::uint32_t> points, double flat) {
+  void look_at(std::span<const std::uint32_t> points, double thin) {
     if (std::none_of(points.begin(), points.end(), [&](std::uint32_t p) { return is_less(p); })) return;
     base::Bounds box = base::empty_bounds();
     std::array<double, 3> low{}, high{};
@@ -84,7 +84,7 @@ class PositionSteps::Losses {
     double step_m = std::numeric_limits<double>::infinity();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double side = shape.side[axis];
-      if (!shape.has_side(axis, flat) || std::abs(high[axis] - low[axis] - side) <= kMostChange * side) continue;
+      if (!shape.has_thickness(axis, thin) || std::abs(high[axis] - low[axis] - side) <= kMostChange * side) continue;
       step_m = std::min(step_m, kMostChange * side);
     }
     if (points.size() <= kMostCompared && (points.size() - distinct.size()) * kVerticesToMerged > points.size()) {
@@ -148,7 +148,7 @@ std::optional<LostForm> PositionSteps::lost_form(std::span<const std::shared_ptr
   for (const Cell& cell : cells_) {
     form.clear();
     for (std::uint32_t p = cell.begin; p < cell.end; ++p) form.push_back(p);
-    losses.look_at(form, kFlat);
+    losses.look_at(form, kThin);
   }
   if (triangles.empty()) return losses.lost();
 
@@ -165,7 +165,7 @@ std::optional<LostForm> PositionSteps::lost_form(std::span<const std::shared_ptr
     for (auto& [root, points] : of_piece) {
       std::sort(points.begin(), points.end());
       points.erase(std::unique(points.begin(), points.end()), points.end());
-      losses.look_at(points, kFlatPiece);
+      losses.look_at(points, kThinPiece);
     }
   };
   // What shares vertices, and what is in one place.

@@ -21,10 +21,14 @@ constexpr std::size_t kVerticesToMerged = 5;
 /// More than a tile has steps from end to end.
 constexpr std::uint8_t kMostHalvings = 24;
 
-/// What is thinner beside its breadth is flat.
-constexpr double kFlat = 0x1p-12;
+/// What is thinner beside its breadth is thin.
+constexpr double kThin = 0x1p-12;
 /// The same of a whole piece, which nobody takes for a wall that is not quite even.
-constexpr double kFlatPiece = 0x1p-15;
+constexpr double kThinPiece = 0x1p-15;
+/// What is thinner than that is flat in any case: one tile of it would not have the steps.
+constexpr double kFlat = 0x1p-20;
+/// So many times what floats tell apart may be their rounding.
+constexpr double kSpacings = 8;
 
 inline std::array<float, 3> coordinates(const base::Vec3f& v) {
   return {v.x, v.y, v.z};
@@ -67,18 +71,31 @@ struct Shape {
     return halvings;
   }
 
-  /// Whether what the points span there is no flatness or rounding of floats.
-  bool has_side(std::size_t axis, double flat = kFlat) const {
+  /// What the points span there beside their breadth.
+  double share_of_breadth(std::size_t axis) const {
     std::array<double, 3> sorted = side;
     std::sort(sorted.begin(), sorted.end());
-    return side[axis] > 8 * float_spacing[axis] && side[axis] >= flat * sorted[1];
+    return side[axis] / sorted[1];
+  }
+
+  /// Whether they span something there that is neither thin nor rounding of floats.
+  bool has_thickness(std::size_t axis, double thin = kThin) const {
+    return side[axis] > kSpacings * float_spacing[axis] && share_of_breadth(axis) >= thin;
+  }
+
+  /// Whether what they span there is no flatness or rounding of floats. What is thin may be the rounding of another axis, too, by which
+  /// all was turned once.
+  bool has_side(std::size_t axis, double thin = kThin) const {
+    if (has_thickness(axis, thin)) return true;
+    const double coarsest = *std::max_element(float_spacing.begin(), float_spacing.end());
+    return side[axis] > kSpacings * coarsest && share_of_breadth(axis) >= kFlat;
   }
 
   /// So that no side that is one changes by more than a tenth.
-  StepHalvings for_sides(double step_of_side, double step_m, double flat = kFlat) const {
+  StepHalvings for_sides(double step_of_side, double step_m, double thin = kThin) const {
     StepHalvings halvings{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (has_side(axis, flat)) halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
+      if (has_side(axis, thin)) halvings[axis] = halvings_to(step_of_side * side[axis], step_m);
     }
     return halvings;
   }

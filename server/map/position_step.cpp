@@ -235,7 +235,7 @@ void PositionSteps::ask_pieces_of(std::span<const Member> members, std::size_t f
     piece.points.erase(std::unique(piece.points.begin(), piece.points.end()), piece.points.end());
     if (piece.points.size() < fewest) continue;
     const Shape shape(piece.bounds);
-    piece.halvings = shape.for_sides(kStepOfPieceSide, step_m, kFlatPiece);
+    piece.halvings = shape.for_sides(kStepOfPieceSide, step_m, kThinPiece);
     if (piece.count <= kSmallPieceVertexCount) {
       positions.clear();
       for (const std::uint32_t i : piece.points) positions.push_back(points_[i].position);

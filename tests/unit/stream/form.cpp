@@ -102,7 +102,7 @@ struct Loss {
 
 /// What became of some vertices.
 Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place>& before,
-             const std::vector<Place>& after, double flat) {
+             const std::vector<Place>& after, double thin) {
   Loss loss;
   std::array<double, 3> side{}, rounded_side{}, far{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -120,10 +120,12 @@ Loss loss_of(const std::vector<std::uint32_t>& vertices, const std::vector<Place
   }
   std::array<double, 3> sorted = side;
   std::sort(sorted.begin(), sorted.end());
+  const auto rounding = [](double at) { return at > 0 ? std::ldexp(8, std::ilogb(at) - 23) : 0; };
+  const double any_rounding = rounding(std::max({far[0], far[1], far[2]}));
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double float_spacing = far[axis] > 0 ? std::ldexp(1, std::ilogb(far[axis]) - 23) : 0;
-    if (side[axis] == 0 ? rounded_side[axis] == 0 : side[axis] < sorted[1] * flat || side[axis] <= 8 * float_spacing)
-      continue;
+    const bool is_thin = side[axis] < sorted[1] * thin;
+    const bool is_flat = side[axis] < sorted[1] * 0x1p-20 || side[axis] <= any_rounding;
+    if (side[axis] == 0 ? rounded_side[axis] == 0 : (is_thin && is_flat) || side[axis] <= rounding(far[axis])) continue;
     loss.side_change = std::max(loss.side_change, std::abs(rounded_side[axis] - side[axis]) / side[axis]);
   }
   std::set<Place> distinct;

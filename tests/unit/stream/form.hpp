@@ -23,8 +23,9 @@ struct FormReport {
 };
 
 /// Compares every piece, and the balls of 50 to 100 and of 1,000 vertices around `seed_count` evenly taken ones (no smaller than a
-/// 20,000th of the scene's diagonal), with what a client decodes at the scene's own steps. A side that is thinner than a 4,096th (of a piece a 32,768th) of
-/// the second longest, or than eight times what floats tell apart there, is flat.
+/// 20,000th of the scene's diagonal), with what a client decodes at the scene's own steps. A side that is thinner than eight times what floats tell
+/// apart there is flat; and one that is thinner than a 4,096th (of a piece a 32,768th) of the second longest, where it is thinner than eight
+/// times what floats tell apart on any axis, or than a millionth of the second longest.
 FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count);
 
 }  // namespace spectra::stream::testing

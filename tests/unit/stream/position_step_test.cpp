@@ -356,6 +356,22 @@ TEST(PositionSteps, OfASmallMeshAreNotCoarsenedByWhatIsFarAway) {
   }
 }
 
+TEST(PositionSteps, KeepTheReliefOfAFlatCountry) {
+  Parts parts;
+  parts.grid(40, 40, {0, 0, 0}, {846, 0, 0}, {0, 846, 0},
+             [](int x, int y) { return 0.25 * std::sin(x * 0.5 + y * 0.7); });
+  expect_kept(parts.mesh());
+  parts.triangles.clear();
+  expect_kept(parts.mesh());
+  // Noise of floats that were turned is none.
+  Parts floor;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> noise(-1e-6F, 1e-6F);
+  floor.grid(120, 120, {10, 10, 0}, {0.1F, 0, 0}, {0, 0.1F, 0}, [&](int, int) { return double{noise(random)}; });
+  const auto scene = scene_of(floor.mesh());
+  for (const auto& tile : scene->tiles()) EXPECT_TRUE(tile->step_halvings.empty());
+}
+
 /// As a server has it.
 std::shared_ptr<const map::SceneSnapshot> served(const Parts& parts) {
   files::LoadedScene loaded;
