@@ -158,12 +158,14 @@ LabelledDemoScene labelled_demo_scene(const DemoSceneOptions& options, const bas
   base::report(progress, base::kModellingPhase, 0);
   const std::uint64_t wanted = std::clamp(options.vertex_count, kDemoSceneLeastVertices, kDemoSceneMostVertices);
   const std::uint64_t seed = scramble(options.seed);
-  const SurfaceMesh stand_in = surfaces(kStandInVertices, seed);
-  const BakedLight light(stand_in);
-  const ThermalSensor sensor(stand_in, seed + 900);
   // The stand-in takes as long as so many vertices of the scene, and three quarters of those go into the surfaces.
   constexpr double kStandInWork = 600'000;
   const double stand_in_share = kStandInWork / (kStandInWork + static_cast<double>(wanted));
+  const SurfaceMesh stand_in = surfaces(kStandInVertices, seed);
+  base::report(progress, base::kModellingPhase, 0.18 * stand_in_share);
+  const BakedLight light(stand_in);
+  base::report(progress, base::kModellingPhase, 0.85 * stand_in_share);
+  const ThermalSensor sensor(stand_in, seed + 900);
   const double surfaces_share = stand_in_share + 0.75 * (1 - stand_in_share);
   base::report(progress, base::kModellingPhase, stand_in_share);
 

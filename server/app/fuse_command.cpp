@@ -53,7 +53,7 @@ base::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusio
 base::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
                                           exports::SceneFileOptions file) {
   ProgressLine line(with_loading(options.input, options.thermal,
-                                 {{map::kTilingPhase, "cutting into tiles", 10}, writing(options, 20)}));
+                                 {{map::kTilingPhase, "cutting into tiles", 16}, writing(options, 9)}));
   BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
   auto notes = loaded.notes;
   jobs::WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));

@@ -73,6 +73,10 @@ std::optional<double> RemainingTime::at(double now_s) const {
   return *end_s_ - now_s;
 }
 
+double RemainingTime::share_at(double now_s) const {
+  return end_s_ ? now_s / *end_s_ : 0;
+}
+
 std::string progress_text(std::string_view words, double share, std::optional<double> remaining_s,
                           std::size_t columns) {
   std::string facts = fmt::format("  {} %", static_cast<int>(100 * std::clamp(share, 0.0, 1.0)));
@@ -159,13 +163,18 @@ void ProgressLine::draw() {
     whole += stages_[i].weight;
     done += i < stage_ ? stages_[i].weight : 0;
   }
+  const double before = done;
   done += share_of_stage_ * stages_[stage_].weight;
   const double share = whole > 0 ? done / whole : 0;
-  remaining_.set(share, seconds());
+  const double now_s = seconds();
+  remaining_.set(share, now_s);
+  // What tells nothing in between goes on as what came before it did, but not beyond its end.
+  const double end_of_stage = whole > 0 ? (before + stages_[stage_].weight) / whole : 0;
+  shown_share_ = std::max({shown_share_, share, std::min(remaining_.share_at(now_s), end_of_stage)});
   if (is_in_background()) return;
   // The last column stays free: some terminals go to the next line after it.
   const std::string text =
-      progress_text(stages_[stage_].words, share, remaining_.at(seconds()), terminal_columns() - 1);
+      progress_text(stages_[stage_].words, shown_share_, remaining_.at(now_s), terminal_columns() - 1);
   const std::size_t columns = column_count(text);
   std::string line = "\r" + text;
   if (columns < drawn_columns_) line.append(drawn_columns_ - columns, ' ');

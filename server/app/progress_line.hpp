@@ -29,6 +29,8 @@ class RemainingTime {
   /// Seconds to the end, counted down while the share stays; nothing while it is too early to tell, or when that time is
   /// over and the share is still the same.
   std::optional<double> at(double now_s) const;
+  /// What share is done by then, if all goes on like that; 0 while it is too early to tell.
+  double share_at(double now_s) const;
 
  private:
   double share_ = 0;
@@ -73,6 +75,7 @@ class ProgressLine {
   std::mutex mutex_;       ///< Of what follows and of the terminal.
   std::size_t stage_ = 0;
   double share_of_stage_ = 0;
+  double shown_share_ = 0;  ///< Never less than before.
   bool is_over_ = false;
   RemainingTime remaining_;
   std::size_t drawn_columns_ = 0;

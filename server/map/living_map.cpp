@@ -26,9 +26,9 @@ namespace {
 using base::Vec3f;
 
 /// About what share of the making is done with the leaves; and of that, when they are cut and when the steps are known.
-constexpr double kLeavesShare = 0.25;
-constexpr double kCutShare = 0.6;
-constexpr double kStepsShare = 0.9;
+constexpr double kLeavesShare = 0.5;
+constexpr double kCutShare = 0.06;
+constexpr double kStepsShare = 0.98;
 
 /// A tile of the full mesh reaches over at most so many doublings of the extent of the first block. Of what 24 bits tell apart it
 /// leaves 17 to the block, and maps of small blocks are not cut into crumbs.
@@ -450,16 +450,22 @@ void LivingMap::change(std::vector<BlockPut> put, std::span<const std::string> r
   // Memory of a large mesh is needed for the rest.
   added.clear();
   put.clear();
-  if (is_first) choose_steps(changed, pool);
+  if (is_first) {
+    choose_steps(changed, pool, [&](double share) {
+      base::report(progress, kTilingPhase, leaves_share * (kCutShare + (kStepsShare - kCutShare) * share));
+    });
+  }
   base::report(progress, kTilingPhase, leaves_share * kStepsShare);
   take(std::move(changed), pool, progress);
   // What comes next may lie somewhere else altogether.
   if (blocks_.empty()) constants_.reset();
 }
 
-void LivingMap::choose_steps(ChangedTree& first, jobs::WorkerPool& pool) {
+void LivingMap::choose_steps(ChangedTree& first, jobs::WorkerPool& pool,
+                             const std::function<void(double)>& found_share) {
   std::vector<std::shared_ptr<Tile>> leaves = new_leaves(first);
-  std::optional<PositionSteps> steps(std::in_place, leaves, pool);
+  std::optional<PositionSteps> steps(std::in_place, leaves, pool, std::nullopt, std::numeric_limits<double>::infinity(),
+                                     found_share);
   const int first_leaf_level = sizes().first_leaf_level;
   if (const auto lost = first_leaf_level > 0 ? steps->lost_form(leaves) : std::nullopt) {
     constants_->grid = grid_for(*lost, leaves);

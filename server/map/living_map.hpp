@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -136,7 +137,7 @@ class LivingMap {
   std::shared_ptr<const MapBlock> taken_in(BlockPut& put);
   ReplacedVertices replaced_vertices(BlockNumber block) const;
   /// Of the first block, and the tiles for it: where some reach too far for the steps that form asks for there, all are cut anew in smaller cells.
-  void choose_steps(ChangedTree& first, jobs::WorkerPool& pool);
+  void choose_steps(ChangedTree& first, jobs::WorkerPool& pool, const std::function<void(double)>& found_share);
   MapGrid grid_for(const LostForm& lost, std::span<const std::shared_ptr<Tile>> leaves) const;
   /// The tree with what has changed.
   void take(ChangedTree changed, jobs::WorkerPool& pool, const base::Progress& progress);

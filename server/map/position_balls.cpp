@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -22,6 +23,9 @@ constexpr std::size_t kVerticesToCrowd = 16;
 constexpr float kLargestBall = 2.2F;
 constexpr float kLargestOfCell = 10;
 constexpr int kMostRounds = 8;
+/// About what share of the time is over when they begin, and after the first; each other one takes half of what is left then.
+constexpr double kRoundsBegin = 0.04;
+constexpr double kFirstRoundEnd = 0.64;
 
 /// What they may reach beyond the cell, in parts of its longest side; and what is looked for where they reach farther.
 constexpr double kBallReach = 1;
@@ -69,7 +73,7 @@ bool PositionSteps::is_crowded(const Cell& cell) {
   return merged_count(positions, steps_m, most, rounded) > most;
 }
 
-void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
+void PositionSteps::keep_sides(jobs::WorkerPool& pool, const std::function<void(double)>& found_share) {
   constexpr std::size_t kChunk = 16;
   halvings_.resize(points_.size());
   for (const Cell& cell : cells_) {
@@ -85,14 +89,21 @@ void PositionSteps::keep_sides(jobs::WorkerPool& pool) {
   SidesRound round{.is_changed = std::vector<std::uint8_t>(points_.size(), 1),
                    .radius = std::vector<float>(points_.size()),
                    .wanted = halvings_};
+  double begin_share = kRoundsBegin, end_share = kFirstRoundEnd;
   for (int i = 0; i < kMostRounds; ++i) {
     round.is_first = i == 0;
-    pool.for_each((cells_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t chunk_count = (cells_.size() + kChunk - 1) / kChunk;
+    std::atomic<std::size_t> done_count{0};
+    pool.for_each(chunk_count, [&](std::size_t chunk) {
       Neighbourhood around;
       for (std::size_t c = chunk * kChunk; c < std::min(cells_.size(), (chunk + 1) * kChunk); ++c) {
         keep_sides_in(cells_[c], around, round);
       }
+      if (!found_share) return;
+      const double of_round = static_cast<double>(++done_count) / static_cast<double>(chunk_count);
+      found_share(begin_share + of_round * (end_share - begin_share));
     });
+    begin_share = std::exchange(end_share, (end_share + 1) / 2);
     keep_flat(planes, round.wanted);
     keep_pieces_apart(round.wanted, round.is_first);
     bool is_any_changed = false;

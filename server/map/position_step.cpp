@@ -110,7 +110,8 @@ class Pieces {
 }  // namespace
 
 PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
-                             std::optional<float> largest_step_m, double largest_tile_m) {
+                             std::optional<float> largest_step_m, double largest_tile_m,
+                             const std::function<void(double)>& found_share) {
   largest_step_m_ = largest_step_m.value_or(usual_step_m(leaves, pool));
   gather(leaves);
   if (points_.empty()) return;
@@ -126,7 +127,7 @@ PositionSteps::PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs
   const bool has_triangles =
       std::any_of(leaves.begin(), leaves.end(), [](const auto& leaf) { return !leaf->triangles.empty(); });
   if (has_triangles) limit_to_one_tile(largest_tile_m);
-  keep_sides(pool);
+  keep_sides(pool, found_share);
   coincident_ = {};
   small_pieces_ = {};
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -42,10 +43,12 @@ struct LostForm {
 class PositionSteps {
  public:
   /// Of the full mesh; the same for any number of threads. `largest_step_m`: that of the map it becomes part of, a power of two.
-  /// `largest_tile_m`: as far as leaves reach at most, where that is less than all of them together. Must not be called from a job of the pool.
+  /// `largest_tile_m`: as far as leaves reach at most, where that is less than all of them together. Must not be called from a job of the pool. `found_share` is told from
+  /// any thread what share is found.
   PositionSteps(std::span<const std::shared_ptr<Tile>> leaves, jobs::WorkerPool& pool,
                 std::optional<float> largest_step_m = std::nullopt,
-                double largest_tile_m = std::numeric_limits<double>::infinity());
+                double largest_tile_m = std::numeric_limits<double>::infinity(),
+                const std::function<void(double)>& found_share = {});
 
   /// The coarsest step that any vertex may have; a power of two.
   float largest_step_m() const { return largest_step_m_; }
@@ -110,7 +113,7 @@ class PositionSteps {
   void keep_pieces_apart(std::vector<StepHalvings>& wanted, bool are_all_new) const;
   std::array<double, 3> rounded_at(std::uint32_t point, const StepHalvings& halvings) const;
   /// Of single vertices, so that balls of neighbours keep the sides of their boxes.
-  void keep_sides(jobs::WorkerPool& pool);
+  void keep_sides(jobs::WorkerPool& pool, const std::function<void(double)>& found_share);
   void gather_around(const base::Bounds& box, double reach, Neighbourhood& around, const SidesRound& round);
   /// Those around one vertex; finds the radius of its smallest ball in the first round. Returns the largest ball's to that (both squared).
   float gather_alone(std::uint32_t seed, double first_reach, Neighbourhood& around, SidesRound& round);

@@ -32,6 +32,14 @@ TEST(RemainingTime, IsNotGuessedFromTheFirstMoment) {
   EXPECT_DOUBLE_EQ(time.at(1).value(), 49);
 }
 
+TEST(RemainingTime, KnowsWhatShareWillBeDone) {
+  RemainingTime time;
+  EXPECT_EQ(time.share_at(1), 0);
+  time.set(0.25, 10);
+  EXPECT_DOUBLE_EQ(time.share_at(10), 0.25);
+  EXPECT_DOUBLE_EQ(time.share_at(30), 0.75);
+}
+
 TEST(ProgressText, TellsWhatHowFarAndHowLong) {
   EXPECT_EQ(progress_text("reading castle.ply", 0.424, std::nullopt, 79), "reading castle.ply  42 %");
   EXPECT_EQ(progress_text("fusing", 0, 0.2, 79), "fusing  0 %, about 1 s left");

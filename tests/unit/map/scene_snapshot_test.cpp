@@ -452,5 +452,23 @@ TEST(SceneSnapshot, TriangleSoupHasLeavesOfTheRightSize) {
   for (const auto& tile : scene->tiles()) EXPECT_LE(tile->owned_count, kLeafSize * 5 / 4);
 }
 
+TEST(SceneSnapshot, TellsHowFarItIsAllAlong) {
+  std::mutex mutex;
+  std::vector<double> shares;
+  const auto progress = [&](std::string_view phase, double share) {
+    const std::lock_guard lock(mutex);
+    if (phase == kTilingPhase) shares.push_back(share);
+  };
+  jobs::WorkerPool pool(2);
+  SceneSnapshot::build(files::LoadedScene{testing::point_cloud(30'000, 3), {}, {}}, 1, pool, kLeafVertexCount,
+                       LevelsOfDetail::LeavesOnly, progress);
+  std::sort(shares.begin(), shares.end());
+  ASSERT_GT(shares.size(), 20U);
+  EXPECT_EQ(shares.back(), 1);
+  double longest = 0;
+  for (std::size_t i = 1; i < shares.size(); ++i) longest = std::max(longest, shares[i] - shares[i - 1]);
+  EXPECT_LT(longest, 0.4);
+}
+
 }  // namespace
 }  // namespace spectra::map
