@@ -43,6 +43,15 @@ describe('What is highlighted', () => {
     );
   });
 
+  it('is said of the map that was counted while the scene is another one', () => {
+    const said = (lowest: number, highest: number, highlighted: [number, number][]) =>
+      plain(highlightWords(histogram(highlighted, 0.1), { ...scene, lowest, highest }, method, {}));
+    expect(said(-20, 907, [[27, 60]])).toBe('10 % of the surface, above 27.0 °C.');
+    expect(said(-20, 907, [[10, 14]])).toBe('10 % of the surface, below 14.0 °C.');
+    expect(said(12, 40, [[27, 60]])).toBe('10 % of the surface, above 27.0 °C.');
+    expect(said(12, 40, [[10, 14]])).toBe('10 % of the surface, below 14.0 °C.');
+  });
+
   it('is said to be nothing, and why', () => {
     expect(words(histogram([], 0))).toBe('Nothing is highlighted.');
     expect(words(histogram([], 0), { limit: 250 })).toBe('Nothing is highlighted. Limit 250.0 °C is above the hottest, 60.0 °C.');

@@ -53,10 +53,13 @@ export function highlightWords(
     const where = value > highest ? `above the hottest, ${said(highest)}` : `below the coldest, ${said(lowest)}`;
     return [`${label} ${said(value)} is ${where}.`];
   });
+  // The map may be another one by now than that of which the share is.
+  const from = Math.max(lowest, histogram.edges[0] ?? lowest);
+  const to = Math.min(highest, histogram.edges.at(-1) ?? highest);
   const of = scene.isPointCloud ? 'points' : 'surface';
   const found =
     share === 0
       ? 'Nothing is highlighted.'
-      : `${percent(share)} of the ${of}${histogram.highlighted.length > 0 ? `, ${places(histogram.highlighted, lowest, highest, said)}` : ''}.`;
+      : `${percent(share)} of the ${of}${histogram.highlighted.length > 0 ? `, ${places(histogram.highlighted, from, to, said)}` : ''}.`;
   return [found, ...beyond].join(' ');
 }

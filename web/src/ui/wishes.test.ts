@@ -21,6 +21,11 @@ describe('wishWords', () => {
     expect(plain(words)).toEqual(['range 20.110 °C to 20.140 °C']);
   });
 
+  it('writes a temperature with the decimals of the scene', () => {
+    const words = wishWords({ params: { threshold: 20.0006 } }, methods, [], 'threshold', 4);
+    expect(plain(words)).toEqual(['Threshold 20.0006 °C']);
+  });
+
   it('says what is asked for, setting by setting', () => {
     const words = wishWords(
       {

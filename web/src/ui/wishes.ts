@@ -8,6 +8,8 @@ export function wishWords(
   methods: readonly Method[],
   palettes: readonly Palette[],
   method: string,
+  /** Of a temperature. */
+  decimals = 1,
 ): string[] {
   if (change === null) return [];
   const words: string[] = [];
@@ -21,7 +23,7 @@ export function wishWords(
         : typeof value !== 'number'
           ? String(value)
           : parameter?.kind === 'temperature'
-            ? celsius(value)
+            ? celsius(value, decimals)
             : figures(value, 3);
     words.push(`${parameter?.label ?? name} ${shown}`);
   }
@@ -30,8 +32,8 @@ export function wishWords(
   if (change.range !== undefined) {
     const { mode, min, max, low, high } = change.range;
     if (mode === 'manual') {
-      const decimals = decimalsOf({ min, max });
-      words.push(`range ${celsius(min, decimals)} to ${celsius(max, decimals)}`);
+      const telling = decimalsOf({ min, max });
+      words.push(`range ${celsius(min, telling)} to ${celsius(max, telling)}`);
     } else if (mode === 'auto') words.push('range to the extremes');
     else words.push(`range ${figures(low ?? 1, 3)}\u2013${figures(high ?? 99, 3)} %`);
   }
