@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <string>
 
 namespace spectra::base {
 
@@ -16,6 +17,16 @@ std::optional<UpAxis> up_axis(std::string_view name) {
   const auto found = std::find(kNames.begin(), kNames.end(), name);
   if (found == kNames.end()) return std::nullopt;
   return static_cast<UpAxis>(found - kNames.begin());
+}
+
+std::optional<UpAxis> up_axis_written(std::string_view name) {
+  if (name.starts_with('+')) {
+    name.remove_prefix(1);
+    if (name.starts_with('-')) return std::nullopt;
+  }
+  std::string lower(name);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return up_axis(lower);
 }
 
 std::string_view to_string(UpAxis up) {

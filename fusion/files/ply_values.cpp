@@ -33,8 +33,10 @@ std::optional<double> unusual_number(std::string_view token) {
   }
   constexpr std::array<std::string_view, 8> kNanBeginnings = {"nan",    "1.#qnan", "1.#snan", "1.#ind",
                                                               "1.#nan", "1.#qo",   "1.#j",    "#n/a"};
-  constexpr std::array<std::string_view, 10> kNanWords = {"null", "(null)", "<null>", "none",  "na",
-                                                          "n/a",  "<na>",   "nil",    "undef", "undefined"};
+  constexpr std::array<std::string_view, 17> kNanWords = {
+      "null",      "(null)",  "<null>",  "none",   "na",    "n/a",  "<na>", "nil", "undef",
+      "undefined", "missing", "no_data", "nodata", "#qnan", "#nan", "*",    "?"};
+  if (text.find_first_not_of('-') == std::string::npos) return std::numeric_limits<double>::quiet_NaN();
   if (std::any_of(kNanBeginnings.begin(), kNanBeginnings.end(),
                   [word](std::string_view beginning) { return word.starts_with(beginning); }) ||
       std::find(kNanWords.begin(), kNanWords.end(), word) != kNanWords.end() || word == "qnan" || word == "snan") {

@@ -11,9 +11,14 @@ namespace spectra::files {
 
 namespace {
 
+/// "1 unit = 1 mm".
+bool is_of_one_unit(const std::vector<std::string>& words, std::size_t at) {
+  return at > 2 && words[at - 1] == "1" && words[at - 2] == "=" && words[at - 3].starts_with("unit");
+}
+
 /// Whether a short name of a unit, which is a word or a letter elsewhere, is all that is said of it: "units: m", not "in m, ...".
 bool is_whole_unit(const std::vector<std::string>& words, std::size_t at) {
-  return at > 0 && (words[at - 1] == "=" || words[at - 1].starts_with("unit")) &&
+  return at > 0 && (is_of_one_unit(words, at) || words[at - 1] == "=" || words[at - 1].starts_with("unit")) &&
          (at + 1 == words.size() || words[at + 1] == ",");
 }
 
@@ -70,7 +75,7 @@ std::string_view unit_told(std::span<const std::string> comments) {
       const auto at = static_cast<std::size_t>(word - words.begin());
       if (*word == "in" && (word == about || !is_whole_unit(words, at))) continue;
       if (is_denied(words, at)) continue;
-      if (word != words.begin() && is_number(*(word - 1))) continue;
+      if (word != words.begin() && is_number(*(word - 1)) && !is_of_one_unit(words, at)) continue;
       for (const auto& [unit, unit_words] : kUnits) {
         if (std::find(unit_words.begin(), unit_words.end(), *word) != unit_words.end()) return unit.name;
       }

@@ -56,19 +56,28 @@ std::optional<base::UpAxis> axis_of_vector(const std::vector<std::string>& words
   return std::nullopt;
 }
 
+/// "Not y up", and "do not use y up".
+bool is_denied(const std::vector<std::string>& words, std::size_t at) {
+  constexpr std::size_t kWordsBetween = 3;
+  for (std::size_t i = at; i > 0 && i + kWordsBetween >= at; --i) {
+    if (is_one_of(words[i - 1], {",", "but"})) return false;
+    if (is_one_of(words[i - 1], {"not", "never", "no"})) return true;
+  }
+  return false;
+}
+
 /// All that one line says about up.
 std::vector<base::UpAxis> told_by(const std::string& line) {
   std::vector<base::UpAxis> told;
   const std::vector<std::string> words = comment_words(line);
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
+    if (is_denied(words, i)) continue;
     if (word == "enu") told.push_back(base::UpAxis::Z);
     if (word == "ned") told.push_back(base::UpAxis::MinusZ);
     if (word.size() == 3 && word.ends_with("up")) {
       if (const auto axis = base::up_axis(word.substr(0, 1))) told.push_back(*axis);
     }
-    const bool is_denied = i > 0 && words[i - 1] == "not";
-    if (is_denied) continue;
     std::size_t next = i + 1;
     if (const auto axis = base::up_axis(word)) {
       const auto is_filler = [](const std::string& w) {
@@ -76,6 +85,8 @@ std::vector<base::UpAxis> told_by(const std::string& line) {
       };
       while (next < words.size() && is_filler(words[next])) ++next;
       if (next == words.size()) continue;
+      // "forward = -z axis up = y": there another axis is named.
+      if (next + 1 < words.size() && words[next + 1] == "=") continue;
       // "y up to 3 m" is a size.
       const bool is_size = next + 1 < words.size() && is_one_of(words[next + 1], {"to", "till", "until", "from"});
       if (is_size) continue;

@@ -48,7 +48,7 @@ std::vector<const CLI::Option*> add_reading(CLI::App& command, files::ReadOption
   command.add_option("--scale", options.metres_per_unit, "Metres in one unit of the file's positions")
       ->capture_default_str();
   const auto set_up = [&options](const std::string& name) {
-    options.up = base::up_axis(name);
+    options.up = base::up_axis_written(name);
     if (!options.up && name != "auto")
       throw CLI::ValidationError("--up " + name, "x, y, z, -x, -y, -z or auto is wanted");
   };

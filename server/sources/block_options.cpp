@@ -72,7 +72,7 @@ base::Result<void> read_field(IncomingBlock& block, const std::string& name, con
   } else if (name == "scale") {
     BOOST_OUTCOME_TRY(read.metres_per_unit, number(name, value));
   } else if (name == "up") {
-    read.up = base::up_axis(value);
+    read.up = base::up_axis_written(value);
     if (!read.up && value != "auto") {
       return base::failure(base::ErrorCode::WrongType,
                            name + " is \"" + value + "\"; x, y, z, -x, -y, -z or auto is wanted", name);

@@ -28,6 +28,10 @@ TEST(UpAxis, HasSixNames) {
     ASSERT_TRUE(base::up_axis(name)) << name;
     EXPECT_EQ(to_string(*base::up_axis(name)), name);
   }
+  for (const std::string_view name : {"X", "+x", "+X"}) EXPECT_EQ(base::up_axis_written(name), base::UpAxis::X) << name;
+  EXPECT_EQ(base::up_axis_written("-Z"), base::UpAxis::MinusZ);
+  for (const std::string_view name : {"", "+-z", "up", "auto", "+", "XX"})
+    EXPECT_FALSE(base::up_axis_written(name)) << name;
   for (const std::string_view name : {"", "X", "+z", "up", "auto", "zz"}) EXPECT_FALSE(base::up_axis(name)) << name;
   EXPECT_EQ(base::direction_of(base::UpAxis::MinusY), (base::Vec3f{0, -1, 0}));
   EXPECT_EQ(base::direction_of(base::UpAxis::X), (base::Vec3f{1, 0, 0}));
@@ -60,6 +64,7 @@ TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
                            "obj_info gravity vector = [0, -1, 0]",
                            "comment gravity: -y",
                            "comment exported with forward -Z, up Y",
+                           "comment Exported from Blender axis_forward=-Z axis_up=Y",
                            "comment not z up, y up"}) {
     EXPECT_EQ(told({line}), "y") << line;
   }
@@ -89,6 +94,8 @@ TEST(UpSearch, ReadsNothingIntoOtherWords) {
                            "comment height y",
                            "comment up vector (0, nan, 0)",
                            "comment not y up",
+                           "comment do not use y up",
+                           "comment never load it y up",
                            "comment cleaned, up z noise",
                            "comment not up y",
                            "comment gravity 1 1 1",
@@ -230,8 +237,8 @@ TEST(SceneSurvey, NamesTheScaleOfTheUnitThatCommentsTell) {
     }
     return std::string();
   };
-  for (const char* line : {"comment units: mm", "comment all values in millimetres", "obj_info unit=MM",
-                           "comment coordinates (mm)", "comment XYZ in millimeters"}) {
+  for (const char* line : {"comment units: mm", "comment 1 unit = 1 mm", "comment all values in millimetres",
+                           "obj_info unit=MM", "comment coordinates (mm)", "comment XYZ in millimeters"}) {
     EXPECT_EQ(said(line), "--scale 0.001 makes metres of them") << line;
   }
   EXPECT_EQ(said("obj_info units centimeters"), "--scale 0.01 makes metres of them");
