@@ -48,8 +48,16 @@ TileSlot* SendingOrder::head(const ViewerTiles& tiles, const Demand& demand) {
   if (head_ < slots_.size() && is_due(head_)) return slots_[head_].get();
   while (first_ < slots_.size() && tiles.is_satisfied(*slots_[first_], demand)) ++first_;
   // What waits may have waited for the last one.
-  head_ = first_;
-  while (head_ < slots_.size() && !is_due(head_)) ++head_;
+  head_ = slots_.size();
+  for (std::size_t i = first_; i < slots_.size(); ++i) {
+    if (!is_due(i)) continue;
+    if (head_ == slots_.size()) head_ = i;
+    if (!is_turn_of_lacking_) break;
+    if (!tiles.is_there(*slots_[i], demand)) {
+      head_ = i;
+      break;
+    }
+  }
   return head_ < slots_.size() ? slots_[head_].get() : nullptr;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -25,19 +26,28 @@ class SendingOrder {
   const std::vector<std::shared_ptr<TileSlot>>& slots() const { return slots_; }
 
   /// Moves to the first slot that is not as demanded and waits for no other; null when there is none. What is as demanded is not
-  /// looked at again before rewind().
+  /// looked at again before rewind(). After a tile in the place of one of before it is the first of which the viewer has nothing yet, if
+  /// there is one: what changes all the time does not keep away what is lacking.
   TileSlot* head(const ViewerTiles& tiles, const Demand& demand);
+  /// Something of a slot goes out that is in the place of what the viewer had of it, or not.
+  void gave(bool is_in_place_of_before) { is_turn_of_lacking_ = is_in_place_of_before; }
   /// Where head() has come to.
   std::size_t head_index() const { return head_; }
   /// Any slot may have changed.
-  void rewind() { head_ = first_ = 0; }
+  void rewind() {
+    first_ = 0;
+    head_ = kNowhere;
+  }
 
  private:
   void choose_previews(const ViewTree& tree, double most_vertices);
 
   std::vector<std::shared_ptr<TileSlot>> slots_;
+  static constexpr auto kNowhere = std::numeric_limits<std::size_t>::max();
+
   std::size_t first_ = 0;  ///< Everything before it is satisfied.
-  std::size_t head_ = 0;   ///< Everything before it is satisfied, or waits.
+  std::size_t head_ = kNowhere;
+  bool is_turn_of_lacking_ = false;
   std::uint64_t choice_count_ = 0;
 };
 

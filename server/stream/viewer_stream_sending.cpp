@@ -115,6 +115,7 @@ ViewerStream::Attempt ViewerStream::next_geometry(TileSlot& slot, double now_s) 
     look_again();
     return {};
   }
+  order_.gave(ViewerTiles::is_there(slot, demand_));
   tiles_.give_geometry(slot, name, demand_.geometry_epoch);
   auto frame = given_out(prepared_header_of(slot, FrameKind::Geometry), slot.prepared.geometry->payload, now_s);
   if (!demand_.fused) {
@@ -138,6 +139,7 @@ ViewerStream::Attempt ViewerStream::next_colours(TileSlot& slot, double now_s) {
     }
     auto header = prepared_header_of(slot, protocol::colour_frame_kind(demand_.colour_transform));
     header.generation = generation_;
+    if (!ViewerTiles::is_there(slot, demand_)) order_.gave(false);
     tiles_.give_colours(slot, demand_, last_sequence_ + 1);
     colour_cost_.learn(slot.prepared.colour_bits, header.vertex_count, slot.prepared.colours->size());
     frame = given_out(header, slot.prepared.colours, now_s);

@@ -202,6 +202,15 @@ bool ViewerTiles::is_anything_beneath(const TileSlot& slot) const {
   });
 }
 
+bool ViewerTiles::is_drawn(const TileSlot& slot, const Demand& demand) const {
+  const auto& children = tree_.nodes()[slot.node].children;
+  return is_there(slot, demand) && std::any_of(children.begin(), children.end(), [&](std::size_t index) {
+           TileId child = slots_[index]->tile->id;
+           while (child.level > slot.tile->id.level + 1) child = map::parent_of(child);
+           return (slot.held.child_mask >> map::octant_of(child) & 1) != 0 && is_lacking(*slots_[index], demand);
+         });
+}
+
 bool ViewerTiles::is_waiting(const TileSlot& slot, const Demand& demand) const {
   if (slot.held.geometry_epoch == demand.geometry_epoch) return false;
   const auto is_lacking_of = [&](const std::vector<std::size_t>& nodes) {
@@ -210,7 +219,9 @@ bool ViewerTiles::is_waiting(const TileSlot& slot, const Demand& demand) const {
     });
   };
   const ViewTree::Node& node = tree_.nodes()[slot.node];
-  if (!slot.wish.is_target && is_lacking_of(node.children) && is_anything_beneath(slot)) return true;
+  if (!slot.wish.is_target && is_lacking_of(node.children) && is_anything_beneath(slot) && !is_drawn(slot, demand)) {
+    return true;
+  }
   return slot.held.wire_revision != 0 && node.parent && is_lacking_of(tree_.nodes()[*node.parent].children) &&
          !is_lacking(slot, demand);
 }

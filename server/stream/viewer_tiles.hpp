@@ -166,6 +166,8 @@ class ViewerTiles {
   /// viewer has of an earlier scene is good enough to be hidden behind them.
   bool is_satisfied(const TileSlot& slot, const Demand& demand) const;
 
+  /// The viewer has something to draw of it, be it of an earlier version, or there will never be anything.
+  static bool is_there(const TileSlot& slot, const Demand& demand);
   /// True when it would put something coarse, or nothing, in the place of what the viewer sees of an earlier version of the map, until
   /// others have come: it comes after those. A coarse tile beneath which there is something and something is lacking; a tile that takes
   /// the place of one of before while a new one is lacking beside it, which may have a part of that place.
@@ -210,10 +212,10 @@ class ViewerTiles {
 
   /// A tile of which the viewer holds something takes the place of one of before.
   static void succeed(TileSlot& slot, const TileSlot& before);
-  /// The viewer has something to draw of it, be it of an earlier version, or there will never be anything.
-  static bool is_there(const TileSlot& slot, const Demand& demand);
   bool is_lacking(const TileSlot& slot, const Demand& demand) const;
   bool is_anything_beneath(const TileSlot& slot) const;
+  /// The viewer draws it, because it lacks some of those that it names.
+  bool is_drawn(const TileSlot& slot, const Demand& demand) const;
   /// Whenever what is prepared of a slot or held of it has changed.
   void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;

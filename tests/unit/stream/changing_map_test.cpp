@@ -235,6 +235,32 @@ TEST_P(ChangingMap, IsNeverSeenCoarserThanBeforeNorWithAHole) {
   for (const auto& [x, y, was] : places) EXPECT_EQ(screen.level_at(x, y), end.level_at(x, y)) << x << ", " << y;
 }
 
+TEST_F(StreamWithViewers, WhatChangesAllTheTimeDoesNotKeepAwayWhatIsLacking) {
+  Tiles now = whole_tree();
+  std::uint32_t revision = 1;
+  const auto first = scene_of(now, revision);
+  TestViewer viewer(first, cache_, pool_);
+  viewer.stream().subscribe({});
+  viewer.stream().set_plan(plan_with_alpha(*first, 0.5));
+  // Between two changes of the root there is time for geometry and colours of one tile.
+  constexpr std::size_t kFramesBetween = 2;
+  std::size_t root_count = 0;
+  for (std::size_t turn = 0; turn < 2 * now.size() + 2; ++turn) {
+    for (std::size_t taken = 0; taken < kFramesBetween;) {
+      wait_until_idle(pool_);
+      const std::size_t count = viewer.take(kFramesBetween - taken);
+      if (count == 0) break;
+      taken += count;
+    }
+    change(now, {0, 0, 0, 0});
+    viewer.stream().set_scene(std::make_shared<FakeScene>(now, ++revision, *first));
+  }
+  for (const auto& frame : viewer.frames)
+    root_count += frame.kind == FrameKind::Geometry && frame.tile.level == 0 ? 1 : 0;
+  EXPECT_EQ(viewer.tiles.size(), now.size()) << "everything came in turn with the root";
+  EXPECT_GE(root_count, 4U) << "in turn with its quarters, which are drawn in its place then";
+}
+
 /// The tiles of a map that comes after another: what has changed is new, never one that was there before.
 Tiles successors(const Tiles& before, const Tiles& next) {
   Tiles result;
