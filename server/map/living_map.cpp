@@ -304,12 +304,9 @@ MapVersion LivingMap::version(std::uint32_t revision) {
       (percentiles_->minimum != version.summary.minimum || percentiles_->maximum != version.summary.maximum)) {
     percentiles_.reset();
   }
-  if (is_reference_good(version)) {
-    version.reference = reference_;
-  } else {
-    // It becomes the reference, and a greeting must not wait for its percentiles.
-    count_percentiles(version);
-  }
+  if (is_reference_good(version)) version.reference = reference_;
+  // The first greeting must not wait for them; later ones are counted by whoever asks, once.
+  if (!reference_) count_percentiles(version);
   version.percentiles = percentiles_;
   return version;
 }

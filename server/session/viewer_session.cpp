@@ -113,7 +113,7 @@ void ViewerSession::opened() {
   robot_subscription_ = served_.robot.subscribe([post] { post([](ViewerSession& self) { self.tell_robot(); }); });
 
   scene_ = served_.scenes.current();
-  // The scene has the histogram of percentiles already, so this takes microseconds.
+  // The scene has the histogram of percentiles already, nearly always, so this takes microseconds.
   const auto temperature = temperature_of(scene_);
   plan_ = fusion::FusionPlan::prepare(fusion::first_view_settings(temperature.summary), temperature).value();
   if (scene_) begin_stream();
