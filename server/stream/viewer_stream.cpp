@@ -51,6 +51,7 @@ void ViewerStream::go_on(const std::function<void()>& action) {
       preparation_.look_up(*slot, demand_);
     }
     post_jobs();
+    tiles_.remove_succeeded(order_.slots(), demand_);
     if (!has_news()) return;
   }
   wake();
@@ -343,17 +344,13 @@ TileSlot* ViewerStream::head() {
 }
 
 bool ViewerStream::is_complete() {
-  if (closed_ || !subscribed_ || !is_complete_due_ || !demand_.plan || head() != nullptr || is_refining_due())
-    return false;
-  if (!demand_.fused && raw_.head(demand_)) return false;
-  // All that they may have stood in for has come.
-  tiles_.remove_leaving();
-  return !tiles_.has_removals();
+  return !closed_ && subscribed_ && is_complete_due_ && demand_.plan && !tiles_.has_removals() &&
+         !tiles_.has_leaving() && head() == nullptr && !is_refining_due() && (demand_.fused || !raw_.head(demand_));
 }
 
 bool ViewerStream::has_news() {
   if (!subscribed_) return false;
-  if (is_complete() || tiles_.has_removals() || (head() == nullptr && is_refining_due())) return true;
+  if (tiles_.has_removals() || is_complete() || (head() == nullptr && is_refining_due())) return true;
   const TileSlot* slot = head();
   if (slot != nullptr) return slot->work == TileSlot::Work::Ready;
   const auto due = raw_.head(demand_);

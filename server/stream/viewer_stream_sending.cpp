@@ -60,7 +60,7 @@ std::optional<OutgoingFrame> ViewerStream::next_frame(double now_s) {
   const std::lock_guard lock(mutex_);
   wake_pending_ = false;
   if (!may_work()) return std::nullopt;
-  tiles_.remove_succeeded(demand_);
+  tiles_.remove_succeeded(order_.slots(), demand_);
   if (tiles_.has_removals()) return next_removal(now_s);
   if (head() == nullptr) refine();
   while (TileSlot* slot = head()) {
@@ -119,9 +119,10 @@ ViewerStream::Attempt ViewerStream::next_geometry(TileSlot& slot, double now_s) 
   tiles_.give_geometry(slot, name, demand_.geometry_epoch);
   auto frame = given_out(prepared_header_of(slot, FrameKind::Geometry), slot.prepared.geometry->payload, now_s);
   if (!demand_.fused) {
-    // Nothing more of the tile follows in this lane.
+    // Nothing more of the tile follows in this lane. Raw layers may have gone on without it, because it waited for theirs.
     note_geometry(slot);
     tiles_.put_down(slot);
+    raw_.rewind();
   }
   return {std::move(frame)};
 }

@@ -354,17 +354,18 @@ void ViewerTiles::remove_from_viewer(TileSlot& slot) {
   count_prepared(slot);
 }
 
-void ViewerTiles::remove_succeeded(const Demand& demand) {
+void ViewerTiles::remove_succeeded(std::span<const std::shared_ptr<TileSlot>> wanted, const Demand& demand) {
   if (leaving_.empty()) return;
   const auto is_to_come = [&](const TileSlot& slot) {
     if (!slot.wish.is_target) return false;
     return !is_satisfied(slot, demand) || (!demand.fused && slot.lacks_raw_layers(demand));
   };
-  std::set<TileId> to_come, outdated_masks;
-  for (const auto& slot : slots_) {
-    if (is_to_come(*slot)) to_come.insert(slot->tile->id);
-    const bool is_held = slot->wish.is_wanted && slot->held.wire_revision != 0;
-    if (is_held && slot->held.child_mask != slot->tile->child_mask) outdated_masks.insert(slot->tile->id);
+  std::map<TileId, base::Bounds> to_come;
+  std::set<TileId> outdated_masks;
+  for (const auto& slot : wanted) {
+    if (is_to_come(*slot)) to_come.emplace(slot->tile->id, slot->tile->bounds);
+    const bool is_outdated = slot->held.wire_revision != 0 && slot->held.child_mask != slot->tile->child_mask;
+    if (is_outdated && slot->failed.geometry_epoch != demand.geometry_epoch) outdated_masks.insert(slot->tile->id);
   }
   // Without it the tile that names it would be drawn instead of its other children.
   const auto is_named = [&](TileId id) {
@@ -378,10 +379,8 @@ void ViewerTiles::remove_succeeded(const Demand& demand) {
     auto& [id, leaving] = *left;
     if (!leaving.successors) {
       leaving.successors.emplace();
-      for (const auto& slot : slots_) {
-        if (to_come.contains(slot->tile->id) && base::overlap(slot->tile->bounds, leaving.bounds)) {
-          leaving.successors->insert(slot->tile->id);
-        }
+      for (const auto& [successor, bounds] : to_come) {
+        if (base::overlap(bounds, leaving.bounds)) leaving.successors->insert(successor);
       }
     }
     std::erase_if(*leaving.successors, [&](const TileId& successor) { return !to_come.contains(successor); });

@@ -185,10 +185,10 @@ class ViewerTiles {
   void forget_all_held();
 
   void remove_from_viewer(TileSlot& slot);
-  /// Removes tiles that are no longer part of the scene and whose places are drawn by those of now, as far as these are wanted.
-  void remove_succeeded(const Demand& demand);
-  /// The same, whatever is drawn in their places.
-  void remove_leaving();
+  /// Removes tiles that are no longer part of the scene and whose places are drawn by those of now, of which `wanted` are wanted.
+  void remove_succeeded(std::span<const std::shared_ptr<TileSlot>> wanted, const Demand& demand);
+  /// There are some left.
+  bool has_leaving() const { return !leaving_.empty(); }
   /// Removes tiles that are not wanted, the longest unwanted first, until what is wanted and what is held beside it
   /// takes at most so many bytes, decoded.
   void remove_surplus(std::uint64_t most_bytes);
@@ -206,8 +206,8 @@ class ViewerTiles {
   struct Leaving {
     base::Bounds bounds;
     TileSlot::Held held;
-    std::optional<std::set<protocol::TileId>>
-        successors;  ///< Those that are still to come; nothing before they are known.
+    /// Those in its place that are still to come; nothing before they are known.
+    std::optional<std::set<protocol::TileId>> successors;
   };
 
   /// A tile of which the viewer holds something takes the place of one of before.
@@ -216,6 +216,7 @@ class ViewerTiles {
   bool is_anything_beneath(const TileSlot& slot) const;
   /// The viewer draws it, because it lacks some of those that it names.
   bool is_drawn(const TileSlot& slot, const Demand& demand) const;
+  void remove_leaving();
   /// Whenever what is prepared of a slot or held of it has changed.
   void count_prepared(TileSlot& slot);
   bool are_children_drawable(const TileSlot& slot) const;

@@ -308,6 +308,12 @@ TEST_F(StreamWithViewers, AMapThatChangesFasterThanItComesIsTheLastOneInTheEnd) 
     for (const auto& tile : last->tiles()) wanted.insert(tile->id);
     for (const auto& [id, tile] : viewer.tiles) held.insert(id);
     EXPECT_EQ(held, wanted) << "round " << round;
+    // What is drawn in the end has its raw layers.
+    for (const auto& tile : last->tiles()) {
+      if (!is_raw || tile->child_mask != 0) continue;
+      EXPECT_EQ(viewer.tiles.at(tile->id).visible.size(), tile->positions.size()) << "round " << round;
+      EXPECT_EQ(viewer.tiles.at(tile->id).temperature.codes.size(), tile->positions.size()) << "round " << round;
+    }
   }
 }
 
