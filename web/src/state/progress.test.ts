@@ -93,6 +93,26 @@ describe('the progress of a picture', () => {
     expect(store.behindSince).toBe(3000);
   });
 
+  it('keeps little of a map that is never complete, and never says that less is missing than is', () => {
+    const { store, clock, progress } = setUp();
+    const announced: number[] = [];
+    for (let revision = 0; revision < 40_000; revision += 1) {
+      clock.now = announced[revision] = 1000 + revision * 200;
+      store.scene = { revision } as Scene;
+      progress.begin();
+    }
+    const since: number[] = [];
+    for (let revision = 0; revision < 39_999; revision += 1) {
+      progress.completed({ generation: 0, scene_revision: revision } as StreamComplete, revision + 1);
+      progress.drawn(revision + 1);
+      expect(store.behindSince).toBeLessThanOrEqual(announced[revision + 1]!);
+      if (store.behindSince !== since.at(-1)) since.push(store.behindSince!);
+      if (revision % 1000 === 999)
+        expect(announced[revision + 1]! - store.behindSince!).toBeLessThan(0.02 * announced[revision]!);
+    }
+    expect(since.length).toBeLessThan(1000);
+  });
+
   it('is not at its end while the scene is another one than that of the picture', () => {
     const { store, progress } = setUp();
     store.link = { phase: 'open' };

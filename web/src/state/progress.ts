@@ -1,6 +1,8 @@
 import type { StreamComplete } from '../protocol/messages';
 import type { Store } from './store.svelte';
 
+/** Since when a revision is missing is kept to this share of the time since the oldest is: of a map that is never complete there are a few hundred. */
+const EXACT_SHARE = 0.01;
 /** Over which the rate is taken. */
 const RATE_MS = 2000;
 
@@ -38,8 +40,11 @@ export class Progress {
     const isBehind = this.store.behindSince !== null;
     this.#mayBeRefused = mayBeRefused && (!isBehind || this.#mayBeRefused);
     const { revision } = this.store.scene ?? { revision: 0 };
-    if ((this.#missing.at(-1)?.revision ?? -1) >= revision) return;
-    this.#missing.push({ at: this.now(), revision, bytes: this.store.received_bytes });
+    const [at, oldest, newest] = [this.now(), this.#missing[0], this.#missing.at(-1)];
+    if (newest !== undefined && at - newest.at < EXACT_SHARE * (at - oldest!.at))
+      newest.revision = Math.max(newest.revision, revision);
+    if ((newest?.revision ?? -1) >= revision) return;
+    this.#missing.push({ at, revision, bytes: this.store.received_bytes });
     this.store.behindSince = this.#missing[0]!.at;
   }
 
