@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -65,6 +66,11 @@ base::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusi
   BOOST_OUTCOME_TRY(
       const auto losses,
       exports::write_scene_file(options.output, mesh, exports::fused_colours(mesh, plan), file, line.sink()));
+  const auto has = [](std::string_view id) { return [id](const files::Note& note) { return note.id == id; }; };
+  // The scene keeps vertices of no triangle, which it says; where the file does not, that is what counts.
+  if (std::any_of(losses.begin(), losses.end(), has("left_out_vertices"))) {
+    std::erase_if(notes, has("unreferenced_vertices"));
+  }
   notes.insert(notes.end(), losses.begin(), losses.end());
   return FusedFacts{std::move(notes), scene->temperature().summary};
 }

@@ -34,27 +34,35 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
       counted(file.added_triangle_count, "triangle", "triangles") +
           " of one vertex added after the others: programs open no mesh of more vertices than three for each triangle");
   if (options.keeping == protocol::codec::DracoKeeping::Everything) return losses;
-  const float coarsest_m = std::max(options.position_step_m, options.largest_position_step_m);
-  std::string rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m),
-                                    coarsest_m > options.position_step_m ? ", finer where the form is finer" : "");
-  if (file.temperature_step_celsius > 0) {
-    rounded += fmt::format(", temperatures to {:g} degC", file.temperature_step_celsius);
+  std::string rounded;
+  const float coarsest_m = std::max(file.position_step_m, options.largest_position_step_m);
+  if (coarsest_m > 0) {
+    std::string_view elsewhere;
+    if (coarsest_m > file.position_step_m)
+      elsewhere = file.position_step_m > 0 ? ", finer where the form is finer" : " or finer";
+    rounded = fmt::format("positions are rounded to {:.4g} mm{}", 1000 * static_cast<double>(coarsest_m), elsewhere);
   }
-  losses.push_back({"rounded_values", 0, "In the file " + rounded + "; --lossless keeps every value as it is"});
+  if (file.temperature_step_celsius > 0) {
+    rounded += fmt::format("{}temperatures {}to {:g} degC", rounded.empty() ? "" : ", ",
+                           rounded.empty() ? "are rounded " : "", file.temperature_step_celsius);
+  }
+  add("rounded_values", rounded.empty() ? 0 : 1, "In the file " + rounded + "; --lossless keeps every value as it is");
+  add("no_lattice", file.position_step_m > 0 ? 0 : 1,
+      "No lattice as fine as the scene needs reaches all of it: positions are written as floats, which makes the file "
+      "larger");
   add("over_range_written", file.over_range_count,
       fmt::format("In the file {} over range {} {:g} degC", counted(file.over_range_count, "vertex", "vertices"),
                   file.over_range_count == 1 ? "has" : "have", file.over_range_celsius));
   add("under_range_written", file.under_range_count,
       fmt::format("In the file {} under range {} {:g} degC", counted(file.under_range_count, "vertex", "vertices"),
                   file.under_range_count == 1 ? "has" : "have", file.under_range_celsius));
-  add("no_lattice", file.position_step_m > 0 ? 0 : 1,
-      "In the file positions are floats, which makes it larger: the scene reaches too far for one lattice of its own "
-      "step");
   if (file.kept == protocol::codec::DracoKeeping::Order) return losses;
   losses.push_back({"vertex_order", 0,
                     "In the file vertices and triangles have an order of their own; --keep-order keeps the scene's"});
   add("left_out_vertices", file.left_out_vertex_count,
-      counted(file.left_out_vertex_count, "vertex", "vertices") + " of no triangle left out; --keep-order keeps them");
+      "In the file " + counted(file.left_out_vertex_count, "vertex", "vertices") + " of no triangle " +
+          (file.left_out_vertex_count == 1 ? "is" : "are") + " left out" +
+          (file.temperature_step_celsius > 0 ? ", though their temperatures count" : "") + "; --keep-order keeps them");
   add("merged_vertices", file.merged_vertex_count,
       counted(file.merged_vertex_count, "vertex", "vertices") +
           " merged with others of the same place and values, which triangles share; --keep-order keeps them");
@@ -63,7 +71,7 @@ std::vector<files::Note> losses_of(const protocol::codec::DracoFile& file, const
           " with the same vertex twice left out; --keep-order keeps them");
   add("split_vertices", file.split_vertex_count,
       counted(file.split_vertex_count, "vertex", "vertices") +
-          " more than in the scene: where surfaces touch in a vertex each has its own; --keep-order keeps the number");
+          " added: where surfaces touch in a vertex each has its own; --keep-order keeps the number");
   return losses;
 }
 

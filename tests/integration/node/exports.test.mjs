@@ -185,6 +185,22 @@ test("three.js reads the Draco file: every triangle once, where the one in the s
   assert.equal(identityOf(await loadedDraco(output)), identityOf(order));
 });
 
+test("of vertices of no triangle a Draco file is said to keep what it keeps", () => {
+  const input = written("loose.ply", {
+    header: [...kFloats, "float temperature"],
+    vertices: [[0, 0, 0, 20], [1, 0, 0, 21], [0, 1, 0.5, 22], [0.5, 0.5, 0.5, 23]],
+    triangles: [[0, 1, 2]],
+  });
+  const kept = /1 vertex of no triangle: not drawn, though kept/;
+  const leftOut = /In the file 1 vertex of no triangle is left out, though their temperatures count; --keep-order keeps them/;
+  const small = fused("drc", input).said;
+  assert.match(small, leftOut);
+  assert.doesNotMatch(small, kept);
+  const ordered = fused("drc", input, "--keep-order").said;
+  assert.match(ordered, kept);
+  assert.doesNotMatch(ordered, leftOut);
+});
+
 test("a Draco file keeps what is small in a large scene", async () => {
   // A map of 2 km with vertices every 20 m, and in it a bowl of 5 cm.
   const vertices = [];

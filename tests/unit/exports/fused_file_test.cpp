@@ -255,6 +255,65 @@ TEST(RoundForFile, KeepsTheFormBesideATriangleFarAway) {
   }
 }
 
+/// What is said of the losses of a Draco file.
+std::string said_of(const mesh::MultispectralMesh& mesh, SceneFileOptions options) {
+  options.format = SceneFileFormat::Draco;
+  const auto file = scene_file(mesh, std::vector<base::Rgb8>(mesh.vertex_count()), options);
+  EXPECT_TRUE(file) << file.error().message;
+  std::string said;
+  for (const files::Note& loss : file.value().losses) said += loss.message + '\n';
+  return said;
+}
+
+TEST(LossesOfADracoFile, SayOfPositionsWhatBecameOfThem) {
+  auto mesh = two_triangles();
+  mesh.triangles().push_back({0, 1, 3});
+  const auto said = [&](float step_m, float largest_step_m) {
+    return said_of(mesh, {.keeping = protocol::codec::DracoKeeping::Order,
+                          .position_step_m = step_m,
+                          .largest_position_step_m = largest_step_m});
+  };
+  const std::string more = "; --lossless keeps every value as it is\n";
+  const std::string no_lattice =
+      "No lattice as fine as the scene needs reaches all of it: positions are written as floats, which makes the file "
+      "larger\n";
+  EXPECT_EQ(said(0.25F, 0.25F), "In the file positions are rounded to 250 mm, temperatures to 0.015625 degC" + more);
+  EXPECT_EQ(said(0.25F, 0.5F),
+            "In the file positions are rounded to 500 mm, finer where the form is finer, "
+            "temperatures to 0.015625 degC" +
+                more);
+  EXPECT_EQ(said(0, 0), "In the file temperatures are rounded to 0.015625 degC" + more + no_lattice);
+  EXPECT_EQ(said(0, 0.5F),
+            "In the file positions are rounded to 500 mm or finer, temperatures to 0.015625 degC" + more + no_lattice);
+  mesh.has_temperature = false;
+  EXPECT_EQ(said(0, 0), no_lattice) << "nothing is rounded";
+}
+
+TEST(LossesOfADracoFile, AddUpToTheVerticesOfTheFile) {
+  // Two triangles that touch in a vertex, two that share none, and a vertex of no triangle.
+  auto mesh = two_triangles();
+  mesh.has_temperature = false;
+  mesh.resize_vertices(12);
+  const std::array<base::Vec3f, 12> positions{{{0, 0, 0},
+                                               {1, 0, 0},
+                                               {0, 1, 0},
+                                               {-1, 0, 0},
+                                               {0, -1, 0},
+                                               {9, 9, 9},
+                                               {5, 0, 0},
+                                               {6, 0, 0},
+                                               {5, 1, 0},
+                                               {6, 0, 0},
+                                               {6, 1, 0},
+                                               {5, 1, 0}}};
+  std::copy(positions.begin(), positions.end(), mesh.positions().begin());
+  mesh.triangles() = {{0, 1, 2}, {0, 3, 4}, {6, 7, 8}, {9, 10, 11}};
+  const std::string said = said_of(mesh, {.position_step_m = 0.25F, .largest_position_step_m = 0.25F});
+  EXPECT_NE(said.find("\nIn the file 1 vertex of no triangle is left out; --keep-order"), std::string::npos) << said;
+  EXPECT_NE(said.find("\n2 vertices merged with others"), std::string::npos) << said;
+  EXPECT_NE(said.find("\n1 vertex added: where surfaces touch"), std::string::npos) << said;
+}
+
 TEST(TemperatureOfMesh, LeavesMissingValuesOut) {
   const auto mesh = two_triangles();
   const auto temperature = temperature_of(mesh);
