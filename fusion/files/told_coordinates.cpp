@@ -30,9 +30,24 @@ bool is_denied(const std::vector<std::string>& words, std::size_t at) {
          ((before == "square" || before == "cubic") && second == "per");
 }
 
+/// The one word of a comment that says nothing but a unit: "mm", "in inches", "everything is in mm". What may be the name of
+/// what was measured, or a mere letter, wants an "in" before it. Empty: it says something else.
+std::string lone_word(const std::vector<std::string>& words) {
+  constexpr std::array<std::string_view, 8> kBeside = {"in", "all", "everything", "is", "are", "unit", "units", "="};
+  constexpr std::array<std::string_view, 4> kAmbiguous = {"m", "um", "foot", "feet"};
+  const auto is_beside = [&kBeside](const std::string& word) {
+    return std::find(kBeside.begin(), kBeside.end(), word) != kBeside.end();
+  };
+  const auto word = std::find_if_not(words.begin(), words.end(), is_beside);
+  if (word == words.end() || !std::all_of(word + 1, words.end(), is_beside)) return {};
+  const bool is_ambiguous = std::find(kAmbiguous.begin(), kAmbiguous.end(), *word) != kAmbiguous.end();
+  return !is_ambiguous || (word != words.begin() && *(word - 1) == "in") ? *word : std::string();
+}
+
 bool speaks_of_metres(std::span<const std::string> comments) {
   return std::any_of(comments.begin(), comments.end(), [](const std::string& comment) {
     const std::vector<std::string> words = comment_words(comment);
+    if (lone_word(words) == "m") return true;
     for (std::size_t i = 0; i < words.size(); ++i) {
       const std::string& word = words[i];
       const bool is_metre = word.starts_with("metre") || word.starts_with("meter");
@@ -58,6 +73,20 @@ constexpr std::array<UnitWords, 5> kUnits = {
      {{"feet", "0.3048"}, {"foot", "feet", "ft"}},
      {{"micrometres", "0.000001"}, {"um", "micrometre", "micrometres", "micrometer", "micrometers", "microns"}}}};
 
+/// The unit that a comment says and nothing else, where no other says another.
+std::string_view lone_unit(std::span<const std::string> comments) {
+  std::string_view told;
+  for (const std::string& comment : comments) {
+    const std::string word = lone_word(comment_words(comment));
+    for (const auto& [unit, unit_words] : kUnits) {
+      if (word.empty() || std::find(unit_words.begin(), unit_words.end(), word) == unit_words.end()) continue;
+      if (!told.empty() && told != unit.name) return {};
+      told = unit.name;
+    }
+  }
+  return told;
+}
+
 /// The unit of length that a comment gives the positions. A bare "2 mm" may be the accuracy of a scanner.
 std::string_view unit_told(std::span<const std::string> comments) {
   const auto is_about_all = [](const std::string& word) {
@@ -81,7 +110,7 @@ std::string_view unit_told(std::span<const std::string> comments) {
       }
     }
   }
-  return {};
+  return lone_unit(comments);
 }
 
 }  // namespace

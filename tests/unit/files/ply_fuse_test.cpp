@@ -150,6 +150,7 @@ TEST(PlyFuse, SaysAgainWhatWasToldOfTheCoordinates) {
            {"comment units = um\n", {}, {}, "comment positions in micrometres\n"},
            {"comment unit: ft\n", {}, {}, "comment positions in feet\n"},
            {"comment values in cm\n", {}, {}, "comment positions in centimetres\n"},
+           {"comment in inches\n", {}, {}, "comment positions in inches\n"},
            {"comment x up\ncomment y up\n", {}, {}, ""},
            {"comment x up\n", base::UpAxis::MinusX, {}, "comment up -x\n"},
            {"comment x up\ncomment units: mm\n", {}, 0.001, "comment up x; positions in metres\n"},

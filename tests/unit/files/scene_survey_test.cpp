@@ -187,7 +187,7 @@ TEST(SceneSurvey, NoticesMillimetresWhereTheyArePlausible) {
   in_metres.comments = {"comment xyz metres; a quarry"};
   EXPECT_FALSE(is_noticed(std::move(in_metres)));
   LoadedScene about_millimetres = sheet(3000, 400, 2);
-  about_millimetres.comments = {"comment millimetres", "comment parameters"};
+  about_millimetres.comments = {"comment accuracy 2 millimetres", "comment parameters"};
   EXPECT_TRUE(is_noticed(std::move(about_millimetres)));
   LoadedScene on_a_map = sheet(3000, 400, 2);
   on_a_map.mesh.origin = {412345, 5461234, 0};
@@ -219,6 +219,12 @@ TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
   }
   EXPECT_FALSE(is_metric({"comment m"})) << "a letter, unless it is said to be the unit";
   EXPECT_FALSE(is_metric({"comment units: m of a map"}));
+  EXPECT_TRUE(is_metric({"comment in m"}));
+  EXPECT_TRUE(is_metric({"comment units: m."}));
+  EXPECT_FALSE(is_metric({"comment in m, as of 2020"}));
+  for (const char* line : {"comment units: \xC2\xB5m", "comment units: \xCE\xBCm", "comment units: \xB5m"}) {
+    EXPECT_FALSE(is_metric({line})) << "a millionth of it";
+  }
   EXPECT_TRUE(is_metric({}, 0.001));
   EXPECT_TRUE(is_metric({}, 1)) << "said, although it changes nothing";
 }
@@ -248,11 +254,37 @@ TEST(SceneSurvey, NamesTheScaleOfTheUnitThatCommentsTell) {
   EXPECT_EQ(said("comment lengths in ft"), "--scale 0.3048 makes metres of them");
   EXPECT_EQ(said("comment units: um"), "--scale 0.000001 makes metres of them");
   for (const char* line :
-       {"comment accuracy 2 mm", "comment points every 5 mm", "comment values in order", "comment mm",
-        "comment unit: metre", "comment units in use", "comment scale 0.001 (mm to m)", "comment a foot"}) {
+       {"comment mm", "obj_info mm", "comment in mm", "comment [mm]", "comment Millimetres.", "comment all in mm",
+        "comment everything is in millimeters", "comment mm units", "comment coordinates in mm."}) {
+    EXPECT_EQ(said(line), "--scale 0.001 makes metres of them") << line;
+  }
+  EXPECT_EQ(said("comment inches"), "--scale 0.0254 makes metres of them");
+  EXPECT_EQ(said("comment in inches"), "--scale 0.0254 makes metres of them");
+  EXPECT_EQ(said("obj_info in feet"), "--scale 0.3048 makes metres of them");
+  EXPECT_EQ(said("comment units: \xC2\xB5m"), "--scale 0.000001 makes metres of them");
+  for (const char* line : {"comment foot", "comment feet", "comment um", "comment in", "comment in in", "comment mm 2",
+                           "comment in mm, roughly", "comment accuracy in mm", "comment mm cm", "comment not in mm"}) {
+    EXPECT_EQ(said(line), "") << line;
+  }
+  for (const char* line :
+       {"comment accuracy 2 mm", "comment points every 5 mm", "comment values in order", "comment unit: metre",
+        "comment units in use", "comment scale 0.001 (mm to m)", "comment a foot"}) {
     EXPECT_EQ(said(line), "") << line;
   }
   EXPECT_EQ(said("comment units: mm", 0.001), "");
+}
+
+TEST(SceneSurvey, TakesALoneUnitOnlyWhereNothingElseSaysAnother) {
+  const auto unit = [](std::vector<std::string> comments) {
+    LoadedScene scene = sheet(3, 0.4, 2);
+    scene.comments = std::move(comments);
+    survey(scene);
+    return scene.mesh.told.unit;
+  };
+  EXPECT_EQ(unit({"comment made by hand", "comment inches", "comment in inches"}), "inches");
+  EXPECT_EQ(unit({"comment inches", "comment mm"}), "");
+  EXPECT_EQ(unit({"comment inches", "comment units: mm"}), "millimetres");
+  EXPECT_EQ(unit({"comment mm", "comment converted to metres"}), "metres");
 }
 
 TEST(SceneSurvey, BearsScenesOfNothing) {
