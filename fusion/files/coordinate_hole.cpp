@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -75,7 +76,19 @@ class Finder {
       const double high = -highest.value;
       judge({axis, low, lowest.count, lowest.next - low, high - lowest.next}, holes);
       if (!holes.certain) judge({axis, high, highest.count, high + highest.next, -highest.next - low}, holes);
-      if (holes.certain) return {holes.certain, std::nullopt};
+      const double low_gap = lowest.next - low, high_gap = high + highest.next;
+      const double between = -highest.next - lowest.next;
+      const bool are_both_shared = lowest.count >= kFewestInAHole && highest.count >= kFewestInAHole;
+      if (!holes.certain && are_both_shared && between >= 0 && std::min(low_gap, high_gap) > between) {
+        const CoordinateHoles of_low = without({axis, low, lowest.count, low_gap, between}, high);
+        const CoordinateHoles of_high = without({axis, high, highest.count, high_gap, between}, low);
+        if (of_low.certain && of_high.certain) holes.certain = of_low.certain;
+        if (!of_low.possible.empty() && !of_high.possible.empty()) {
+          holes.possible.push_back(of_low.possible.front());
+          holes.possible.push_back(of_high.possible.front());
+        }
+      }
+      if (holes.certain) return {holes.certain, {}};
     }
     return holes;
   }
@@ -99,6 +112,16 @@ class Finder {
     bool is_used = false;
   };
 
+  /// What is found of a number at one end where those at the other are no vertices.
+  CoordinateHoles without(const Candidate& candidate, double other_end) const {
+    std::vector<SampledVertex> rest;
+    std::copy_if(vertices_.begin(), vertices_.end(), std::back_inserter(rest),
+                 [&](const SampledVertex& vertex) { return vertex.position.*kAxes[candidate.axis] != other_end; });
+    CoordinateHoles holes;
+    Finder(rest, metres_, is_used_).judge(candidate, holes);
+    return holes;
+  }
+
   void judge(const Candidate& candidate, CoordinateHoles& holes) const {
     if (candidate.count < kFewestInAHole || vertices_.size() - candidate.count < kFewestElsewhere) return;
     if (!(candidate.gap > candidate.range_of_others)) return;
@@ -110,7 +133,7 @@ class Finder {
     if (is_certain(candidate, kind, evidence)) {
       holes.certain = hole;
     } else if (is_possible(candidate, kind, evidence)) {
-      holes.possible = {hole, static_cast<double>(candidate.count) / static_cast<double>(vertices_.size())};
+      holes.possible.push_back({hole, static_cast<double>(candidate.count) / static_cast<double>(vertices_.size())});
     }
   }
 
@@ -198,7 +221,10 @@ class Finder {
 
 bool stands_for_none(const base::Vec3d& place, double sizes, bool is_used) {
   if (!(sizes > 1)) return false;
-  if (!is_used || sizes > kFartherThanAnyForm) return true;
+  return !is_used || sizes > kFartherThanAnyForm || is_written_for_none(place);
+}
+
+bool is_written_for_none(const base::Vec3d& place) {
   const bool is_one_number = place.x == place.y && place.y == place.z;
   return std::all_of(kAxes.begin(), kAxes.end(), [&](const auto axis) {
     const double number = place.*axis;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "fusion/base/vertex_types.hpp"
 
@@ -37,15 +38,17 @@ using IsUsed = std::function<bool(std::uint64_t vertex)>;
 
 struct CoordinateHoles {
   std::optional<Hole> certain;
-  std::optional<SharedCoordinate> possible;  ///< Only where there is no certain one.
+  std::vector<SharedCoordinate> possible;  ///< Only where there is no certain one.
 };
 
 /// Whether a place of very many vertices (in the numbers of the file), that is `sizes` times as far from the others as those are
 /// large, stands for "no position". Not the tip of a cone whose triangles share no vertices: what triangles use must be 0 0 0,
 /// a number that is written for none, or 1000 times as far away as the scene is large.
 bool stands_for_none(const base::Vec3d& place, double sizes, bool is_used);
+/// Its numbers (of the file) alone say so.
+bool is_written_for_none(const base::Vec3d& place);
 
-/// The numbers that stand for "not measured" in one coordinate: a dozen vertices share them exactly, farther from all others
+/// The number that stands for "not measured" in one coordinate (of several, each certain, one: the rest when that is taken out): a dozen vertices share them exactly, farther from all others
 /// than those are from each other. A true form has such numbers too (both ends of a pipe, a base far below), so that more
 /// must be there:
 ///
@@ -57,7 +60,7 @@ bool stands_for_none(const base::Vec3d& place, double sizes, bool is_used);
 /// - any other: the same, but 1000 times where triangles use it;
 /// - or it is 1e9 times as far away as the scene is large.
 ///
-/// `metres` in one unit of the file.
+/// Two such numbers, one at either end, are judged each without the other. `metres` in one unit of the file.
 CoordinateHoles find_coordinate_holes(std::span<const SampledVertex> vertices, double metres, const IsUsed& is_used);
 
 }  // namespace spectra::files

@@ -202,13 +202,18 @@ void PlyBodyReader::conclude_positions(const PlyFaceReader& faces) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     facts_.is_finer_than_declared = facts_.is_finer_than_declared || (origin[axis] != 0 && has_more_digits_[axis]);
   }
-  facts_.shared_coordinate = sample_.shared_coordinate();
-  if (interpretation_.hole) return;
-  facts_.hole = sample_.coordinate_hole();
-  const auto& hole = sample_.hole();
-  if (!hole) return;
-  (hole->is_certain ? facts_.hole.emplace().place : facts_.crowded_place.emplace()) = hole->place;
-  facts_.is_crowded_place_used = hole->is_used;
+  facts_.shared_coordinates = sample_.shared_coordinates();
+  facts_.holes = sample_.coordinate_holes();
+  const std::vector<Hole>& known = interpretation_.holes;
+  for (const HolePlace& hole : sample_.holes()) {
+    if (std::any_of(known.begin(), known.end(), [&](const Hole& one) { return one.has(hole.place); })) continue;
+    // What is left out is settled.
+    if (hole.is_certain && known.empty()) {
+      facts_.holes.push_back({hole.place});
+    } else if (hole.is_suspect) {
+      facts_.crowded_places.push_back({hole.place, hole.is_used});
+    }
+  }
 }
 
 /// Brings the positions to metres, and finds those that are none.
@@ -228,9 +233,10 @@ void PlyBodyReader::judge_positions(std::span<base::Vec3d> positions, std::uint6
   sample_.add(first_vertex, positions);
   Box box{facts_.min, facts_.max};
   bool all_good = true;
-  const std::optional<Hole>& hole = interpretation_.hole;
-  if (hole) {
-    for (const base::Vec3d& p : positions) all_good = all_good && !hole->has(p);
+  const std::vector<Hole>& holes = interpretation_.holes;
+  facts_.hole_counts.resize(holes.size());
+  for (const Hole& hole : holes) {
+    for (const base::Vec3d& p : positions) all_good = all_good && !hole.has(p);
   }
   for (const base::Vec3d& p : positions) {
     all_good = all_good && is_position(p);
@@ -240,11 +246,12 @@ void PlyBodyReader::judge_positions(std::span<base::Vec3d> positions, std::uint6
     box = {facts_.min, facts_.max};
     if (is_left_out_.is_empty()) is_left_out_.resize(header_.find("vertex")->count);
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      const bool is_hole = hole && hole->has(positions[i]);
-      if (is_position(positions[i]) && !is_hole) {
+      const auto hole =
+          std::find_if(holes.begin(), holes.end(), [&](const Hole& one) { return one.has(positions[i]); });
+      if (is_position(positions[i]) && hole == holes.end()) {
         box.add(positions[i]);
       } else {
-        facts_.hole_count += is_hole ? 1U : 0U;
+        if (hole != holes.end()) ++facts_.hole_counts[static_cast<std::size_t>(hole - holes.begin())];
         left_out_.push_back(static_cast<std::uint32_t>(i));
         is_left_out_.set(first_vertex + i);
       }

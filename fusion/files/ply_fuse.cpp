@@ -56,7 +56,7 @@ base::Result<FirstPass> first_pass(PlyStream& stream) {
     return for_each_temperature(block, [&](std::span<const float> celsius) { temperatures->add(celsius); });
   };
   BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
-  if (stream.leave_out_hole(facts)) {
+  if (stream.leave_out_holes(facts)) {
     temperatures.emplace();
     BOOST_OUTCOME_TRY(facts, stream.read(handlers));
   }

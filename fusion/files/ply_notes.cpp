@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -67,7 +68,7 @@ class Notes {
         survey_(interpretation.survey),
         options_(options),
         facts_(facts),
-        hole_(interpretation.hole),
+        holes_(interpretation.holes),
         vertices_(*header.find("vertex")) {}
 
   std::vector<Note> take() {
@@ -96,41 +97,61 @@ class Notes {
   }
 
   void about_positions() {
-    const std::uint64_t nowhere_count = facts_.left_out_vertex_count - facts_.hole_count;
+    const std::uint64_t hole_count =
+        std::accumulate(facts_.hole_counts.begin(), facts_.hole_counts.end(), std::uint64_t{0});
+    const std::uint64_t nowhere_count = facts_.left_out_vertex_count - hole_count;
     add("left_out_vertices", nowhere_count,
         counted(nowhere_count, "vertex", "vertices") + " without a position (not a number, or beyond 1e30 m) left out");
-    if (facts_.hole_count > 0) {
-      add("hole_vertices", facts_.hole_count,
-          counted(facts_.hole_count, "vertex", "vertices") + hole_text() +
-              ", taken for holes and left out with their temperatures, like vertices without a position; written as "
-              "nan they need no guess");
-    }
-    if (facts_.crowded_place) {
-      add("crowded_place", 1,
-          "many vertices are in exactly one place, " + place_text(*facts_.crowded_place) +
-              (facts_.is_crowded_place_used
-                   ? ", and faces use them, so that they are kept; where they stand for holes, write nan there or "
-                     "leave them out of the faces"
-                   : ", among the others, so that they are kept; where they stand for holes, write nan or 0 0 0 "
-                     "there"));
-    }
-    if (facts_.shared_coordinate) {
-      constexpr double kPercent = 100;
-      const auto& [as_hole, share] = *facts_.shared_coordinate;
-      add("shared_coordinate", 1,
-          short_number(std::max(0.1, std::round(10 * kPercent * share) / 10)) + " % of the vertices share " +
-              axis_text(as_hole, " = ") +
-              ", far from all others, and are kept; where they stand for holes, write nan or -9999 there");
-    }
+    add("hole_vertices", hole_count,
+        counted(hole_count, "vertex", "vertices") + holes_text() +
+            ", taken for holes and left out with their temperatures, like vertices without a position; written as "
+            "nan they need no guess");
+    add("crowded_place", facts_.crowded_places.size(), crowded_text());
+    add("shared_coordinate", facts_.shared_coordinates.size(), shared_text());
     add("left_out_faces", facts_.faces.left_out_face_count,
         counted(facts_.faces.left_out_face_count, "face", "faces") + " of vertices without a position left out");
     about_rounding();
   }
 
   /// What tells the holes, in the numbers of the file.
-  std::string hole_text() const {
-    if (hole_->axes == std::array{true, true, true}) return " in exactly one place, " + place_text(hole_->place);
-    return " whose " + axis_text(*hole_, " is ");
+  std::string holes_text() const {
+    std::string text;
+    for (std::size_t i = 0; i < facts_.hole_counts.size(); ++i) {
+      const Hole& hole = holes_[i];
+      const std::string one = hole.axes == std::array{true, true, true}
+                                  ? " in exactly one place, " + place_text(hole.place)
+                                  : " whose " + axis_text(hole, " is ");
+      if (facts_.hole_counts.size() == 1) return one;
+      if (facts_.hole_counts[i] == 0) continue;
+      text += (text.empty() ? " (" : "; ") + std::to_string(facts_.hole_counts[i]) + one;
+    }
+    return text + ')';
+  }
+  std::string crowded_text() const {
+    std::string text;
+    for (const bool is_used : {true, false}) {
+      std::string places;
+      std::size_t count = 0;
+      for (const CrowdedPlace& one : facts_.crowded_places) {
+        if (one.is_used == is_used) places += (count++ == 0 ? "" : " and in ") + place_text(one.place);
+      }
+      if (count == 0) continue;
+      text += std::string(text.empty() ? "" : "; ") + "many vertices are in exactly one place, " + places +
+              (is_used ? ", and faces use them, so that they are kept; where they stand for holes, write nan there or "
+                         "leave them out of the faces"
+                       : ", among the others, so that they are kept; where they stand for holes, write nan or 0 0 0 "
+                         "there");
+    }
+    return text;
+  }
+  std::string shared_text() const {
+    std::string text;
+    for (const auto& [as_hole, share] : facts_.shared_coordinates) {
+      constexpr double kPercent = 100;
+      text += (text.empty() ? "" : ", and ") + short_number(std::max(0.1, std::round(10 * kPercent * share) / 10)) +
+              " % of the vertices share " + axis_text(as_hole, " = ");
+    }
+    return text + ", far from all others, and are kept; where they stand for holes, write nan or -9999 there";
   }
   std::string axis_text(const Hole& hole, const char* is) const {
     for (const auto& [slot, axis, name] : {std::tuple{kX, 0U, "x"}, std::tuple{kY, 1U, "y"}, std::tuple{kZ, 2U, "z"}}) {
@@ -451,7 +472,7 @@ class Notes {
   const PlySurvey& survey_;
   const ReadOptions& options_;
   const PlyBodyFacts& facts_;
-  const std::optional<Hole>& hole_;
+  const std::vector<Hole>& holes_;
   const PlyElement& vertices_;
   std::vector<Note> notes_;
 };

@@ -171,7 +171,7 @@ base::Result<LoadedScene> read_ply(const std::filesystem::path& path, const Read
     return base::success();
   };
   BOOST_OUTCOME_TRY(PlyBodyFacts facts, stream.read(handlers));
-  if (stream.leave_out_hole(facts)) {
+  if (stream.leave_out_holes(facts)) {
     kept_count = 0;
     mesh.confidence = {};
     mesh.left_out.clear();

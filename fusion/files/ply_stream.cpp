@@ -198,9 +198,9 @@ base::Result<PlyBodyFacts> PlyStream::read(const PlyHandlers& handlers) {
   return reader.handler_has_failed() ? std::move(facts) : located(with_reason(std::move(facts)), name_);
 }
 
-bool PlyStream::leave_out_hole(const PlyBodyFacts& facts) {
-  if (!facts.hole) return false;
-  interpretation_.hole = facts.hole;
+bool PlyStream::leave_out_holes(const PlyBodyFacts& facts) {
+  if (facts.holes.empty()) return false;
+  interpretation_.holes = facts.holes;
   return true;
 }
 

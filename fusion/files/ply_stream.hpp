@@ -46,6 +46,12 @@ struct PlyHandlers {
   std::function<base::Result<void>(std::span<const base::Triangle>)> triangles;
 };
 
+/// Exactly one place of many vertices.
+struct CrowdedPlace {
+  base::Vec3d place;
+  bool is_used = false;  ///< By faces.
+};
+
 /// What was found in the body.
 struct PlyBodyFacts {
   base::Vec3d min, max;      ///< Of all positions.
@@ -53,20 +59,19 @@ struct PlyBodyFacts {
   base::Vec3d origin;        ///< What to tell them from, as scene_origin.hpp says.
   /// Text whose coordinates, far from 0, have more digits than the floats that they are declared as: they are kept as doubles.
   bool is_finer_than_declared = false;
-  /// What stands for holes, found in this reading: PlyStream::leave_out_hole() takes it.
-  std::optional<Hole> hole;
+  /// What stands for holes, found in this reading: PlyStream::leave_out_holes() takes it.
+  std::vector<Hole> holes;
   FaceFacts faces;
   TemperatureFacts temperature;
-  std::uint64_t left_out_vertex_count = 0;            ///< Without a position within 1e30 m, and holes.
-  std::uint64_t hole_count = 0;                       ///< Left out because they are at the place of holes.
-  std::optional<base::Vec3d> crowded_place;           ///< Many vertices are there, and are kept: it may be a hole.
-  bool is_crowded_place_used = false;                 ///< By faces.
-  std::optional<SharedCoordinate> shared_coordinate;  ///< The same of one coordinate.
-  std::uint64_t unreferenced_vertex_count = 0;        ///< Vertices of no triangle; 0 when there is no triangle at all.
-  std::uint64_t absurd_time_count = 0;                ///< Vertices that were seen at no Unix time.
-  std::uint64_t clamped_colour_count = 0;             ///< Vertices whose colour was out of range or no number.
-  std::uint64_t trailing_byte_count = 0;              ///< After the last element; white space does not count in ascii.
-  std::uint64_t packed_trailing_byte_count = 0;       ///< After the end of the gzip data.
+  std::uint64_t left_out_vertex_count = 0;           ///< Without a position within 1e30 m, and holes.
+  std::vector<std::uint64_t> hole_counts;            ///< Left out because they are such a hole, of each.
+  std::vector<CrowdedPlace> crowded_places;          ///< Many vertices are there, and are kept: it may be a hole.
+  std::vector<SharedCoordinate> shared_coordinates;  ///< The same of one coordinate.
+  std::uint64_t unreferenced_vertex_count = 0;       ///< Vertices of no triangle; 0 when there is no triangle at all.
+  std::uint64_t absurd_time_count = 0;               ///< Vertices that were seen at no Unix time.
+  std::uint64_t clamped_colour_count = 0;            ///< Vertices whose colour was out of range or no number.
+  std::uint64_t trailing_byte_count = 0;             ///< After the last element; white space does not count in ascii.
+  std::uint64_t packed_trailing_byte_count = 0;      ///< After the end of the gzip data.
 };
 
 /// How the values of a file are taken.
@@ -80,7 +85,7 @@ struct PlyInterpretation {
   TemperatureConversion temperature;
   double metres_per_unit;
   std::optional<base::Vec3d> origin;  ///< Absent: chosen.
-  std::optional<Hole> hole;           ///< Vertices there are no part of the scene.
+  std::vector<Hole> holes;            ///< Vertices there are no part of the scene.
 };
 
 /// A PLY file that is read in blocks, in constant memory but for one or two bits a vertex (12 bytes where faces have more than
@@ -111,7 +116,7 @@ class PlyStream {
 
   /// Where the reading found holes that are written as a number, they are left out of all later ones, and true tells that this
   /// one is void.
-  bool leave_out_hole(const PlyBodyFacts& facts);
+  bool leave_out_holes(const PlyBodyFacts& facts);
 
   /// What has to be said about the file after a reading, for people.
   std::vector<Note> notes(const PlyBodyFacts& facts) const;

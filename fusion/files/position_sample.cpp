@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 namespace spectra::files {
 
@@ -15,6 +16,7 @@ constexpr std::size_t kFewestInAHole = 12;
 constexpr std::size_t kFewestElsewhere = 12;
 /// Where many places have several vertices each, none of them is a hole.
 constexpr std::size_t kMoreThanAnyOther = 8;
+constexpr std::size_t kMostHoles = 4;
 constexpr double kBulkReach = 32;
 
 constexpr std::array<double base::Vec3d::*, 3> kAxes = {&base::Vec3d::x, &base::Vec3d::y, &base::Vec3d::z};
@@ -67,52 +69,63 @@ void PositionSample::add(std::uint64_t first_vertex, std::span<const base::Vec3d
 }
 
 void PositionSample::conclude(double metres, const IsUsed& is_used) {
-  find_hole();
-  const CoordinateHoles holes = find_coordinate_holes(entries_, metres, is_used);
-  coordinate_hole_ = holes.certain;
-  shared_coordinate_ = holes.possible;
-  if (coordinate_hole_) {
-    std::erase_if(entries_, [this](const SampledVertex& entry) { return coordinate_hole_->has(entry.position); });
+  find_holes();
+  while (coordinate_holes_.size() < kMostHoles) {
+    CoordinateHoles found = find_coordinate_holes(entries_, metres, is_used);
+    shared_coordinates_ = std::move(found.possible);
+    if (!found.certain) break;
+    coordinate_holes_.push_back(*found.certain);
+    std::erase_if(entries_, [&](const SampledVertex& entry) { return found.certain->has(entry.position); });
   }
   find_bulk();
-  if (!hole_) return;
   if (!bulk_) {
-    hole_.reset();
+    holes_.clear();
     return;
   }
   const double size = std::hypot(bulk_->max.x - bulk_->min.x, bulk_->max.y - bulk_->min.y, bulk_->max.z - bulk_->min.z);
-  hole_->is_used = std::any_of(hole_->vertices.begin(), hole_->vertices.end(), is_used);
-  const base::Vec3d& place = hole_->place;
-  const base::Vec3d in_file = {place.x / metres, place.y / metres, place.z / metres};
-  hole_->is_certain = (place == base::Vec3d{} && !hole_->is_used) ||
-                      stands_for_none(in_file, distance(*bulk_, place) / size, hole_->is_used);
+  for (HolePlace& hole : holes_) {
+    hole.is_used = std::any_of(hole.vertices.begin(), hole.vertices.end(), is_used);
+    const base::Vec3d in_file = {hole.place.x / metres, hole.place.y / metres, hole.place.z / metres};
+    hole.is_certain = (hole.place == base::Vec3d{} && !hole.is_used) ||
+                      stands_for_none(in_file, distance(*bulk_, hole.place) / size, hole.is_used);
+    // The two ends of a tank whose triangles share no vertices are crowded like that.
+    hole.is_suspect = holes_.size() == 1 || !hole.is_used || is_written_for_none(in_file);
+  }
 }
 
-void PositionSample::find_hole() {
+void PositionSample::find_holes() {
   const auto key = [](const SampledVertex& entry) {
     return std::tuple(entry.position.x, entry.position.y, entry.position.z, entry.vertex);
   };
   std::sort(entries_.begin(), entries_.end(),
             [&](const SampledVertex& a, const SampledVertex& b) { return key(a) < key(b); });
-  std::size_t most = 0;
-  std::size_t second = 0;
-  std::size_t most_begin = 0;
+  struct Run {
+    std::size_t begin = 0, count = 0;
+  };
+  std::array<Run, kMostHoles + 1> runs{};  // The longest, from the longest on.
   for (std::size_t begin = 0, end = 0; begin < entries_.size(); begin = end) {
     while (end < entries_.size() && entries_[end].position == entries_[begin].position) ++end;
-    if (end - begin > most) {
-      second = most;
-      most = end - begin;
-      most_begin = begin;
-    } else {
-      second = std::max(second, end - begin);
-    }
+    if (end - begin <= runs.back().count) continue;
+    runs.back() = {begin, end - begin};
+    for (std::size_t i = kMostHoles; i > 0 && runs[i].count > runs[i - 1].count; --i) std::swap(runs[i], runs[i - 1]);
   }
-  if (most < kFewestInAHole || most < kMoreThanAnyOther * second || entries_.size() - most < kFewestElsewhere) return;
-  const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(most_begin);
-  const auto last = first + static_cast<std::ptrdiff_t>(most);
-  hole_ = {first->position, {}, false, false};
-  for (auto entry = first; entry != last; ++entry) hole_->vertices.push_back(entry->vertex);
-  entries_.erase(first, last);
+  std::size_t hole_count = 0;
+  std::size_t rest = entries_.size();
+  for (std::size_t i = 0; i < kMostHoles && runs[i].count >= kFewestInAHole; ++i) {
+    rest -= runs[i].count;
+    if (rest < kFewestElsewhere) break;
+    if (runs[i].count >= kMoreThanAnyOther * runs[i + 1].count) hole_count = i + 1;
+  }
+  for (std::size_t i = 0; i < hole_count; ++i) {
+    const auto first = entries_.begin() + static_cast<std::ptrdiff_t>(runs[i].begin);
+    HolePlace& hole = holes_.emplace_back();
+    hole.place = first->position;
+    std::for_each_n(first, runs[i].count, [&](const SampledVertex& entry) { hole.vertices.push_back(entry.vertex); });
+  }
+  std::erase_if(entries_, [this](const SampledVertex& entry) {
+    return std::any_of(holes_.begin(), holes_.end(),
+                       [&](const HolePlace& hole) { return hole.place == entry.position; });
+  });
 }
 
 void PositionSample::find_bulk() {

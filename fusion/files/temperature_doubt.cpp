@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <vector>
 
 #include "fusion/files/ply_notes.hpp"
 #include "fusion/files/ply_values.hpp"
@@ -54,45 +55,61 @@ std::optional<float> least_distance(double number) {
   return size >= step && std::fmod(size, step) == 0 ? std::optional(1.0F) : std::nullopt;
 }
 
-/// The one that keeps away from all others.
-std::optional<SharedNumber> shared_number(const TemperatureFacts& facts, const CelsiusScale& scale) {
-  for (const bool is_high : {true, false}) {
-    const LeastNumber& end = is_high ? facts.high : facts.low;
-    const float gap = end.next - end.value;
-    // Both ends are told as the least, one of negatives.
-    const float range_of_others = -(is_high ? facts.low : facts.high).value - end.next;
-    if (!are_many(end.count, facts) || !are_many(facts.finite_count - end.count, facts)) continue;
-    const float celsius = is_high ? -end.value : end.value;
-    // Without the digits that the way to degC and back has made.
-    const std::string shown = short_number((static_cast<double>(celsius) - scale.offset) / scale.factor);
-    const double in_file = std::strtod(shown.c_str(), nullptr);
-    const std::optional<float> distance = least_distance(in_file);
-    constexpr float kOfAny = 8, kFewestCelsiusOfAny = 100;
-    if (gap < (distance ? kFewestCelsius : kFewestCelsiusOfAny)) continue;
-    if (gap > distance.value_or(kOfAny) * range_of_others) return SharedNumber{end.count, celsius, in_file, gap};
-  }
-  return std::nullopt;
+/// That number at one end, where it keeps away from all others. The others reach to `other_end`, told as the least of negatives where
+/// that is the highest.
+std::optional<SharedNumber> shared_at_end(const TemperatureFacts& facts, const CelsiusScale& scale, bool is_high,
+                                          float other_end) {
+  const LeastNumber& end = is_high ? facts.high : facts.low;
+  if (!are_many(end.count, facts) || !are_many(facts.finite_count - end.count, facts)) return std::nullopt;
+  const float gap = end.next - end.value;
+  const float range_of_others = -other_end - end.next;
+  const float celsius = is_high ? -end.value : end.value;
+  // Without the digits that the way to degC and back has made.
+  const std::string shown = short_number((static_cast<double>(celsius) - scale.offset) / scale.factor);
+  const double in_file = std::strtod(shown.c_str(), nullptr);
+  const std::optional<float> distance = least_distance(in_file);
+  constexpr float kOfAny = 8, kFewestCelsiusOfAny = 100;
+  if (gap < (distance ? kFewestCelsius : kFewestCelsiusOfAny)) return std::nullopt;
+  if (gap <= distance.value_or(kOfAny) * range_of_others) return std::nullopt;
+  return SharedNumber{end.count, celsius, in_file, gap};
 }
 
-/// Many are exactly 0, and all others keep away from it as measured ones do not.
-bool zero_stands_alone(const TemperatureFacts& facts) {
+/// Those that keep away from all others: the highest, the lowest, or both. Of two each is judged without the other, too.
+std::vector<SharedNumber> shared_numbers(const TemperatureFacts& facts, const CelsiusScale& scale) {
+  std::vector<SharedNumber> numbers;
+  const auto look = [&](float low, float high) {
+    numbers.clear();
+    if (const auto one = shared_at_end(facts, scale, true, low)) numbers.push_back(*one);
+    if (const auto one = shared_at_end(facts, scale, false, high)) numbers.push_back(*one);
+    return numbers.size();
+  };
+  const bool are_others_between = -facts.high.next > facts.low.value && facts.low.next < -facts.high.value;
+  if (are_others_between && look(facts.low.next, facts.high.next) == 2) return numbers;
+  look(facts.low.value, facts.high.value);
+  return numbers;
+}
+
+/// Many are exactly 0, and all others, the measured ones of which lie within a range, keep away from it as those do not.
+bool zero_stands_alone(const TemperatureFacts& facts, float low, float high) {
   if (!are_many(facts.zero_count, facts) || facts.nearest_zero < kFewestCelsius) return false;
-  const float lowest = facts.low.value < 0 ? facts.low.value : facts.nearest_zero;
-  const float highest = facts.high.value < 0 ? -facts.high.value : -facts.nearest_zero;
+  const float lowest = low < 0 ? low : facts.nearest_zero;
+  const float highest = high > 0 ? high : -facts.nearest_zero;
   return 4 * facts.nearest_zero >= highest - lowest;
 }
 
 class Doubt {
  public:
   Doubt(const TemperatureFacts& facts, const PlyProperty& property)
-      : facts_(facts), property_(property), shared_(shared_number(facts, {})) {
+      : facts_(facts), property_(property), shared_(shared_numbers(facts, {})) {
     measured_count_ = facts.finite_count - facts.zero_count - facts.full_count;
     hot_count_ = facts.too_hot_count - facts.full_count;
     large_count_ = facts.large_count;
-    if (!shared_ || shared_->celsius == 0 || shared_->celsius == kFull) return;
-    measured_count_ -= shared_->count;
-    if (shared_->celsius > kHottest) hot_count_ -= shared_->count;
-    if (is_large(shared_->celsius)) large_count_ -= shared_->count;
+    for (const SharedNumber& shared : shared_) {
+      if (shared.celsius == 0 || shared.celsius == kFull) continue;
+      measured_count_ -= shared.count;
+      if (shared.celsius > kHottest) hot_count_ -= shared.count;
+      if (is_large(shared.celsius)) large_count_ -= shared.count;
+    }
   }
 
   std::optional<TemperatureDoubt> find() const {
@@ -145,23 +162,29 @@ class Doubt {
   TemperatureDoubt of_all(const std::string& text) const { return {facts_.finite_count, range() + text}; }
 
   std::optional<TemperatureDoubt> of_some() const {
-    const auto asked = [this](std::uint64_t count, const std::string& what, float value) -> TemperatureDoubt {
+    TemperatureDoubt doubt;
+    const auto ask = [&](std::uint64_t count, const std::string& what, float value) {
       const std::string text = value_text(static_cast<double>(value), PlyScalar::Float32);
-      return {count,
-              range() + counted(count, "is", "are") + what + ": if " + text + " stands for no data, --no-data " + text};
+      doubt.count += count;
+      doubt.message += (doubt.message.empty() ? range() : "; ") + counted(count, "is", "are") + what + ": if " + text +
+                       " stands for no data, --no-data " + text;
     };
-    if (facts_.too_hot_count > 0) return asked(facts_.too_hot_count, " above 3000", highest());
-    if (facts_.too_cold_count > 0) return asked(facts_.too_cold_count, " below -100", lowest());
-    if (zero_stands_alone(facts_)) {
+    if (facts_.too_hot_count > 0) ask(facts_.too_hot_count, " above 3000", highest());
+    if (facts_.too_cold_count > 0) ask(facts_.too_cold_count, " below -100", lowest());
+    const bool is_zero_alone = zero_stands_alone(facts_, lowest_measured(), highest_measured());
+    if (is_zero_alone) {
       const std::string nearest = short_number(static_cast<double>(facts_.nearest_zero));
-      return asked(facts_.zero_count, " exactly 0 and no other is nearer to it than " + nearest, 0);
+      ask(facts_.zero_count, " exactly 0 and no other is nearer to it than " + nearest, 0);
     }
-    if (shared_) {
-      const std::string exactly = value_text(static_cast<double>(shared_->celsius), PlyScalar::Float32);
-      const std::string nearest = short_number(static_cast<double>(shared_->gap));
-      return asked(shared_->count, " exactly " + exactly + " and no other is nearer to it than " + nearest,
-                   shared_->celsius);
+    for (const auto& [count, celsius, in_file, gap] : shared_) {
+      const bool is_asked = (celsius == highest() && facts_.too_hot_count > 0) ||
+                            (celsius == lowest() && facts_.too_cold_count > 0) || (celsius == 0 && is_zero_alone);
+      if (is_asked) continue;
+      const std::string exactly = value_text(static_cast<double>(celsius), PlyScalar::Float32);
+      const std::string nearest = short_number(static_cast<double>(gap));
+      ask(count, " exactly " + exactly + " and no other is nearer to it than " + nearest, celsius);
     }
+    if (doubt.count > 0) return doubt;
     if (lowest() >= 0 && highest() <= 1 && highest() > lowest()) {
       return of_all(std::string("look like shares of a range: ") + kOwnScale);
     }
@@ -183,12 +206,15 @@ class Doubt {
   bool has_hot_hundredths() const { return facts_.hot_low < facts_.hot_high && are_mostly_large(); }
   bool are_mostly_large() const { return 2 * large_count_ > measured_count_; }
 
+  bool is_shared(float celsius) const {
+    return std::any_of(shared_.begin(), shared_.end(), [=](const SharedNumber& one) { return one.celsius == celsius; });
+  }
   float lowest() const { return facts_.low.value; }
   float highest() const { return -facts_.high.value; }
   /// Without those that many share.
-  float lowest_measured() const { return shared_ && shared_->celsius == lowest() ? facts_.low.next : lowest(); }
+  float lowest_measured() const { return is_shared(lowest()) ? facts_.low.next : lowest(); }
   float highest_measured() const {
-    if (shared_ && shared_->celsius == highest()) return -facts_.high.next;
+    if (is_shared(highest())) return -facts_.high.next;
     const bool has_others = facts_.full_count > 0 && facts_.highest_but_full >= lowest();
     return has_others ? facts_.highest_but_full : highest();
   }
@@ -206,10 +232,16 @@ class Doubt {
            short_number(static_cast<double>(highest())) + ", taken as degC, ";
   }
   std::string no_data() const {
-    if (facts_.full_count > 0) return "; if 65535 stands for no data, --no-data 65535";
-    if (!shared_ || shared_->celsius == 0) return "";
-    const std::string number = value_text(static_cast<double>(shared_->celsius), PlyScalar::Float32);
-    return "; if " + number + " stands for no data, --no-data " + number;
+    std::string text;
+    const auto ask = [&text](float celsius) {
+      const std::string number = value_text(static_cast<double>(celsius), PlyScalar::Float32);
+      text += "; if " + number + " stands for no data, --no-data " + number;
+    };
+    if (facts_.full_count > 0) ask(kFull);
+    for (const SharedNumber& shared : shared_) {
+      if (shared.celsius != 0 && shared.celsius != kFull) ask(shared.celsius);
+    }
+    return text;
   }
   /// What they would be, without 65535. Those below absolute zero count where they tell that these are hundredths.
   std::string celsius(double scale, double offset) const {
@@ -228,7 +260,7 @@ class Doubt {
 
   const TemperatureFacts& facts_;
   const PlyProperty& property_;
-  const std::optional<SharedNumber> shared_;
+  const std::vector<SharedNumber> shared_;
   std::uint64_t measured_count_ = 0;               ///< Those that are neither 0 nor 65535 nor shared.
   std::uint64_t hot_count_ = 0, large_count_ = 0;  ///< Of these.
 };
@@ -238,14 +270,16 @@ class Doubt {
 std::optional<TemperatureDoubt> temperature_doubt(const TemperatureFacts& facts, const PlyProperty& property,
                                                   const std::optional<CelsiusScale>& told) {
   if (!told) return Doubt(facts, property).find();
-  const std::optional<SharedNumber> shared = shared_number(facts, *told);
-  if (!shared) return std::nullopt;
-  const std::string number = short_number(shared->in_file);
-  return TemperatureDoubt{shared->count, counted(shared->count, "temperature is", "temperatures are") + " exactly " +
-                                             number +
-                                             " in the file, far from all others: if that stands for no data, "
-                                             "--no-data " +
-                                             number};
+  TemperatureDoubt doubt;
+  for (const SharedNumber& shared : shared_numbers(facts, *told)) {
+    const std::string number = short_number(shared.in_file);
+    doubt.count += shared.count;
+    doubt.message += (doubt.message.empty() ? "" : "; ") + counted(shared.count, "temperature is", "temperatures are") +
+                     " exactly " + number +
+                     " in the file, far from all others: if that stands for no data, --no-data " + number;
+  }
+  if (doubt.count == 0) return std::nullopt;
+  return doubt;
 }
 
 }  // namespace spectra::files

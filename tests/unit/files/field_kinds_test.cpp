@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -162,6 +163,30 @@ TEST(FieldKinds, HolesWrittenAsANumberAreHoles) {
   EXPECT_NE(note_text(small, "hole_vertices").find("-9999 0 0,"), std::string::npos);
 }
 
+TEST(FieldKinds, HolesOfTwoKindsAreHoles) {
+  for (const std::size_t other_count : {100U, 90U, 14U, 700U}) {
+    std::vector<base::Vec3d> places(100);
+    places.resize(100 + other_count, {-9999, -9999, -9999});
+    const LoadedScene scene = loaded(map_square(places));
+    ASSERT_EQ(scene.mesh.vertex_count(), 400U) << other_count;
+    EXPECT_NEAR(place_x(scene, 3), 500'000.573, 1e-6);
+    EXPECT_EQ(note_count(scene, "hole_vertices"), 100 + other_count);
+    const std::string said = note_text(scene, "hole_vertices");
+    EXPECT_NE(said.find("100 in exactly one place, 0 0 0"), std::string::npos) << said;
+    EXPECT_NE(said.find(std::to_string(other_count) + " in exactly one place, -9999 -9999 -9999"), std::string::npos)
+        << said;
+  }
+  // A place and a coordinate.
+  std::vector<base::Vec3d> places(100, {-1, -1, -1});
+  for (int i = 0; i < 100; ++i) places.push_back({500'000 + 0.1 * i, 4'200'000 + 0.07 * (i * 37 % 100), -9999});
+  const LoadedScene scene = loaded(map_square(places));
+  EXPECT_EQ(scene.mesh.vertex_count(), 400U);
+  const std::string said = note_text(scene, "hole_vertices");
+  EXPECT_NE(said.find("200 vertices ("), std::string::npos) << said;
+  EXPECT_NE(said.find("100 in exactly one place, -1 -1 -1"), std::string::npos) << said;
+  EXPECT_NE(said.find("100 whose z is -9999"), std::string::npos) << said;
+}
+
 TEST(FieldKinds, WhatNobodyCanMeasureIsNoRounding) {
   // A speck of half a millimetre, 3 m from 0: floats are a quarter of a micrometre apart there.
   std::vector<std::string> lines;
@@ -277,6 +302,43 @@ TEST(FieldKinds, ACrowdedPlaceAmongTheOthersIsKeptAndSaid) {
   EXPECT_EQ(scene.mesh.vertex_count(), 500U);
   EXPECT_NE(note_text(scene, "crowded_place").find("exactly one place, -1 -1 -1, among the others"), std::string::npos);
   EXPECT_EQ(note_text(scene_of(5), "crowded_place"), "");
+}
+
+TEST(FieldKinds, TwoCrowdedPlacesAreSaidBoth) {
+  std::vector<std::string> lines;
+  for (int i = 0; i < 400; ++i)
+    lines.push_back(std::to_string(i % 20 - 10) + ".5 " + std::to_string(i / 20 - 10) + ".5 " +
+                    std::to_string(i % 7 - 3));
+  lines.resize(500, "-1 -1 -1");
+  lines.resize(600, "1 1 1");
+  EXPECT_NE(note_text(loaded(text_file("", lines)), "crowded_place").find("-1 -1 -1 and in 1 1 1, among the others"),
+            std::string::npos);
+  // What one reading leaves out does not hide what is kept.
+  lines.resize(700, "-9999 -9999 -9999");
+  const LoadedScene scene = loaded(text_file("", lines));
+  EXPECT_EQ(note_count(scene, "hole_vertices"), 100U);
+  EXPECT_NE(note_text(scene, "crowded_place").find("-1 -1 -1 and in 1 1 1, among the others"), std::string::npos);
+}
+
+TEST(FieldKinds, TheEndsOfATankThatSharesNoVerticesAreNoHoles) {
+  std::vector<std::string> lines;
+  std::string faces;
+  constexpr int kFacets = 100;
+  const auto rim = [](int i, int z) {
+    const double angle = 2 * std::numbers::pi * i / kFacets;
+    return std::to_string(std::cos(angle)) + ' ' + std::to_string(std::sin(angle)) + ' ' + std::to_string(z);
+  };
+  for (const int z : {1, 4}) {
+    for (int i = 0; i < kFacets; ++i) {
+      faces += "3 " + std::to_string(lines.size()) + ' ' + std::to_string(lines.size() + 1) + ' ' +
+               std::to_string(lines.size() + 2) + '\n';
+      lines.insert(lines.end(), {"0 0 " + std::to_string(z), rim(i, z), rim(i + 1, z)});
+    }
+  }
+  const LoadedScene scene =
+      loaded(text_file("", lines, "element face " + std::to_string(2 * kFacets) + "\n" + std::string(kFaces), faces));
+  EXPECT_EQ(scene.mesh.vertex_count(), 600U);
+  EXPECT_EQ(note_text(scene, "crowded_place") + note_text(scene, "hole_vertices"), "");
 }
 
 TEST(FieldKinds, ACrowdedPlaceThatFacesUseIsSaid) {

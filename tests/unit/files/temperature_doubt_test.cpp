@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "loaded.hpp"
@@ -133,6 +134,42 @@ TEST(TemperatureDoubt, ANumberThatManyShareFarFromAllOthersIsAskedAbout) {
       "200 temperatures are exactly 999 in the file, far from all others: if that stands for no data, --no-data 999",
       note_text(third_of(999, 288.5, 12, kelvin), "implausible_temperatures"));
   EXPECT_EQ(note_text(third_of(300, 288.5, 12, kelvin), "implausible_temperatures"), "");
+}
+
+TEST(TemperatureDoubt, TwoNumbersForNoneAreAskedAboutBoth) {
+  const auto beside = [](std::vector<const char*> numbers, const char* type = "float") {
+    std::vector<std::string> others;
+    for (const char* number : numbers) others.insert(others.end(), 30, number);
+    return said(type, 18, 0.25, 60, others);
+  };
+  for (const auto& [none, other] : std::vector<std::pair<const char*, const char*>>{{"-99", "99"},
+                                                                                    {"-99.99", "999"},
+                                                                                    {"0", "65535"},
+                                                                                    {"0", "9999"},
+                                                                                    {"0", "99"},
+                                                                                    {"-200", "9999"},
+                                                                                    {"-100", "1000"}}) {
+    const std::string text = beside({none, other});
+    expect_in(std::string("if ") + none + " stands for no data, --no-data " + none, text);
+    expect_in(std::string("if ") + other + " stands for no data, --no-data " + other, text);
+  }
+  // Also where the unit is in doubt, and where it is told.
+  std::vector<std::string> others(30, "65535");
+  others.resize(60, "-99");
+  const std::string kelvin = said("float", 290, 0.25, 60, others);
+  expect_in("look like kelvin", kelvin);
+  expect_in("--no-data 65535; if -99 stands for no data, --no-data -99", kelvin);
+  ReadOptions options;
+  options.temperature_unit = TemperatureUnit::Celsius;
+  std::string body =
+      "ply\nformat ascii 1.0\nelement vertex 120\n" + std::string(kXyz) + "property float temperature\nend_header\n";
+  for (int i = 0; i < 120; ++i)
+    body += std::to_string(i) + " 0 0 " + (i < 60 ? std::to_string(20 + 0.1 * i) : i < 90 ? "-99" : "99") + "\n";
+  const LoadedScene scene = loaded(body, options);
+  EXPECT_EQ(note_count(scene, "implausible_temperatures"), 60U);
+  expect_in("--no-data 99; 30 temperatures are exactly -99 in the file", note_text(scene, "implausible_temperatures"));
+  // Room temperatures between two plateaus are nothing of the kind.
+  EXPECT_EQ(beside({"10", "60"}), "");
 }
 
 TEST(TemperatureDoubt, PlateausAreNoQuestion) {
