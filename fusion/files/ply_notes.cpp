@@ -44,20 +44,11 @@ std::vector<std::string> unused_names(const PlyElement& element, const PlySlots&
 }
 
 /// Where something was guessed, or is probably not as it was meant, and an option or another file mends it.
-constexpr std::array<std::string_view, 14> kNeedAttention = {"hole_vertices",
-                                                             "crowded_place",
-                                                             "shared_coordinate",
-                                                             "rounded_positions",
-                                                             "coarse_positions",
-                                                             "clamped_colours",
-                                                             "texture",
-                                                             "unused_options",
-                                                             "no_temperature",
-                                                             "no_colours",
-                                                             "implausible_temperatures",
-                                                             "absurd_times",
-                                                             "crossing_polygons",
-                                                             "large_polygons"};
+constexpr std::array<std::string_view, 15> kNeedAttention = {
+    "hole_vertices",    "crowded_place",     "shared_coordinate", "rounded_positions",
+    "coarse_positions", "clamped_colours",   "colour_white",      "texture",
+    "unused_options",   "no_temperature",    "no_colours",        "implausible_temperatures",
+    "absurd_times",     "crossing_polygons", "large_polygons"};
 
 class Notes {
  public:
@@ -223,17 +214,24 @@ class Notes {
       const PlyElement& element = is_of_faces ? *faces : vertices_;
       if (schema_.has_unusual_colour_names) {
         const auto name = [&](PlySlot slot) { return element.properties[*slots[slot]].name; };
+        const bool is_one = slots[kRed] == slots[kBlue];
         add("colour_properties", element.count,
-            "The colours are taken from the properties " + joined({name(kRed), name(kGreen), name(kBlue)}));
+            is_one ? "The colours are taken from the property " + joined({name(kRed)})
+                   : "The colours are taken from the properties " + joined({name(kRed), name(kGreen), name(kBlue)}));
       }
       PlyScalar type = element.properties[*slots[kRed]].type;
       for (std::size_t slot = kRed; slot <= kBlue; ++slot) {
         if (element.properties[*slots[slot]].type != PlyScalar::UInt8) type = element.properties[*slots[slot]].type;
       }
-      std::string text =
-          conversion_text(schema_.colour_coding, schema_.true_colour_type.value_or(type), survey_.colour_range);
+      type = schema_.true_colour_type.value_or(type);
+      const std::optional<double> white = options_.colour_white;
+      std::string text = conversion_text(schema_.colour_coding, type, survey_.colour_range, white);
       if (schema_.true_colour_type) text = "The header says uchar, but the text has others: c" + text.substr(1);
       if (!text.empty()) add("converted_colours", vertices_.count, text);
+      if (const std::string doubt = white_doubt(type, survey_.colour_range);
+          schema_.colour_coding == ColourCoding::Channels && !white && !doubt.empty()) {
+        add("colour_white", vertices_.count, doubt);
+      }
     } else {
       about_textures();
     }
@@ -283,7 +281,7 @@ class Notes {
     }
     add("no_colours", names.size(),
         "No colours found, everything is grey; these could be them: " + joined(names) +
-            " (call them red, green and blue; one alone gray, or rgb where it is packed)");
+            " (--colour-properties RED,GREEN,BLUE takes them, or one alone that is grey; packed ones call rgb)");
   }
 
   void about_temperature_property() {
@@ -390,15 +388,21 @@ class Notes {
 
   /// What was said of the file and has changed nothing.
   void about_options() {
+    const bool has_channels =
+        (schema_.has_vertex_colours() || schema_.has_face_colours()) && schema_.colour_coding == ColourCoding::Channels;
+    std::string of_colours;
+    if (options_.colour_white && !has_channels) {
+      of_colours = "There are no colours of levels, so this has no effect: --colour-white";
+    }
     if (temperature_property() == nullptr) {
       std::vector<std::string> names;
       if (options_.temperature_unit) names.emplace_back("--temperature-unit");
       if (options_.temperature_scale) names.emplace_back("--temperature-scale");
       if (options_.temperature_offset) names.emplace_back("--temperature-offset");
       if (!options_.no_data.empty()) names.emplace_back("--no-data");
-      if (!names.empty()) {
-        add("unused_options", names.size(), "There is no temperature, so these have no effect: " + joined(names));
-      }
+      std::string text = names.empty() ? "" : "There is no temperature, so these have no effect: " + joined(names);
+      if (!text.empty() && !of_colours.empty()) text += "; ";
+      add("unused_options", names.size() + (of_colours.empty() ? 0 : 1), text + of_colours);
       return;
     }
     std::vector<std::string> values;
@@ -406,10 +410,11 @@ class Notes {
       const bool is_seen = (facts_.temperature.no_data_seen >> i & 1U) != 0;
       if (!is_seen) values.push_back(number_text(options_.no_data[i]));
     }
-    if (!values.empty()) {
-      add("unused_options", values.size(),
-          "No temperature of the file, in its own unit, has this --no-data value: " + joined(values));
-    }
+    std::string text = values.empty()
+                           ? ""
+                           : "No temperature of the file, in its own unit, has this --no-data value: " + joined(values);
+    if (!text.empty() && !of_colours.empty()) text += "; ";
+    add("unused_options", values.size() + (of_colours.empty() ? 0 : 1), text + of_colours);
   }
 
   void about_what_is_skipped() {

@@ -31,9 +31,13 @@ base::Result<ScenePair> read_pair(const std::filesystem::path& path, const std::
                                   const ReadOptions& options) {
   ReadOptions scene_options;  // those about temperature belong to the thermal file
   scene_options.metres_per_unit = options.metres_per_unit;
+  scene_options.colour_properties = options.colour_properties;
+  scene_options.colour_white = options.colour_white;
   scene_options.origin = options.origin;
   scene_options.progress = options.progress;
   ReadOptions thermal_options = options;
+  thermal_options.colour_properties.clear();
+  thermal_options.colour_white.reset();
   if (options.progress) {
     thermal_options.progress = [&options](std::string_view, double share) {
       options.progress(base::kReadingThermalPhase, share);
@@ -63,7 +67,8 @@ base::Result<ScenePair> read_pair(const std::filesystem::path& path, const std::
                             "--scale " + number_text(options.scale()) + " taken for " + scaled + " alone: " + as_it_is +
                                 " is in metres already"});
     };
-    ReadOptions unscaled = options;
+    ReadOptions unscaled = thermal_options;
+    unscaled.progress = options.progress;
     unscaled.metres_per_unit = 1;
     BOOST_OUTCOME_TRY(LoadedScene thermal_as_it_is, read_ply(thermal_path, unscaled));
     if (check_overlap(scene, thermal_as_it_is) && sizes_agree(scene, thermal_as_it_is)) {

@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "fusion/files/colour_names.hpp"
+#include "fusion/files/name_words.hpp"
 #include "fusion/files/temperature_name.hpp"
 
 namespace spectra::files {
@@ -79,6 +80,46 @@ std::optional<ColourCoding> find_colours(const PlyElement& element, PlySlots& sl
   std::copy(channels->begin(), channels->end(), slots.begin() + kRed);
   has_unusual_names = true;
   return ColourCoding::Channels;
+}
+
+/// Colours that the options name, in the element if it has them.
+std::optional<ColourCoding> find_named_colours(const PlyElement& element, const std::vector<std::string>& names,
+                                               PlySlots& slots) {
+  std::array<std::optional<std::size_t>, 3> indices;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    indices[channel] = find_scalar(element, names[names.size() == 3 ? channel : 0]);
+    if (!indices[channel]) return std::nullopt;
+  }
+  std::copy(indices.begin(), indices.end(), slots.begin() + kRed);
+  const std::vector<std::string> words = name_words(names[0]);
+  const bool is_packed =
+      std::any_of(words.begin(), words.end(), [](const std::string& word) { return word == "rgb" || word == "rgba"; });
+  if (names.size() == 1) return is_packed ? ColourCoding::Packed : ColourCoding::Channels;
+  return lower_case(names[0]) == "f_dc_0" ? ColourCoding::Splat : ColourCoding::Channels;
+}
+
+base::Result<void> find_colours(const PlyElement& vertices, const PlyElement* faces, const ReadOptions& options,
+                                PlySchema& schema) {
+  const std::vector<std::string>& wanted = options.colour_properties;
+  std::optional<ColourCoding> coding;
+  if (wanted.empty()) {
+    coding = find_colours(vertices, schema.vertex, schema.has_unusual_colour_names);
+    if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face, schema.has_unusual_colour_names);
+  } else {
+    coding = find_named_colours(vertices, wanted, schema.vertex);
+    if (!coding && faces != nullptr) coding = find_named_colours(*faces, wanted, schema.face);
+    schema.has_unusual_colour_names = true;
+    if (!coding) {
+      const auto missing = std::find_if(wanted.begin(), wanted.end(),
+                                        [&](const std::string& name) { return !find_scalar(vertices, name); });
+      return base::failure(base::ErrorCode::Unsupported,
+                           "there is no scalar property '" + printable(*missing) + "' (the vertices have " +
+                               scalar_names(vertices) + ")",
+                           "colour_properties");
+    }
+  }
+  schema.colour_coding = coding.value_or(ColourCoding::Channels);
+  return base::success();
 }
 
 /// The property whose name says temperature most plainly.
@@ -207,9 +248,7 @@ base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& o
   if (const PlyElement* const strips = with_entries(header, "tristrips")) {
     BOOST_OUTCOME_TRY(schema.strip_list, find_corner_list(*strips));
   }
-  auto coding = find_colours(*vertices, schema.vertex, schema.has_unusual_colour_names);
-  if (!coding && faces != nullptr) coding = find_colours(*faces, schema.face, schema.has_unusual_colour_names);
-  schema.colour_coding = coding.value_or(ColourCoding::Channels);
+  BOOST_OUTCOME_TRYV(find_colours(*vertices, faces, options, schema));
   BOOST_OUTCOME_TRY(find_temperatures(*vertices, faces, options, schema));
   find_confidence(*vertices, schema.vertex);
   return schema;

@@ -31,7 +31,7 @@ struct PlySchema {
   /// Colours and temperature of the faces, when the vertices have none.
   PlySlots face;
   ColourCoding colour_coding = ColourCoding::Channels;
-  /// The colours have names that are customary nowhere, but say what they are.
+  /// The colours have names that are customary nowhere, but say what they are; or the options name them.
   bool has_unusual_colour_names = false;
   /// The type that the vertices' colours of a text really have, where they are declared as uchar but hold something else.
   std::optional<PlyScalar> true_colour_type;
@@ -47,7 +47,7 @@ struct PlySchema {
   bool has_face_temperature() const { return face[kTemperature].has_value(); }
 };
 
-/// Finds what is of use. BadHeader, or Unsupported when the options name a property that is not there.
+/// Finds what is of use. BadHeader, or Unsupported when the options name properties that are not there.
 base::Result<PlySchema> ply_schema(const PlyHeader& header, const ReadOptions& options);
 
 }  // namespace spectra::files

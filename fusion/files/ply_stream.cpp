@@ -133,9 +133,11 @@ base::Result<void> PlyStream::interpret() {
       if (!is_byte(*index)) type = properties[**index].type;
     }
     type = schema.true_colour_type.value_or(type);
-    BOOST_OUTCOME_TRY(interpretation_.colours,
-                      colour_conversion(schema.colour_coding, type, interpretation_.survey.colour_range));
-    interpretation_.colours.is_bytes = schema.colour_coding == ColourCoding::Channels &&
+    BOOST_OUTCOME_TRY(
+        interpretation_.colours,
+        colour_conversion(schema.colour_coding, type, interpretation_.survey.colour_range, options_.colour_white));
+    interpretation_.colours.is_bytes = interpretation_.colours.factor == 1 &&
+                                       schema.colour_coding == ColourCoding::Channels &&
                                        header_.format != PlyFormat::Ascii && std::all_of(first, first + 3, is_byte);
   }
   return base::success();

@@ -75,7 +75,7 @@ class DoubtfulTemperature {
 class FaceSums {
  public:
   FaceSums(const PlySchema& schema, PlyScalar colour_type, std::uint64_t vertex_count, const ReadOptions& options)
-      : schema_(schema), colour_type_(colour_type), conversion_(options) {
+      : schema_(schema), colour_type_(colour_type), white_(options.colour_white), conversion_(options) {
     const auto count = static_cast<std::size_t>(vertex_count);
     if (schema.has_face_colours()) colours_.resize(count);
     if (schema.has_face_temperature()) temperatures_.resize(count);
@@ -98,8 +98,9 @@ class FaceSums {
       // Packed colours were unpacked before they were added.
       const bool is_packed = schema_.colour_coding == ColourCoding::Packed;
       BOOST_OUTCOME_TRY(const ColourConversion conversion,
-                        is_packed ? base::Result<ColourConversion>(ColourConversion{})
-                                  : colour_conversion(schema_.colour_coding, colour_type_, survey.colour_range));
+                        is_packed
+                            ? base::Result<ColourConversion>(ColourConversion{})
+                            : colour_conversion(schema_.colour_coding, colour_type_, survey.colour_range, white_));
       survey.face_colours.resize(colours_.size());
       for (std::size_t v = 0; v < colours_.size(); ++v) {
         std::array<double, 3> means{};
@@ -159,6 +160,7 @@ class FaceSums {
 
   const PlySchema& schema_;
   const PlyScalar colour_type_;
+  const std::optional<double> white_;
   const TemperatureConversion conversion_;
   std::vector<Colour> colours_;
   std::vector<Temperature> temperatures_;

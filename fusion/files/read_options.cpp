@@ -1,5 +1,6 @@
 #include "fusion/files/read_options.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -44,6 +45,24 @@ std::optional<TemperatureUnit> temperature_unit(std::string_view name) {
   return std::nullopt;
 }
 
+base::Result<std::vector<std::string>> colour_properties(std::string_view text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    names.emplace_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  const bool is_any_empty =
+      std::any_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); });
+  if ((names.size() != 1 && names.size() != 3) || is_any_empty) {
+    return base::failure(
+        base::ErrorCode::WrongType,
+        "colour-properties is \"" + std::string(text) + "\"; three names with commas between them are wanted, or one",
+        "colour_properties");
+  }
+  return names;
+}
+
 std::optional<CelsiusScale> ReadOptions::celsius_scale() const {
   if (temperature_unit) return scale_of(*temperature_unit);
   if (!temperature_scale && !temperature_offset) return std::nullopt;
@@ -71,6 +90,11 @@ base::Result<void> check_read_options(const ReadOptions& options) {
       return base::failure(base::ErrorCode::OutOfRange, "no-data is a number; nan stands for no data anyway",
                            "no_data");
     }
+  }
+  if (options.colour_white && !is_sensible(*options.colour_white)) {
+    return base::failure(base::ErrorCode::OutOfRange,
+                         "colour-white is the number of the file that is white, from 1e-16 to 1e16: 4095 for 12 bits",
+                         "colour_white");
   }
   if (!is_sensible(options.scale())) {
     return base::failure(base::ErrorCode::OutOfRange,

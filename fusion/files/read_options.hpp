@@ -23,6 +23,9 @@ enum class TemperatureUnit { Celsius, Kelvin, Centikelvin, Fahrenheit };
 /// By its name on the command line: celsius, kelvin, centikelvin, fahrenheit.
 std::optional<TemperatureUnit> temperature_unit(std::string_view name);
 
+/// The names of properties that are written with commas between them: three, or one alone. WrongType when they are not that many.
+base::Result<std::vector<std::string>> colour_properties(std::string_view text);
+
 /// From the numbers of a file to degrees Celsius: celsius = factor * value + offset.
 struct CelsiusScale {
   double factor = 1;
@@ -33,6 +36,11 @@ struct CelsiusScale {
 struct ReadOptions {
   /// The vertex (or face) property that holds the temperature, any scalar; empty: found by its name.
   std::string temperature_property;
+  /// The vertex (or face) properties that hold red, green and blue, any scalars, or one: grey, or a packed colour by its name (rgb,
+  /// rgba); empty: found by their names.
+  std::vector<std::string> colour_properties;
+  /// The number of the file that is white; absent: found by how far its colours go. Not of packed colours and splats.
+  std::optional<double> colour_white;
   /// The unit, or instead of it a scale, an offset or both: celsius = scale * value + offset.
   std::optional<TemperatureUnit> temperature_unit;
   std::optional<double> temperature_scale;

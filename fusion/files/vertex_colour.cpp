@@ -17,6 +17,9 @@ constexpr double kSplatFactor = 0.28209479177387814;
 /// Floats up to here are shares of white, some of them a little too bright.
 constexpr double kMostShare = 2;
 constexpr double kMostByte = 255.5;
+/// Interpolated and sharpened levels are over-exposed here and there, as shares are.
+constexpr double kMostLevel = 2 * 255;
+constexpr double kWhite10Bit = 1023, kWhite12Bit = 4095, kWhite14Bit = 16383;
 constexpr double kMost16Bit = 65535.5;
 constexpr double kSixteenToEight = 1.0 / 257;
 /// In levels of 255.
@@ -40,6 +43,19 @@ std::optional<std::uint32_t> packed_bits(double value, bool is_floating) {
 
 bool are_shares(PlyScalar type, const ColourRange& range) {
   return is_floating(type) && (range.largest <= kMostShare || range.has_mostly_shares());
+}
+
+/// What is white where that is neither 1 nor 255, by the bits that the largest number needs. Counts of 10 or 12 bits in a larger type would
+/// all be nearly black as 16 bits.
+double white_of_many_bits(double largest) {
+  for (const double white : {kWhite10Bit, kWhite12Bit}) {
+    if (largest < white + 0.5) return white;
+  }
+  return std::numeric_limits<std::uint16_t>::max();
+}
+
+bool are_levels(PlyScalar type, const ColourRange& range) {
+  return range.largest <= (is_floating(type) ? kMostLevel : kMostByte);
 }
 
 }  // namespace
@@ -100,7 +116,8 @@ void ColourConversion::convert(std::array<std::span<const double>, 3> values, st
   }
 }
 
-base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range) {
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range,
+                                                 std::optional<double> white) {
   const double largest = range.largest;
   ColourConversion conversion;
   conversion.is_wrapped = coding == ColourCoding::Channels && type == PlyScalar::Int8;
@@ -110,10 +127,14 @@ base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar 
   } else if (coding == ColourCoding::Splat) {
     conversion.factor = 255 * kSplatFactor;
     conversion.offset = 255 * 0.5;
+  } else if (white) {
+    conversion.factor = 255 / *white;
   } else if (are_shares(type, range)) {
     conversion.factor = 255;
-  } else if (largest <= kMostByte) {
+  } else if (are_levels(type, range)) {
     conversion.factor = 1;
+  } else if (largest < kWhite12Bit + 0.5 && size_bytes(type) > 1) {
+    conversion.factor = 255 / white_of_many_bits(largest);
   } else if (largest < kMost16Bit && type != PlyScalar::UInt8 && type != PlyScalar::Int8) {
     conversion.factor = kSixteenToEight;
   } else {
@@ -125,7 +146,8 @@ base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar 
   return conversion;
 }
 
-std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range_of_all) {
+std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range_of_all,
+                            std::optional<double> white) {
   const std::string name(to_string(type));
   switch (coding) {
     case ColourCoding::Packed:
@@ -135,13 +157,26 @@ std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRan
     case ColourCoding::Channels:
       break;
   }
+  const double largest = range_of_all.largest;
+  const std::string range =
+      "Colours of type " + name + (largest > 0 ? " with values up to " + number_text(largest) : "") + " taken as ";
+  if (white) return range + "0 to " + number_text(*white);
   if (type == PlyScalar::UInt8) return {};
   if (type == PlyScalar::Int8) return "Colours of type char taken as bytes: negative ones are 128 to 255";
-  const double largest = range_of_all.largest;
-  const std::string range = "Colours of type " + name + " with values up to " + number_text(largest) + " ";
-  if (are_shares(type, range_of_all)) return range + "taken as shares of 1, times 255";
-  if (largest <= kMostByte) return range + "taken as 0 to 255";
-  return range + "taken as 16 bits, divided by 257";
+  if (are_shares(type, range_of_all)) return range + "shares of 1, times 255";
+  if (are_levels(type, range_of_all)) return range + "0 to 255";
+  if (largest < kWhite10Bit + 0.5) return range + "10 bits, 0 to 1023";
+  if (largest < kWhite12Bit + 0.5) return range + "12 bits, 0 to 4095";
+  return range + "16 bits, divided by 257";
+}
+
+std::string white_doubt(PlyScalar type, const ColourRange& range) {
+  if (are_shares(type, range) || are_levels(type, range) || range.largest > kWhite14Bit + 0.5) return {};
+  const std::string level = number_text(std::ceil(range.largest * kSixteenToEight)) + " of 255";
+  if (range.largest < kWhite12Bit + 0.5) {
+    return "As 16 bits no colour would be brighter than " + level + "; where they are, --colour-white 65535";
+  }
+  return "No colour is brighter than " + level + "; where 16383 is white in the file (14 bits), --colour-white 16383";
 }
 
 }  // namespace spectra::files

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -39,11 +40,15 @@ struct ColourConversion {
                std::uint64_t& outside_count) const;
 };
 
-/// The conversion for colours of that coding, type and range: to 255 as they are, larger ones of 16 bits, floats up to about 1,
-/// or nearly all of them, as shares of white. An error tells what is too large.
-base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range);
+/// The conversion for colours of that coding, type and range: to 255 as they are, larger ones of 10, 12 or 16 bits, floats up to about
+/// 1, or nearly all of them, as shares of white. `white`: what people said is white, of channels. An error tells what is too large.
+base::Result<ColourConversion> colour_conversion(ColourCoding coding, PlyScalar type, const ColourRange& range,
+                                                 std::optional<double> white);
 
 /// What was done to colours that are no bytes, for people; empty when nothing was.
-std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range);
+std::string conversion_text(ColourCoding coding, PlyScalar type, const ColourRange& range, std::optional<double> white);
+
+/// What else could be white of channels that were taken so, where that is not certain; empty: it is.
+std::string white_doubt(PlyScalar type, const ColourRange& range);
 
 }  // namespace spectra::files

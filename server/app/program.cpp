@@ -33,6 +33,15 @@ std::vector<const CLI::Option*> add_reading(CLI::App& command, files::ReadOption
   const auto before = static_cast<std::ptrdiff_t>(command.get_options().size());
   command.add_option("--temperature-property", options.temperature_property,
                      "The property that holds the temperature, whatever its name");
+  const auto set_colours = [&options](const std::string& names) {
+    auto properties = files::colour_properties(names);
+    if (!properties) throw CLI::ValidationError("--colour-properties", properties.error().message);
+    options.colour_properties = std::move(properties).value();
+  };
+  command.add_option_function<std::string>("--colour-properties", set_colours,
+                                           "The properties that hold the colours, whatever their names: "
+                                           "RED,GREEN,BLUE, or one that is grey or packed (rgb)");
+  command.add_option("--colour-white", options.colour_white, "The number that is white in the file, such as 4095");
   const auto set_unit = [&options](const std::string& name) {
     options.temperature_unit = files::temperature_unit(name);
     if (!options.temperature_unit) {
@@ -63,7 +72,8 @@ std::vector<const CLI::Option*> add_reading(CLI::App& command, files::ReadOption
       },
       "");
   command.get_option("--temperature-property")->check(is_something);
-  for (const char* name : {"--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
+  command.get_option("--colour-properties")->check(is_something);
+  for (const char* name : {"--colour-white", "--temperature-scale", "--temperature-offset", "--no-data", "--scale"}) {
     command.get_option(name)->check(is_number);
   }
   const auto all = command.get_options();

@@ -56,6 +56,10 @@ base::Result<void> read_field(IncomingBlock& block, const std::string& name, con
     BOOST_OUTCOME_TRY(block.sensor, place(name, value));
   } else if (name == "temperature_property") {
     read.temperature_property = value;
+  } else if (name == "colour_properties") {
+    BOOST_OUTCOME_TRY(read.colour_properties, files::colour_properties(value));
+  } else if (name == "colour_white") {
+    BOOST_OUTCOME_TRY(read.colour_white, number(name, value));
   } else if (name == "temperature_unit") {
     read.temperature_unit = files::temperature_unit(value);
     if (!read.temperature_unit) {
@@ -97,13 +101,17 @@ std::optional<std::string> repeated_field(const std::vector<std::pair<std::strin
 
 std::string limits_of(std::string_view field) {
   if (field == "observed_at") return "0 to 1e11 seconds since 1970";
-  if (field == "scale" || field == "temperature_scale") return "1e-16 to 1e16";
+  if (field == "scale" || field == "temperature_scale" || field == "colour_white") return "1e-16 to 1e16";
   return "";
 }
 
 std::vector<std::pair<std::string, std::string>> query_of(const files::ReadOptions& read) {
   std::vector<std::pair<std::string, std::string>> query;
   if (!read.temperature_property.empty()) query.emplace_back("temperature_property", read.temperature_property);
+  std::string colours;
+  for (const std::string& name : read.colour_properties) colours += (colours.empty() ? "" : ",") + name;
+  if (!colours.empty()) query.emplace_back("colour_properties", colours);
+  if (read.colour_white) query.emplace_back("colour_white", files::number_text(*read.colour_white));
   for (const char* name : {"celsius", "kelvin", "centikelvin", "fahrenheit"}) {
     if (read.temperature_unit && read.temperature_unit == files::temperature_unit(name)) {
       query.emplace_back("temperature_unit", name);

@@ -35,9 +35,9 @@ test("wrong usage is 2 and names what is wrong", () => {
   fails(2, /range/, "fuse", demo, inFolder("o.ply"), "--method", "thermal_only", "--range", "30:20");
   fails(2, /xyz|format|ply/i, "fuse", demo, inFolder("o.xyz"), "--method", "thermal_only");
   fails(2, /listen|address|port/i, "serve", "--listen", "127.0.0.1:99999");
-  for (const option of ["--scale", "--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data"]) {
+  for (const option of ["--scale", "--colour-properties", "--colour-white", "--temperature-property", "--temperature-scale", "--temperature-offset", "--no-data"]) {
     fails(2, new RegExp(`${option}: it is empty`), "info", demo, option, "");
-    if (option === "--temperature-property") continue;
+    if (option.includes("propert")) continue;
     fails(2, new RegExp(`${option}: 1,5 is no number; write it with a decimal point`), "info", demo, option, "1,5");
   }
 });
@@ -65,7 +65,7 @@ test("a failed job is 1 and names the file", () => {
 test("what would be lost is not overwritten, and what could not be written is said", () => {
   const before = readFileSync(demo);
   fails(2, /demo\.ply: the output is the input/, "fuse", demo, demo, "--method", "thermal_only");
-  for (const option of [["--up", "y"], ["--scale", "0.001"], ["--temperature-unit", "kelvin"], ["--no-data", "0"]]) {
+  for (const option of [["--up", "y"], ["--scale", "0.001"], ["--temperature-unit", "kelvin"], ["--no-data", "0"], ["--colour-properties", "a"], ["--colour-white", "255"]]) {
     for (const source of [["--live"], ["--demo"], ["--demo-drive"], []]) {
       fails(2, new RegExp(`${option[0]}: it says something of a scene file, and there is none`), "serve", ...source, ...option);
     }

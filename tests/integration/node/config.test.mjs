@@ -115,7 +115,7 @@ test("every option of serve is in the sample, and every line of the sample is go
   writeFileSync(at("map_thermal.ply"), "");
   writeFileSync(at("map.store"), "");
   const here = (value) => value.replace(/"\/(?:[\w.]+\/)*([\w.]+)"/, (_, name) => `"${at(name)}"`);
-  const ofAScene = ["temperature-property", "temperature-unit", "temperature-scale", "temperature-offset", "no-data", "scale", "up"];
+  const ofAScene = ["colour-properties", "colour-white", "temperature-property", "temperature-unit", "temperature-scale", "temperature-offset", "no-data", "scale", "up"];
   const needed = {
     ...Object.fromEntries(ofAScene.map((name) => [name, ["scene"]])), thermal: ["scene"], history: ["store"], at: ["store"], invite: ["tokens"], certificate: ["key"], key: ["certificate"], track: ["map"], submaps: ["map"] };
   for (const key of settings.keys()) {

@@ -48,13 +48,19 @@ test("the options of reading are there on the command line", () => {
   assert.ok(isUsual(info("07-centikelvin-ushort.ply", "--temperature-unit", "centikelvin")));
   assert.ok(isUsual(info("07-centikelvin-ushort.ply", "--temperature-scale", "0.01", "--temperature-offset", "-273.15")));
   assert.ok(isUsual(info("08d-field-name.ply", "--temperature-property", "quality")));
+  const scaled = info("03-colours-16-bit.ply", "--colour-properties", "blue,green,red", "--colour-white", "60000");
+  assert.equal(note(scaled, "colour_properties").message, "The colours are taken from the properties blue, green, red");
+  assert.match(note(scaled, "converted_colours").message, /taken as 0 to 60000$/);
   const none = info("05-no-data-minus-9999.ply", "--no-data", "-9999", "--no-data", "20");
   assert.equal(note(none, "no_data_temperatures").count, 48);
   assert.ok(Math.abs(info("19-millimetres.ply", "--scale", "0.001").size_m[0] - 3) < 1e-5);
   assert.ok(Math.abs(info("19-millimetres.ply").size_m[0] - 3000) < 1e-2);
+  for (const [written, up] of [["Y", "y"], ["+y", "y"], ["-Z", "-z"], ["+X", "x"]]) {
+    assert.equal(info("19-millimetres.ply", "--up", written).up, up, written);
+  }
   for (const command of ["serve", "fuse", "info", "tradeoff"]) {
     const help = run(command, "--help");
-    for (const option of ["temperature-property", "temperature-unit", "temperature-scale", "temperature-offset", "no-data", "scale"]) {
+    for (const option of ["colour-properties", "colour-white", "temperature-property", "temperature-unit", "temperature-scale", "temperature-offset", "no-data", "scale"]) {
       assert.match(help, new RegExp(`--${option}`), `${command} --${option}`);
     }
   }
@@ -67,6 +73,8 @@ test("options that cannot be meant are wrong usage, and name themselves", () => 
     [["--temperature-unit", "kelvin", "--temperature-offset", "1"], /temperature-/],
     [["--no-data", "nan"], /no-data/],
     [["--scale", "-1"], /scale/],
+    [["--colour-properties", "a,b"], /colour-properties/],
+    [["--colour-white", "0"], /colour-white/],
   ]) {
     const { status, stderr } = spawnSync(binary, ["info", inField("06-kelvin.ply"), ...options], { encoding: "utf8" });
     assert.equal(status, 2, options.join(" "));

@@ -23,6 +23,7 @@ using test::kRgb;
 using test::kXyz;
 using test::loaded;
 using test::note_count;
+using test::note_text;
 using test::PlyBytes;
 
 std::string ascii_head(std::uint64_t vertices, std::string_view properties, std::uint64_t faces = 0,
@@ -226,6 +227,105 @@ TEST(PlyReader, AnOverExposedColourDoesNotDarkenTheOthers) {
     const LoadedScene whole = loaded(ascii_head(21, head) + ones + "0 1 0 " + rest + "\n");
     EXPECT_EQ(whole.mesh.visible()[0], (base::Rgb8{1, 0, 1})) << rest;
   }
+}
+
+/// The first vertex has the colour `level`, the second 0; what is said is left in `said`.
+base::Rgb8 colour_of_type(const std::string& type, const std::string& level, const ReadOptions& options,
+                          LoadedScene& scene) {
+  const std::string head =
+      std::string(kXyz) + "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
+  scene = loaded(ascii_head(2, head) + "0 0 0 " + level + " 0 0\n1 0 0 0 0 0\n", options);
+  return scene.mesh.visible()[0];
+}
+
+TEST(PlyReader, CountsOfTenAndTwelveBitsAreNotDark) {
+  LoadedScene scene;
+  for (const char* type : {"ushort", "short", "int", "float"}) {
+    EXPECT_EQ(colour_of_type(type, "4095", {}, scene), (base::Rgb8{255, 0, 0})) << type;
+    EXPECT_EQ(note_text(scene, "converted_colours"),
+              "Colours of type " + std::string(type) + " with values up to 4095 taken as 12 bits, 0 to 4095");
+    EXPECT_EQ(note_text(scene, "colour_white"),
+              "As 16 bits no colour would be brighter than 16 of 255; where they are, --colour-white 65535");
+    EXPECT_EQ(colour_of_type(type, "1023", {}, scene), (base::Rgb8{255, 0, 0})) << type;
+    EXPECT_EQ(note_count(scene, "colour_white"), 2U);
+    EXPECT_EQ(colour_of_type(type, "2048", {}, scene), (base::Rgb8{128, 0, 0})) << type;
+    EXPECT_EQ(colour_of_type(type, "600", {}, scene), (base::Rgb8{150, 0, 0})) << type;
+  }
+  // From there on 16 bits are as likely, and said to be dark.
+  EXPECT_EQ(colour_of_type("ushort", "16383", {}, scene), (base::Rgb8{64, 0, 0}));
+  EXPECT_EQ(note_text(scene, "colour_white"),
+            "No colour is brighter than 64 of 255; where 16383 is white in the file (14 bits), --colour-white 16383");
+  EXPECT_EQ(colour_of_type("ushort", "25700", {}, scene), (base::Rgb8{100, 0, 0}));
+  EXPECT_EQ(note_count(scene, "colour_white"), 0U);
+  // Levels that are a little over-exposed are no ten bits where they are floats.
+  EXPECT_EQ(colour_of_type("float", "300.5", {}, scene), (base::Rgb8{255, 0, 0}));
+  EXPECT_EQ(note_count(scene, "clamped_colours"), 1U);
+  EXPECT_EQ(note_count(scene, "colour_white"), 0U);
+  // Those of faces.
+  const LoadedScene faces =
+      loaded(ascii_head(3, std::string(kXyz) + "element face 1\n" + std::string(kFaces) +
+                               "property ushort red\nproperty ushort green\nproperty ushort blue\n") +
+             "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 4095 2048 0\n");
+  EXPECT_EQ(faces.mesh.visible()[2], (base::Rgb8{255, 128, 0}));
+  EXPECT_EQ(note_count(faces, "colour_white"), 3U);
+}
+
+TEST(PlyReader, WhatIsWhiteCanBeTold) {
+  LoadedScene scene;
+  ReadOptions options;
+  options.colour_white = 65535;
+  EXPECT_EQ(colour_of_type("ushort", "4095", options, scene), (base::Rgb8{16, 0, 0}));
+  EXPECT_EQ(note_text(scene, "converted_colours"), "Colours of type ushort with values up to 4095 taken as 0 to 65535");
+  EXPECT_EQ(note_count(scene, "colour_white"), 0U);
+  options.colour_white = 1;
+  EXPECT_EQ(colour_of_type("float", "0.5", options, scene), (base::Rgb8{128, 0, 0}));
+  EXPECT_EQ(colour_of_type("float", "7", options, scene), (base::Rgb8{255, 0, 0}));
+  EXPECT_EQ(note_count(scene, "clamped_colours"), 1U);
+  options.colour_white = 100;
+  EXPECT_EQ(colour_of_type("uchar", "60", options, scene), (base::Rgb8{153, 0, 0}));
+  EXPECT_EQ(note_text(scene, "converted_colours"), "Colours of type uchar taken as 0 to 100");
+  PlyBytes binary;
+  binary.text("ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + std::string(kXyz) + std::string(test::kRgb) +
+              "end_header\n");
+  binary.le(0.0F).le(0.0F).le(0.0F).le(std::uint8_t{60}).le(std::uint8_t{100}).le(std::uint8_t{200});
+  EXPECT_EQ(loaded(binary.bytes(), options).mesh.visible()[0], (base::Rgb8{153, 255, 255}));
+  options.colour_white = 255;
+  EXPECT_EQ(loaded(binary.bytes(), options).mesh.visible()[0], (base::Rgb8{60, 100, 200}));
+  const LoadedScene none = loaded(ascii_head(1, std::string(kXyz)) + "0 0 0\n", options);
+  EXPECT_EQ(note_text(none, "unused_options"), "There are no colours of levels, so this has no effect: --colour-white");
+  for (const double white : {0.0, -1.0, 1e17, std::numeric_limits<double>::quiet_NaN()}) {
+    options.colour_white = white;
+    EXPECT_FALSE(test::read_bytes(binary.bytes(), options)) << white;
+  }
+}
+
+TEST(PlyReader, ColoursAreTakenFromThePropertiesThatAreNamed) {
+  ReadOptions options;
+  options.colour_properties = {"Ka", "kb", "KC"};
+  const std::string head = std::string(kXyz) + std::string(test::kRgb) +
+                           "property uchar ka\nproperty uchar kb\nproperty uchar kc\nproperty uint colours_rgb\n";
+  const std::string text = ascii_head(1, head) + "0 0 0 1 2 3 40 50 60 3957840\n";
+  const LoadedScene scene = loaded(text, options);
+  EXPECT_EQ(scene.mesh.visible()[0], (base::Rgb8{40, 50, 60}));
+  EXPECT_EQ(note_text(scene, "colour_properties"), "The colours are taken from the properties ka, kb, kc");
+  EXPECT_NE(note_text(scene, "skipped_vertex_properties").find("red, green, blue"), std::string::npos);
+  options.colour_properties = {"kb"};
+  const LoadedScene grey = loaded(text, options);
+  EXPECT_EQ(grey.mesh.visible()[0], (base::Rgb8{50, 50, 50}));
+  EXPECT_EQ(note_text(grey, "colour_properties"), "The colours are taken from the property kb");
+  options.colour_properties = {"colours_rgb"};
+  EXPECT_EQ(loaded(text, options).mesh.visible()[0], (base::Rgb8{60, 100, 80}));
+  // Of the faces, where the vertices have none of that name.
+  const std::string of_faces = ascii_head(3, std::string(kXyz) + std::string(test::kRgb) + "element face 1\n" +
+                                                 std::string(kFaces) + "property uchar kb\n") +
+                               "0 0 0 1 2 3\n1 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 2 70\n";
+  options.colour_properties = {"kb"};
+  EXPECT_EQ(loaded(of_faces, options).mesh.visible()[1], (base::Rgb8{70, 70, 70}));
+  options.colour_properties = {"ka", "missing", "kc"};
+  const auto refused = test::read_bytes(text, options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "colour_properties");
+  EXPECT_NE(refused.error().message.find("there is no scalar property 'missing'"), std::string::npos);
 }
 
 TEST(PlyReader, BytesDeclaredAsCharAreBytes) {

@@ -11,6 +11,8 @@ TEST(BlockOptions, AreThoseOfTheCommandLine) {
   const auto block = incoming_block("a", {{"observed_at", "1700000000.5"},
                                           {"sensor", "1,-2.5,3e2"},
                                           {"temperature_property", "heat"},
+                                          {"colour_properties", "a,b,c"},
+                                          {"colour_white", "4095"},
                                           {"temperature_unit", "kelvin"},
                                           {"no_data", "-9999"},
                                           {"no_data", "inf"},
@@ -20,10 +22,22 @@ TEST(BlockOptions, AreThoseOfTheCommandLine) {
   EXPECT_EQ(block.value().observed_at, 1700000000.5);
   EXPECT_EQ(block.value().sensor, (base::Vec3d{1, -2.5, 300}));
   EXPECT_EQ(block.value().read.temperature_property, "heat");
+  EXPECT_EQ(block.value().read.colour_properties, (std::vector<std::string>{"a", "b", "c"}));
+  EXPECT_EQ(block.value().read.colour_white, 4095);
   EXPECT_EQ(block.value().read.temperature_unit, files::TemperatureUnit::Kelvin);
   EXPECT_EQ(block.value().read.no_data.size(), 2U);
   EXPECT_EQ(block.value().read.metres_per_unit, 0.001);
   EXPECT_EQ(block.value().read.up, base::UpAxis::MinusY);
+}
+
+TEST(BlockOptions, UpMayBeWrittenAsPeopleDo) {
+  for (const char* up : {"Y", "+y", "+Y", "y"}) {
+    const auto block = incoming_block("a", {{"up", up}});
+    ASSERT_TRUE(block) << block.error().message;
+    EXPECT_EQ(block.value().read.up, base::UpAxis::Y) << up;
+  }
+  EXPECT_EQ(incoming_block("a", {{"up", "-Z"}}).value().read.up, base::UpAxis::MinusZ);
+  EXPECT_FALSE(incoming_block("a", {{"up", "+-z"}}));
 }
 
 TEST(BlockOptions, TimesThatCannotBeMeantAreRefused) {
@@ -59,6 +73,8 @@ TEST(BlockOptions, AreWrittenAsAQueryThatIsReadBack) {
   files::ReadOptions read;
   EXPECT_TRUE(query_of(read).empty());
   read.temperature_property = "heat";
+  read.colour_properties = {"r0", "g0", "b0"};
+  read.colour_white = 1023;
   read.temperature_scale = 0.1;
   read.temperature_offset = -273.15;
   read.no_data = {-9999, std::numeric_limits<double>::infinity()};
@@ -68,6 +84,8 @@ TEST(BlockOptions, AreWrittenAsAQueryThatIsReadBack) {
   ASSERT_TRUE(block) << block.error().message;
   const files::ReadOptions& back = block.value().read;
   EXPECT_EQ(back.temperature_property, "heat");
+  EXPECT_EQ(back.colour_properties, read.colour_properties);
+  EXPECT_EQ(back.colour_white, 1023);
   EXPECT_EQ(back.temperature_scale, 0.1);
   EXPECT_EQ(back.temperature_offset, -273.15);
   EXPECT_EQ(back.no_data, read.no_data);
@@ -88,6 +106,9 @@ TEST(BlockOptions, NameTheFieldThatCannotBeMeant) {
     EXPECT_EQ(field(name, "what"), name);
   }
   EXPECT_EQ(field("observed_at", "nan"), "observed_at");
+  EXPECT_EQ(field("colour_white", "white"), "colour_white");
+  EXPECT_EQ(field("colour_properties", "a,b"), "colour_properties");
+  EXPECT_EQ(field("colour_properties", "a,,b"), "colour_properties");
   EXPECT_EQ(field("sensor", "1,2,3,4"), "sensor");
   EXPECT_EQ(field("temperature_property", "two\nlines"), "temperature_property");
   EXPECT_NE(field("scale", "0"), "");
