@@ -214,6 +214,44 @@ std::vector<bool> border_vertices(const mesh::MultispectralMesh& mesh) {
   return is_border;
 }
 
+using Direction = std::array<float, 3>;
+
+Direction unit(const std::array<double, 3>& v) {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  if (!(length > 0) || !std::isfinite(length)) return {};
+  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length), static_cast<float>(v[2] / length)};
+}
+
+/// Which way the surface of a scene faces at its vertices; 0 where there is none, or nothing to tell it by.
+std::vector<Direction> facings(std::span<const base::Vec3f> positions, std::span<const base::Triangle> triangles) {
+  std::vector<std::array<double, 3>> sums(positions.size());
+  for (const auto& [a, b, c] : triangles) {
+    const auto edge = [&](std::uint32_t to) -> std::array<double, 3> {
+      return {static_cast<double>(positions[to].x) - static_cast<double>(positions[a].x),
+              static_cast<double>(positions[to].y) - static_cast<double>(positions[a].y),
+              static_cast<double>(positions[to].z) - static_cast<double>(positions[a].z)};
+    };
+    const auto u = edge(b), v = edge(c);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t next = (axis + 1) % 3, last = (axis + 2) % 3;
+      const double area = u[next] * v[last] - u[last] * v[next];
+      for (const std::uint32_t corner : {a, b, c}) sums[corner][axis] += area;
+    }
+  }
+  std::vector<Direction> directions(positions.size());
+  std::transform(sums.begin(), sums.end(), directions.begin(), unit);
+  return directions;
+}
+
+float dot(const Direction& a, const Direction& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// On the two sides of something thin.
+bool are_opposite(const Direction& a, const Direction& b) {
+  return dot(a, b) < -0.5F;
+}
+
 /// The thermal surface under a scene's vertices.
 class PlaceJoin {
  public:
@@ -239,12 +277,75 @@ class PlaceJoin {
         from, most,
         [&](std::size_t v, const mesh::NearestSurface::Hit& hit) {
           places_[v] = {static_cast<float>(hit.distance), static_cast<float>(beyond_border(from[v], hit)),
-                        temperature(hit)};
+                        temperature(hit), hit.corners[0]};
         },
         [&](std::size_t count) {
           const double share = static_cast<double>(done_count += count) / static_cast<double>(from.size());
           base::report(progress_, base::kJoiningPhase, kBuildingShare + (1 - kBuildingShare) * std::min(1.0, share));
         });
+  }
+
+  /// A point of a thermal cloud may be nearest to a vertex of the scene though it lies on the other side of a wall: the points are nearest
+  /// to a side each, and a vertex takes the nearest of those that are not on the opposite one. To be called after look().
+  void keep_to_sides(double most) {
+    if (!thermal_.is_point_cloud() || scene_.is_point_cloud()) return;
+    const std::span<const base::Vec3f> from = scene_.positions();
+    const std::vector<Direction> facing = facings(from, scene_.triangles());
+    std::vector<Direction> facing_of_points(positions_.size());
+    mesh::NearestSurface(from, scene_.triangles()).find_all(positions_, most, [&](std::size_t p, const auto& hit) {
+      std::array<double, 3> sum{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          sum[axis] += hit.weights[i] * static_cast<double>(facing[hit.corners[i]][axis]);
+        }
+      }
+      facing_of_points[p] = unit(sum);
+    });
+    std::array<std::vector<std::uint32_t>, 6> vertices;  // By where they face most: x, -x, y ...
+    for (std::uint32_t v = 0; v < places_.size(); ++v) {
+      if (places_[v].point == kNone || !are_opposite(facing[v], facing_of_points[places_[v].point])) continue;
+      const auto axis =
+          static_cast<std::size_t>(std::max_element(facing[v].begin(), facing[v].end(),
+                                                    [](float a, float b) { return std::abs(a) < std::abs(b); }) -
+                                   facing[v].begin());
+      vertices[2 * axis + (facing[v][axis] < 0 ? 1 : 0)].push_back(v);
+    }
+    for (std::size_t way = 0; way < vertices.size(); ++way) {
+      if (vertices[way].empty()) continue;
+      std::vector<std::uint32_t> points;
+      std::vector<base::Vec3f> places_of_points, places_of_vertices;
+      for (std::uint32_t p = 0; p < facing_of_points.size(); ++p) {
+        const Direction& direction = facing_of_points[p];
+        const float along = way % 2 == 0 ? direction[way / 2] : -direction[way / 2];
+        if (direction == Direction{} || along < 0) continue;
+        points.push_back(p);
+        places_of_points.push_back(positions_[p]);
+      }
+      for (const std::uint32_t v : vertices[way]) {
+        places_[v].is_of_other_side = true;
+        places_of_vertices.push_back(from[v]);
+      }
+      mesh::NearestSurface(places_of_points, {})
+          .find_all(places_of_vertices, most, [&](std::size_t i, const auto& hit) {
+            const std::uint32_t v = vertices[way][i];
+            const std::uint32_t point = points[hit.corners[0]];
+            if (are_opposite(facing[v], facing_of_points[point])) return;
+            places_[v] = {static_cast<float>(hit.distance), 0, thermal_.temperature_celsius()[point], point};
+            places_[v].is_beside_nearer = true;
+          });
+    }
+  }
+
+  /// How many of the vertices within `reach` are on one of two sides that are near each other: those that have the nearest point of
+  /// their own, and those that have one of the other, because their own has none.
+  std::pair<std::uint64_t, std::uint64_t> side_counts(double reach) const {
+    std::pair<std::uint64_t, std::uint64_t> counts;
+    for (const Place& place : places_) {
+      if (!is_within(place, reach)) continue;
+      counts.first += place.is_beside_nearer ? 1U : 0U;
+      counts.second += place.is_of_other_side ? 1U : 0U;
+    }
+    return counts;
   }
 
   /// The distance up to which places are joined.
@@ -289,7 +390,11 @@ class PlaceJoin {
     float distance = std::numeric_limits<float>::infinity();
     float beyond_border = 0;
     float temperature_celsius = kMissing;
+    std::uint32_t point = kNone;    ///< Of a cloud: which; else a corner of a triangle.
+    bool is_beside_nearer = false;  ///< A nearer one is on the other side of something thin.
+    bool is_of_other_side = false;  ///< This one is.
   };
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   /// Beyond the border the surface reaches as far as neighbours are apart, or as it may be displaced.
   bool is_within(const Place& place, double reach) const {
@@ -399,6 +504,7 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
   } else {
     reach = join.reach(scene_box.diagonal());
   }
+  join.keep_to_sides(reach);
   std::vector<float> found = join.found_distances(reach);
   BOOST_OUTCOME_TRYV(check_extent(scene, thermal, scene_box, thermal_box, join_distance_m == 0 ? reach : 0));
   const std::uint64_t count = mesh.vertex_count();
@@ -438,6 +544,15 @@ base::Result<void> join_by_place(const LoadedScene& thermal, double join_distanc
                                ", has no vertex of the scene at it: the scene's hottest has " + celsius_text(kept) +
                                advice,
                            true});
+  }
+  if (const auto [own_count, other_count] = join.side_counts(reach); own_count + other_count > 0) {
+    scene.notes.push_back(
+        {"thermal_sides", own_count + other_count,
+         "Two sides of the scene are closer to each other than the points of " + thermal.mesh.name +
+             " are: " + counted(own_count, "vertex takes", "vertices take") + " the nearest of the own side, " +
+             counted(other_count, "vertex takes", "vertices take") + " one of the other, the own having none within " +
+             base::distance_text(reach) + "; a point is of the side that it is nearest to",
+         other_count > 0});
   }
   if (joined_count < count) {
     scene.notes.push_back({"thermal_not_reached", count - joined_count,

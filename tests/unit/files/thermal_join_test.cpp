@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "fusion/files/ply_reader.hpp"
@@ -406,6 +407,52 @@ TEST(ThermalJoin, PointsOfACloudReachATenthOfTheSceneAtMost) {
     const bool is_near = std::hypot(std::min(p.x, 1 - p.x), std::min(p.y, 1 - p.y)) < 0.15F;
     EXPECT_TRUE(is_near || std::isnan(mesh.temperature_celsius()[v])) << v;
   }
+}
+
+/// A wall of 4 x 2 m and 5 cm thickness: 2 x 41 x 21 vertices and the triangles of both sides, which face away from each other.
+std::string thin_wall() {
+  constexpr int kColumns = 41, kRows = 21;
+  std::string lines, faces;
+  for (int side = 0; side < 2; ++side) {
+    for (int i = 0; i < kColumns * kRows; ++i) {
+      lines += std::to_string(0.1 * (i % kColumns)) + (side == 0 ? " 0 " : " 0.05 ") +
+               std::to_string(0.1 * (i / kColumns)) + '\n';
+      if (i % kColumns + 1 == kColumns || i / kColumns + 1 == kRows) continue;
+      const int a = side * kColumns * kRows + i;
+      for (const auto& [b, c] : {std::pair(a + 1, a + kColumns + 1), {a + kColumns + 1, a + kColumns}}) {
+        faces += "3 " + std::to_string(a) + ' ' + std::to_string(side == 0 ? b : c) + ' ' +
+                 std::to_string(side == 0 ? c : b) + '\n';
+      }
+    }
+  }
+  return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(2 * kColumns * kRows) + "\n" +
+         std::string(test::kXyz) + "element face " + std::to_string(4 * (kColumns - 1) * (kRows - 1)) + "\n" +
+         std::string(test::kFaces) + "end_header\n" + lines + faces;
+}
+
+TEST(ThermalJoin, PointsOfACloudKeepToTheirSideOfAThinWall) {
+  // Points 40 cm apart, 1 cm off the wall, which is warm on one side; those of the other side lie between them.
+  std::string lines;
+  int count = 0;
+  const auto add = [&](double first, const char* rest, const char* celsius) {
+    for (int i = 0; i < 66; ++i, ++count) {
+      lines += std::to_string(first + 0.4 * (i % 11)) + rest + std::to_string(first + 0.4 * (i / 11)) + celsius + '\n';
+    }
+  };
+  add(0, " 0.01 ", " 35");
+  const auto one_side = joined(thin_wall(), thermal_file(lines, count));
+  ASSERT_TRUE(one_side) << one_side.error().message;
+  EXPECT_NE(note_text(one_side.value(), "thermal_sides").find("861 vertices take one of the other"), std::string::npos)
+      << note_text(one_side.value(), "thermal_sides");
+  add(0.2, " 0.06 ", " 10");
+  const auto both = joined(thin_wall(), thermal_file(lines, count));
+  ASSERT_TRUE(both) << both.error().message;
+  const auto celsius = both.value().mesh.temperature_celsius();
+  EXPECT_EQ(std::count(celsius.begin(), celsius.begin() + 861, 35.0F), 861);
+  EXPECT_EQ(std::count(celsius.begin() + 861, celsius.end(), 10.0F), 861);
+  EXPECT_NE(note_text(both.value(), "thermal_sides").find("of the own side, 0 vertices take one of the other"),
+            std::string::npos)
+      << note_text(both.value(), "thermal_sides");
 }
 
 TEST(ThermalJoin, RefusesWhatIsAllInOnePlace) {
