@@ -40,10 +40,10 @@ std::string text_file(const std::string& properties, const std::vector<std::stri
 
 TEST(FieldKinds, NanHasManySpellings) {
   for (const char* nan :
-       {"nan",     "NaN",       "-nan",    "-nan(ind)", "nan(snan)", "1.#QNAN", "-1.#QNAN",  "1.#QNAN0",
-        "-1.#IND", "-1.#IND00", "1.#SNAN", "1.#J",      "NaNQ",      "NaNS",    "qnan",      "null",
-        "NULL",    "None",      "NA",      "N/A",       "#N/A",      "<NA>",    "undefined", "-",
-        "--",      "*",         "?",       "missing",   "nodata",    "#QNAN"}) {
+       {"nan",       "NaN",     "-nan",  "-nan(ind)", "nan(snan)", "1.#QNAN", "-1.#QNAN", "1.#QNAN0", "-1.#IND",
+        "-1.#IND00", "1.#SNAN", "1.#J",  "NaNQ",      "NaNS",      "qnan",    "null",     "NULL",     "None",
+        "NA",        "N/A",     "#N/A",  "<NA>",      "undefined", "-",       "--",       "*",        "?",
+        "missing",   "nodata",  "#QNAN", "no_data",   "#NaN",      "---"}) {
     const LoadedScene scene = loaded(text_file(
         "property float temperature\n", {"0 0 0 20", std::string("1 0 0 ") + nan, std::string(nan) + " 0 0 30"}));
     EXPECT_EQ(scene.mesh.vertex_count(), 2U) << nan;

@@ -65,7 +65,8 @@ TEST(UpSearch, ReadsWhatProgramsAndPeopleWrite) {
                            "comment gravity: -y",
                            "comment exported with forward -Z, up Y",
                            "comment Exported from Blender axis_forward=-Z axis_up=Y",
-                           "comment not z up, y up"}) {
+                           "comment not z up, y up",
+                           "comment not z up but y up"}) {
     EXPECT_EQ(told({line}), "y") << line;
   }
   for (const char* line : {"comment x right, y down, z forward", "comment up -y", "comment up axis = -Y",
@@ -95,6 +96,7 @@ TEST(UpSearch, ReadsNothingIntoOtherWords) {
                            "comment up vector (0, nan, 0)",
                            "comment not y up",
                            "comment do not use y up",
+                           "comment there is no y up",
                            "comment never load it y up",
                            "comment cleaned, up z noise",
                            "comment not up y",
@@ -220,6 +222,7 @@ TEST(SceneSurvey, KnowsWhetherAnybodySaidThatItIsMetric) {
   EXPECT_FALSE(is_metric({"comment m"})) << "a letter, unless it is said to be the unit";
   EXPECT_FALSE(is_metric({"comment units: m of a map"}));
   EXPECT_TRUE(is_metric({"comment in m"}));
+  EXPECT_TRUE(is_metric({"comment 1 unit = 1 m"}));
   EXPECT_TRUE(is_metric({"comment units: m."}));
   EXPECT_FALSE(is_metric({"comment in m, as of 2020"}));
   for (const char* line : {"comment units: \xC2\xB5m", "comment units: \xCE\xBCm", "comment units: \xB5m"}) {
