@@ -1,9 +1,20 @@
-// What the page bears: a million vertices, and hundreds of changes.
+// What the page bears: a million vertices, hundreds of changes, and a machine that draws slowly.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
-import { PROGRAM, assertGpuObjects, drawn, gpuObjects, openClient, settled, startServer, test } from './harness.mjs';
+import {
+  PROGRAM,
+  assertGpuObjects,
+  demoServer,
+  drawn,
+  gpuObjects,
+  openClient,
+  screenshot,
+  settled,
+  startServer,
+  test,
+} from './harness.mjs';
 
 /** Longest task of the page's main thread. */
 const LONGEST_TASK_MS = 50;
@@ -215,5 +226,76 @@ export function addLoadTests(browser, scratch) {
     assert.deepEqual(problems, []);
     await page.close();
     await server.stop();
+  });
+
+  test('A slow machine draws less while the camera moves, and everything at rest', async () => {
+    const server = await demoServer();
+    const { page } = await openClient(browser, server.url);
+    await settled(page);
+    const pose = await page.evaluate(() => globalThis.spectra.viewport.pose);
+    await page.evaluate(({ eye, target }) => {
+      globalThis.spectra.store.marksShown = false;
+      globalThis.spectra.setView({ eye, target });
+    }, pose);
+    await settled(page);
+    const before = await screenshot(page, 'pace-before');
+    const { triangles } = await page.evaluate(() => globalThis.spectra.viewport.gpuObjects);
+    await page.evaluate(() => {
+      globalThis.waits = [];
+      globalThis.notches = [];
+      globalThis.said = [];
+      const { store, viewport } = globalThis.spectra;
+      setInterval(() => globalThis.said.push([viewport.gpuObjects.triangles, store.drawnError.position_m]), 10);
+      addEventListener('pointermove', (event) => {
+        globalThis.waits.push(performance.now() - event.timeStamp);
+        globalThis.notches.push(globalThis.spectra.viewport.notch);
+      });
+    });
+    await page.mouse.move(700, 450);
+    await page.mouse.down();
+    const pictures = () => page.evaluate(() => [globalThis.spectra.viewport.pictures, performance.now()]);
+    const [first, start] = await pictures();
+    for (let i = 1; i <= 80; i += 1) {
+      await page.mouse.move(700 + 200 * Math.sin(i / 8), 450 + 30 * Math.sin(i / 5));
+      await page.waitForTimeout(16);
+    }
+    const [last, end] = await pictures();
+    await page.mouse.up();
+    // The picture at rest comes while the pointer goes on.
+    for (let i = 0; i < 60; i += 1) {
+      await page.mouse.move(600 + 5 * i, 500);
+      await page.waitForTimeout(30);
+    }
+    const { waits, notches } = await page.evaluate(() => ({ waits: globalThis.waits, notches: globalThis.notches }));
+    const used = notches.filter((notch) => notch !== null);
+    waits.sort((a, b) => a - b);
+    console.log(
+      `        moving: ${((end - start) / (last - first)).toFixed(0)} ms a picture, at last ${JSON.stringify(used.at(-1))};` +
+        ` an input waited ${waits[waits.length >> 1].toFixed(0)} ms (median), ${waits.at(-1).toFixed(0)} ms (longest)`,
+    );
+    assert.ok(used.at(-1).resolution < 1, 'drawing by software is a slow machine');
+    await drawn(page);
+    const said = await page.evaluate(() => globalThis.said);
+    const atRest_m = said.at(-1)[1];
+    const coarse = said.filter(([drawn]) => drawn < triangles / 2);
+    assert.ok(used.at(-1).levels === 0 || coarse.length > 0);
+    assert.deepEqual(
+      coarse.filter(([, error_m]) => error_m <= atRest_m),
+      [],
+      'said to be as exact as at rest while what was drawn last is not',
+    );
+    const picture_ms = await page.evaluate(() => globalThis.spectra.viewport.picture_ms);
+    console.log(`        at rest: ${picture_ms.toFixed(0)} ms a picture`);
+    // Both grow with whatever else the machine has to do.
+    assert.ok(waits.at(-1) < picture_ms / 2, 'input waits until a picture is drawn');
+    await page.evaluate(({ eye, target }) => globalThis.spectra.setView({ eye, target }), pose);
+    await settled(page);
+    await page.mouse.move(20, 890);
+    const after = await screenshot(page, 'pace-after');
+    assert.equal(await page.evaluate(() => globalThis.spectra.viewport.gpuObjects.triangles), triangles);
+    for (let x = 200; x < 1100; x += 25) {
+      for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);
+    }
+    await page.close();
   });
 }

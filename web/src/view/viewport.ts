@@ -65,6 +65,8 @@ export class Viewport {
   #size: [number, number] = [1, 1];
   #up: UpAxis = 'y';
   #isAiming = false;
+  /** Asked for while the answer to the one before was out. */
+  #toAimAt: [number, number] | null = null;
   #isOutlined = false;
   readonly #pace = new MotionPace();
   /** How pictures that have been sent and not drawn are drawn; null: in full. */
@@ -502,11 +504,16 @@ export class Viewport {
 
   /** Aims at what is seen at a place of the canvas; where nothing is, nothing changes. */
   async #aim(x: number, y: number): Promise<void> {
+    this.#toAimAt = [x, y];
     if (this.#isAiming) return;
     this.#isAiming = true;
-    const point = await this.pick(x, y);
+    while (this.#toAimAt !== null) {
+      const place = this.#toAimAt;
+      this.#toAimAt = null;
+      const point = await this.pick(...place);
+      if (point !== null) this.aimAt(point);
+    }
     this.#isAiming = false;
-    if (point !== null) this.aimAt(point);
   }
 
   #ask(question: (id: number) => Extract<RenderRequest, { id: number }>) {
