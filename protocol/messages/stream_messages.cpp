@@ -154,6 +154,8 @@ static void describe(auto& fields, Is<StreamStats> auto& message) {
   fields.field("skipped_frames", message.skipped_frames);
   fields.field("viewers", message.viewers);
   fields.field("accuracy", message.accuracy);
+  fields.field("generation", message.generation);
+  fields.field("scene_revision", message.scene_revision);
   rules(fields, message);
 }
 

@@ -107,6 +107,11 @@ struct StreamStats {
   /// Connected now.
   std::uint64_t viewers = 0;
   StreamAccuracy accuracy;
+  /// Of the settings in force.
+  std::uint32_t generation = 0;
+  /// All that is to be drawn has been sent in that generation as it was in this revision of the scene, or later. Of
+  /// a map that changes all the time it rises, while stream.complete hardly ever comes.
+  std::uint32_t scene_revision = 0;
 };
 
 enum class StatusLevel { Info, Warning, Error };

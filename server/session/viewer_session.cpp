@@ -611,6 +611,8 @@ void ViewerSession::ticked() {
   message.queued_bytes = stats.queued_bytes + peer_.queued_bytes();
   message.skipped_frames = stats.skipped_frames;
   message.viewers = served_.viewer_count;
+  message.generation = stats.generation;
+  message.scene_revision = stats.shown_revision;
   message.accuracy.position_mm = if_positive(stats.position_mm);
   message.accuracy.colour_levels = stats.colour_levels;
   message.accuracy.temperature_celsius = stats.temperature_celsius;

@@ -195,6 +195,8 @@ StreamStats ViewerStream::stats() const {
   stats.queued_bytes = window_.in_flight_bytes() + tiles_.prepared_bytes();
   stats.skipped_frames = skipped_frame_count_;
   stats.failed_tiles = failed_tile_count_;
+  stats.generation = generation_;
+  stats.shown_revision = subscribed_ && demand_.plan ? tiles_.shown_revision(demand_) : 0;
   std::vector<HeldQuality> held;
   for (const auto& slot : tiles_.slots())
     held.push_back({!slot->is_drawable()     ? 0
@@ -233,7 +235,7 @@ void ViewerStream::adopt(std::shared_ptr<const map::SceneSnapshot> scene) {
   scene_ = std::move(scene);
   order_.clear();
   raw_.clear();
-  tiles_.adopt(*scene_);
+  tiles_.adopt(*scene_, demand_);
   take_looks();
   is_complete_due_ = true;
   answer_first();

@@ -26,7 +26,10 @@ void TileSlot::forget_raw() {
   }
 }
 
-void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
+void ViewerTiles::adopt(const map::SceneSnapshot& scene, const Demand& demand) {
+  for (const auto& slot : slots_) {
+    if (!is_to_come(*slot, demand)) slot->shown_revision = scene_revision_;
+  }
   tree_ = ViewTree(scene);
   std::map<TileId, std::shared_ptr<TileSlot>> known_slots;
   for (auto& slot : slots_) known_slots.emplace(slot->tile->id, slot);
@@ -34,16 +37,19 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
   for (std::size_t node = 0; node < tree_.nodes().size(); ++node) {
     const auto& tile = tree_.nodes()[node].tile;
     auto slot = std::make_shared<TileSlot>();
+    slot->shown_revision = scene_revision_;
     if (const auto known = known_slots.find(tile->id); known != known_slots.end()) {
       if (known->second->tile == tile) {
         slot = known->second;
       } else {
         succeed(*slot, *known->second);
+        slot->shown_revision = known->second->shown_revision;
         abandon(*known->second);
       }
       known_slots.erase(known);
     } else if (const auto left = leaving_.find(tile->id); left != leaving_.end()) {
       slot->held = left->second.held;
+      slot->shown_revision = left->second.shown_revision;
       leaving_.erase(left);
     }
     slot->tile = tile;
@@ -54,10 +60,11 @@ void ViewerTiles::adopt(const map::SceneSnapshot& scene) {
     if (slot->held.wire_revision != 0) {
       TileSlot left;
       succeed(left, *slot);
-      leaving_.insert_or_assign(id, Leaving{slot->tile->bounds, left.held, std::nullopt});
+      leaving_.insert_or_assign(id, Leaving{slot->tile->bounds, left.held, slot->shown_revision, std::nullopt});
     }
     abandon(*slot);
   }
+  scene_revision_ = scene.revision();
 }
 
 void ViewerTiles::succeed(TileSlot& slot, const TileSlot& before) {
@@ -150,6 +157,20 @@ bool ViewerTiles::is_satisfied(const TileSlot& slot, const Demand& demand) const
     return true;
   const bool is_of_before = slot.held.wire_revision != 0 && slot.held.geometry_epoch == 0;
   return is_of_before && slot.held.child_mask == slot.tile->child_mask && is_hidden(slot, demand);
+}
+
+bool ViewerTiles::is_to_come(const TileSlot& slot, const Demand& demand) const {
+  if (!slot.wish.is_wanted || !slot.wish.is_target) return false;
+  return !is_satisfied(slot, demand) || (!demand.fused && slot.lacks_raw_layers(demand));
+}
+
+std::uint32_t ViewerTiles::shown_revision(const Demand& demand) const {
+  std::uint32_t shown = scene_revision_;
+  for (const auto& slot : slots_) {
+    if (is_to_come(*slot, demand)) shown = std::min(shown, slot->shown_revision);
+  }
+  for (const auto& [id, leaving] : leaving_) shown = std::min(shown, leaving.shown_revision);
+  return shown;
 }
 
 template <class IsSo>
@@ -356,14 +377,10 @@ void ViewerTiles::remove_from_viewer(TileSlot& slot) {
 
 void ViewerTiles::remove_succeeded(std::span<const std::shared_ptr<TileSlot>> wanted, const Demand& demand) {
   if (leaving_.empty()) return;
-  const auto is_to_come = [&](const TileSlot& slot) {
-    if (!slot.wish.is_target) return false;
-    return !is_satisfied(slot, demand) || (!demand.fused && slot.lacks_raw_layers(demand));
-  };
   std::map<TileId, base::Bounds> to_come;
   std::set<TileId> outdated_masks;
   for (const auto& slot : wanted) {
-    if (is_to_come(*slot)) to_come.emplace(slot->tile->id, slot->tile->bounds);
+    if (is_to_come(*slot, demand)) to_come.emplace(slot->tile->id, slot->tile->bounds);
     const bool is_outdated = slot->held.wire_revision != 0 && slot->held.child_mask != slot->tile->child_mask;
     if (is_outdated && slot->failed.geometry_epoch != demand.geometry_epoch) outdated_masks.insert(slot->tile->id);
   }

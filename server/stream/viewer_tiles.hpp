@@ -33,6 +33,8 @@ struct TileSlot {
   std::shared_ptr<const map::Tile> tile;
   std::size_t node = 0;  ///< In the tree.
   bool is_gone = false;  ///< No longer part of the scene, or the stream has ended.
+  /// Of the scene: what had changed there by then has been given out. As of when the scene was replaced last.
+  std::uint32_t shown_revision = 0;
 
   /// What the camera asks for.
   struct Wish {
@@ -138,7 +140,7 @@ class ViewerTiles {
  public:
   /// The tiles of another scene. Those that both have stay as they are; of those that have changed the viewer holds
   /// something outdated; those that are gone are removed.
-  void adopt(const map::SceneSnapshot& scene);
+  void adopt(const map::SceneSnapshot& scene, const Demand& demand);
   /// The end: nothing is left, and jobs that are under way find their slots gone.
   void clear();
 
@@ -168,6 +170,9 @@ class ViewerTiles {
 
   /// The viewer has something to draw of it, be it of an earlier version, or there will never be anything.
   static bool is_there(const TileSlot& slot, const Demand& demand);
+  /// The scene's newest revision of which all that is to be drawn has been given out.
+  std::uint32_t shown_revision(const Demand& demand) const;
+
   /// True when it would put something coarse, or nothing, in the place of what the viewer sees of an earlier version of the map, until
   /// others have come: it comes after those. A coarse tile beneath which there is something and something is lacking; a tile that takes
   /// the place of one of before while a new one is lacking beside it, which may have a part of that place.
@@ -206,6 +211,7 @@ class ViewerTiles {
   struct Leaving {
     base::Bounds bounds;
     TileSlot::Held held;
+    std::uint32_t shown_revision = 0;
     /// Those in its place that are still to come; nothing before they are known.
     std::optional<std::set<protocol::TileId>> successors;
   };
@@ -213,6 +219,8 @@ class ViewerTiles {
   /// A tile of which the viewer holds something takes the place of one of before.
   static void succeed(TileSlot& slot, const TileSlot& before);
   bool is_lacking(const TileSlot& slot, const Demand& demand) const;
+  /// It is to be drawn, and something of it has not been given out.
+  bool is_to_come(const TileSlot& slot, const Demand& demand) const;
   bool is_anything_beneath(const TileSlot& slot) const;
   /// The viewer draws it, because it lacks some of those that it names.
   bool is_drawn(const TileSlot& slot, const Demand& demand) const;
@@ -239,6 +247,7 @@ class ViewerTiles {
   std::deque<protocol::TileFrameHeader> removals_;
   std::map<protocol::TileId, Leaving> leaving_;
   std::size_t prepared_bytes_ = 0;
+  std::uint32_t scene_revision_ = 0;
   double next_look_s_ = std::numeric_limits<double>::infinity();
 };
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "fake_scene.hpp"
+#include "server/map/tile_place.hpp"
 #include "stream_with_viewers.hpp"
 #include "test_viewer.hpp"
 
@@ -259,6 +260,66 @@ TEST_F(StreamWithViewers, WhatChangesAllTheTimeDoesNotKeepAwayWhatIsLacking) {
     root_count += frame.kind == FrameKind::Geometry && frame.tile.level == 0 ? 1 : 0;
   EXPECT_EQ(viewer.tiles.size(), now.size()) << "everything came in turn with the root";
   EXPECT_GE(root_count, 4U) << "in turn with its quarters, which are drawn in its place then";
+}
+
+/// A little more changes each time than comes. What is said to be shown is: of each leaf what it was by then, or newer; and that goes on.
+TEST_F(StreamWithViewers, WhatIsShownOfAMapThatIsHardlyEverCompleteIsSaid) {
+  Tiles now = whole_tree();
+  std::vector<TileId> leaves;
+  for (const auto& tile : now) {
+    if (tile->child_mask == 0) leaves.push_back(tile->id);
+  }
+  std::uint32_t revision = 1;
+  std::map<TileId, std::vector<std::uint32_t>> changes;
+  for (const TileId& id : leaves) changes[id].push_back(revision);
+  const auto first = scene_of(now, revision);
+  TestViewer viewer(first, cache_, pool_);
+  viewer.stream().subscribe({});
+  EXPECT_EQ(viewer.stream().stats().shown_revision, 0U) << "without settings there is no picture";
+  viewer.stream().set_plan(plan_with_alpha(*first, 0.5));
+  std::map<TileId, std::uint32_t> geometry_of, shown_of;  // Revisions of the scene.
+  std::size_t seen = 0, complete_count = 0;
+  std::uint32_t last_shown = 0;
+  std::uint32_t random = 1;
+  constexpr std::size_t kTurns = 150;
+  for (std::size_t turn = 0; turn < kTurns; ++turn) {
+    wait_until_idle(pool_);
+    viewer.take(3);
+    for (; seen < viewer.frames.size(); ++seen) {
+      const auto& frame = viewer.frames[seen];
+      if (frame.kind == FrameKind::Geometry) geometry_of[frame.tile] = revision;
+      if (frame.kind == FrameKind::Colours) shown_of[frame.tile] = geometry_of[frame.tile];
+    }
+    if (viewer.stream().take_complete()) ++complete_count;
+    const auto stats = viewer.stream().stats();
+    EXPECT_EQ(stats.generation, 1U);
+    EXPECT_GE(stats.shown_revision, last_shown);
+    last_shown = stats.shown_revision;
+    for (const TileId& id : leaves) {
+      for (const std::uint32_t changed : changes[id]) {
+        if (changed > last_shown) continue;
+        EXPECT_GE(shown_of[id], changed) << "turn " << turn;
+      }
+    }
+    ++revision;
+    for (int i = 0; i < 2; ++i) {
+      random = random * 1664525U + 1013904223U;
+      TileId id = leaves[static_cast<std::size_t>(random >> 8) % leaves.size()];
+      changes[id].push_back(revision);
+      change(now, id);
+      while (id.level > 0) change(now, id = map::parent_of(id));
+    }
+    viewer.stream().set_scene(std::make_shared<FakeScene>(now, revision, *first));
+  }
+  EXPECT_LT(complete_count, kTurns / 10);
+  EXPECT_GT(last_shown, revision / 2);
+  EXPECT_LT(last_shown + 1, revision);
+  // Of newer settings nothing is shown yet.
+  viewer.stream().set_plan(plan_with_alpha(*first, 0.3));
+  EXPECT_EQ(viewer.stream().stats().generation, 2U);
+  EXPECT_LT(viewer.stream().stats().shown_revision, revision);
+  viewer.complete();
+  EXPECT_EQ(viewer.stream().stats().shown_revision, revision);
 }
 
 /// The tiles of a map that comes after another: what has changed is new, never one that was there before.

@@ -744,6 +744,13 @@ export interface StreamStats {
   /** Connected now. */
   viewers: number;
   accuracy: StreamAccuracy;
+  /** Of the settings in force. */
+  generation: number;
+  /**
+   * All that is to be drawn has been sent in that generation as it was in this revision of the scene, or later. Of a map
+   * that changes all the time it rises, while stream.complete hardly ever comes.
+   */
+  scene_revision: number;
 }
 
 /** Result of scene.subscribe. */
@@ -1039,6 +1046,8 @@ export const streamStats: Decoder<StreamStats> = object({
   skipped_frames: count,
   viewers: count,
   accuracy: streamAccuracy,
+  generation: count,
+  scene_revision: count,
 });
 
 export const status: Decoder<Status> = object({

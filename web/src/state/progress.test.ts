@@ -7,13 +7,8 @@ function setUp() {
   const store = new Store();
   store.fusionInForce = { method: 'blend' } as Fusion;
   const tiles = { size: 0, current: 0, total: 0, progress: () => ({ current: tiles.current, total: tiles.total }) };
-  const clock = { now: 1000, isBusy: false };
-  const progress = new Progress(
-    store,
-    tiles,
-    () => clock.isBusy,
-    () => clock.now,
-  );
+  const clock = { now: 1000, busy: false, answeredGeneration: 0 };
+  const progress = new Progress(store, tiles, clock, () => clock.now);
   return { store, tiles, clock, progress };
 }
 const complete = (generation: number) => ({ generation }) as StreamComplete;
@@ -49,12 +44,12 @@ describe('the progress of a picture', () => {
     progress.drawn(1);
     expect(store.behindSince).toBe(1000);
     expect(store.complete).toEqual(complete(3));
-    clock.isBusy = true;
+    clock.busy = true;
     progress.completed(complete(4), 1);
     progress.drawn(1);
     expect(store.behindSince).toBe(1000);
     expect(store.pictureMethod).toBeNull();
-    clock.isBusy = false;
+    clock.busy = false;
     progress.completed(complete(4), 1);
     progress.drawn(1);
     expect(store.behindSince).toBeNull();
@@ -91,6 +86,52 @@ describe('the progress of a picture', () => {
     expect([store.behindSince, store.lastUpdate]).toEqual([null, { bytes: 70, ms: 300 }]);
     grows(5, 3000);
     expect(store.behindSince).toBe(3000);
+  });
+
+  it('of a map that is never complete is behind of what has not been sent, and never at its end', () => {
+    const { store, clock, progress } = setUp();
+    for (const [revision, at] of [
+      [1, 1000],
+      [2, 1500],
+      [3, 1900],
+      [4, 2300],
+    ] as const) {
+      clock.now = at;
+      store.scene = { revision } as Scene;
+      progress.begin();
+    }
+    progress.shows({ generation: 0, scene_revision: 2 }, 7);
+    // It is still being drawn.
+    progress.drawn(6);
+    expect(store.behindSince).toBe(1000);
+    progress.drawn(7);
+    expect([store.behindSince, store.complete, store.lastUpdate]).toEqual([1900, null, null]);
+    // The range has become another, and with it the generation.
+    store.generation = 1;
+    progress.shows({ generation: 0, scene_revision: 3 }, 8);
+    progress.drawn(8);
+    expect(store.behindSince).toBe(2300);
+    clock.now = 2600;
+    store.scene = { revision: 5 } as Scene;
+    progress.begin();
+    // Settings that were made here are not in it.
+    clock.answeredGeneration = 1;
+    progress.shows({ generation: 0, scene_revision: 4 }, 9);
+    progress.drawn(9);
+    expect(store.behindSince).toBe(2300);
+    clock.busy = true;
+    progress.shows({ generation: 1, scene_revision: 4 }, 10);
+    progress.drawn(10);
+    expect(store.behindSince).toBe(2300);
+    clock.busy = false;
+    for (const scene_revision of [4, 5]) {
+      progress.shows({ generation: 1, scene_revision }, 11);
+      progress.drawn(11);
+      expect(store.behindSince).toBe(2600);
+    }
+    progress.completed({ generation: 1, scene_revision: 5 } as StreamComplete, 12);
+    progress.drawn(12);
+    expect(store.behindSince).toBeNull();
   });
 
   it('keeps little of a map that is never complete, and never says that less is missing than is', () => {
@@ -163,11 +204,11 @@ describe('the progress of a picture', () => {
     store.generation = 4;
     store.complete = complete(4);
     progress.begin(true);
-    clock.isBusy = true;
+    clock.busy = true;
     progress.tick();
     expect(store.behindSince).toBe(1000);
     // Taken, they are another generation, which is to come.
-    clock.isBusy = false;
+    clock.busy = false;
     store.generation = 5;
     progress.tick();
     expect(store.behindSince).toBe(1000);

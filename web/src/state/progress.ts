@@ -1,4 +1,5 @@
 import type { StreamComplete } from '../protocol/messages';
+import type { Shown } from '../tiles/frame_intake';
 import type { Store } from './store.svelte';
 
 /** Since when a revision is missing is kept to this share of the time since the oldest is: of a map that is never complete there are a few hundred. */
@@ -13,6 +14,14 @@ interface Tiles {
   progress(generation: number): { current: number; total: number };
 }
 
+/** What is known of the settings that were made here. */
+interface Settings {
+  /** Some are still on their way to the server. */
+  readonly busy: boolean;
+  /** Of those that it has answered last. */
+  readonly answeredGeneration: number;
+}
+
 /** How far the picture is behind what was asked for, what it cost, and what the link brings meanwhile; in the store. */
 export class Progress {
   /** What the picture is behind of, the oldest first: from when on, of which revision of the scene, and how many bytes had come by then. */
@@ -22,14 +31,14 @@ export class Progress {
   #here: { picture: number; method: string; at: number }[] = [];
   /** Pictures that are complete once they have been drawn. */
   #complete: { picture: number; message: StreamComplete }[] = [];
+  #shown: { picture: number; shown: Shown }[] = [];
   /** What the picture is behind of are settings alone. */
   #mayBeRefused = false;
 
-  /** `isBusy`: settings are still on their way to the server. */
   constructor(
     private readonly store: Store,
     private readonly tiles: Tiles,
-    private readonly isBusy: () => boolean,
+    private readonly settings: Settings,
     private readonly now: () => number = () => performance.now(),
   ) {}
 
@@ -58,15 +67,28 @@ export class Progress {
     this.#complete.push({ picture, message });
   }
 
+  /** All that had changed by a revision is in the picture of this number. */
+  shows(shown: Shown, picture: number): void {
+    if (this.#missing.length > 1) this.#shown.push({ picture, shown });
+  }
+
+  /** What has changed since remains. */
+  #showsUpTo({ generation, scene_revision }: Shown): void {
+    // A map that grows may have another range, and with it another generation, all the time.
+    if (generation < this.settings.answeredGeneration || this.settings.busy) return;
+    const newest = this.#missing.at(-1);
+    this.#missing = this.#missing.filter((one) => one.revision > scene_revision || one === newest);
+    this.store.behindSince = this.#missing[0]?.at ?? null;
+  }
+
   #completed(message: StreamComplete): void {
     const { store } = this;
     store.complete = message;
     store.pictureRevision = message.scene_revision;
-    if (message.generation < store.generation || this.isBusy()) return;
+    if (message.generation < store.generation || this.settings.busy) return;
     if (!store.isOfOldScene) return this.#caughtUp();
-    // Of a map that grows all the time: it is behind of what has come since alone.
-    this.#missing = this.#missing.filter(({ revision }) => revision > message.scene_revision);
-    store.behindSince = this.#missing[0]?.at ?? null;
+    // Of a map that grows all the time.
+    this.#showsUpTo(message);
     this.#methodIsShown();
   }
 
@@ -82,6 +104,8 @@ export class Progress {
   drawn(picture: number): void {
     for (const { message } of this.#complete.filter((one) => one.picture <= picture)) this.#completed(message);
     this.#complete = this.#complete.filter((one) => one.picture > picture);
+    for (const { shown } of this.#shown.filter((one) => one.picture <= picture)) this.#showsUpTo(shown);
+    this.#shown = this.#shown.filter((one) => one.picture > picture);
     const drawn = this.#here.filter((one) => one.picture <= picture).at(-1);
     if (drawn === undefined) return;
     this.#here = this.#here.filter((one) => one.picture > picture);
@@ -99,6 +123,7 @@ export class Progress {
   /** Nothing comes any more: there is nothing to be behind of. */
   disconnected(): void {
     this.#complete = [];
+    this.#shown = [];
     this.#notBehind();
     this.store.rate_bytes_per_s = 0;
   }
@@ -110,7 +135,7 @@ export class Progress {
     store.rate_bytes_per_s = (this.#window.reduce((sum, { bytes }) => sum + bytes, 0) / RATE_MS) * 1000;
     // What was refused changes no picture: nothing more comes.
     const isShown = store.complete !== null && store.complete.generation >= store.generation;
-    if (this.#mayBeRefused && isShown && !this.isBusy()) this.#caughtUp();
+    if (this.#mayBeRefused && isShown && !this.settings.busy) this.#caughtUp();
     // What is made here comes into the picture all at once.
     if (store.hereSince !== null || store.factsSince !== null) store.progress = 0;
     else if (store.behindSince !== null) store.progress = this.#share();

@@ -191,7 +191,7 @@ export class Session {
       onRefusal: (error) => this.settings.refused(error),
       onProblem: say,
     });
-    this.#progress = new Progress(store, this.tiles, () => this.settings.busy);
+    this.#progress = new Progress(store, this.tiles, this.settings);
     this.#catalogue = new CatalogueLoader({
       onLoaded: ({ methods, palettes }) => {
         store.methods = methods;
@@ -393,6 +393,7 @@ export class Session {
         break;
       case 'stream.stats':
         store.stats = streamStats(params, method);
+        this.#intake.shownAfterAll(store.stats);
         break;
       case 'robot.moved':
         store.robot = robotAfter(store.robot, robotMoved(params, method));
@@ -425,7 +426,8 @@ export class Session {
 
   /** Brings decoded tiles into the picture. Returns true when the next one has work, too. */
   #bringIn(): boolean {
-    const { bytes, next_ms, complete } = this.#intake.bringIn(performance.now());
+    const { bytes, next_ms, complete, shown } = this.#intake.bringIn(performance.now());
+    if (shown !== null) this.#progress.shows(shown, this.viewport.nextPicture);
     if (complete !== null) this.#completed(complete);
     const isOther = this.tiles.updateSelection();
     if (isOther || complete !== null) this.readings.differs(this.viewport.nextPicture);

@@ -7,6 +7,8 @@ interface Arrival {
   result: DecodeResult;
   /** When it, or a predecessor that waited in its place, was decoded. */
   since: number;
+  /** Of the first of them. */
+  firstSequence: number;
 }
 
 /** Longest time for which a coarse answer waits for the finer one behind it. */
@@ -35,11 +37,16 @@ export class Arrivals {
     return this.#waiting.size;
   }
 
+  /** That of the oldest frame of which something has not been brought in. */
+  get oldestSequence(): number {
+    return Math.min(...[...this.#waiting.values()].map(({ firstSequence }) => firstSequence));
+  }
+
   add(frame: TileFrame, result: DecodeResult, now: number): void {
     const key = `${result.kind} ${tileKey(frame.tile)}`;
     const older = this.#waiting.get(key);
     if (older !== undefined && older.frame.sequence > frame.sequence) return;
-    this.#waiting.set(key, { frame, result, since: older?.since ?? now });
+    this.#waiting.set(key, { frame, result, since: older?.since ?? now, firstSequence: older?.firstSequence ?? frame.sequence });
   }
 
   /** What has not been brought in of a tile is not wanted any more. */

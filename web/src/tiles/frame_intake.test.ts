@@ -112,6 +112,24 @@ describe('FrameIntake', () => {
     expect(picture().complete).toBeNull();
   });
 
+  it('shows a revision once everything before is in the picture, whatever comes after', async () => {
+    receive(FrameKind.geometry);
+    intake.shownAfterAll({ generation: 1, scene_revision: 4 });
+    receive(FrameKind.colours);
+    intake.shownAfterAll({ generation: 1, scene_revision: 5 });
+    receive(FrameKind.colours);
+    await decodings[2]?.finish();
+    expect(picture().shown).toBeNull();
+    await decodings[0]?.finish();
+    expect(picture().shown?.scene_revision).toBe(4);
+    expect(picture().shown).toBeNull();
+    await decodings[1]?.finish();
+    expect(picture().shown?.scene_revision).toBe(5);
+    intake.shownAfterAll({ generation: 1, scene_revision: 6 });
+    intake.beginConnection();
+    expect(picture().shown).toBeNull();
+  });
+
   it('leaves out what was sent of a tile before it was removed', async () => {
     receive(FrameKind.geometry);
     receive(FrameKind.colours);
@@ -128,7 +146,7 @@ describe('FrameIntake', () => {
     intake.completeAfterAll(COMPLETE);
     intake.beginConnection();
     await decodings[0]?.finish();
-    expect(picture()).toEqual({ bytes: 0, next_ms: null, complete: null });
+    expect(picture()).toEqual({ bytes: 0, next_ms: null, complete: null, shown: null });
     expect(acknowledged).toEqual([]);
     expect(tiles.size).toBe(0);
   });

@@ -1,13 +1,16 @@
 import type { DecodeJob } from '../decode/messages';
 import { type DecodePool, Superseded } from '../decode/pool';
 import { FrameKind, type TileFrame, tileKey } from '../protocol/frame';
-import type { StreamComplete } from '../protocol/messages';
+import type { StreamComplete, StreamStats } from '../protocol/messages';
 import { Acknowledger } from '../decode/acknowledger';
 import { Arrivals } from './arrivals';
 import { RawMismatch, type TileSet } from './tile_set';
 
 /** Most bytes of decoded tiles brought into one picture, so that no picture takes long. */
 const BYTES_PER_PICTURE = 4 * 1024 * 1024;
+
+/** What the picture shows of a scene that changes. */
+export type Shown = Pick<StreamStats, 'generation' | 'scene_revision'>;
 
 export interface FrameIntakeEvents {
   /** Every frame up to this one is decoded. */
@@ -33,6 +36,7 @@ export class FrameIntake {
   #topLevel = Infinity;
   #lastSequence = 0;
   #completeAfter: { sequence: number; message: StreamComplete } | null = null;
+  #shownAfter: { sequence: number; shown: Shown }[] = [];
 
   constructor(
     private readonly tiles: TileSet,
@@ -53,6 +57,7 @@ export class FrameIntake {
     this.#removedAt.clear();
     this.#lastSequence = 0;
     this.#completeAfter = null;
+    this.#shownAfter = [];
     this.tiles.beginConnection();
   }
 
@@ -102,17 +107,26 @@ export class FrameIntake {
     this.events.onArrival();
   }
 
+  /** The server has sent all that had changed by a revision; bringIn() says when that is in the picture. */
+  shownAfterAll(shown: Shown): void {
+    this.#shownAfter.push({ sequence: this.#lastSequence, shown });
+    this.events.onArrival();
+  }
+
   /**
    * Brings decoded tiles into the tile set, as many as one picture can take: how many bytes, after how many milliseconds there is more
-   * (see Arrivals.bringIn), and the completion that is reached with them.
+   * (see Arrivals.bringIn), and the completion and the revision that are reached with them.
    */
-  bringIn(now: number): { bytes: number; next_ms: number | null; complete: StreamComplete | null } {
+  bringIn(now: number): { bytes: number; next_ms: number | null; complete: StreamComplete | null; shown: Shown | null } {
     const last = this.#completeAfter;
     const isLast = last !== null && this.#acknowledger.sequence >= last.sequence;
     const { bytes, next_ms } = this.#arrivals.bringIn(now, BYTES_PER_PICTURE, isLast);
-    if (!isLast || this.#arrivals.size > 0) return { bytes, next_ms, complete: null };
+    const isIn = (sequence: number) => this.#acknowledger.sequence >= sequence && this.#arrivals.oldestSequence > sequence;
+    const shown = this.#shownAfter.filter(({ sequence }) => isIn(sequence)).at(-1)?.shown ?? null;
+    this.#shownAfter = this.#shownAfter.filter(({ sequence }) => !isIn(sequence));
+    if (!isLast || this.#arrivals.size > 0) return { bytes, next_ms, complete: null, shown };
     this.#completeAfter = null;
-    return { bytes, next_ms, complete: last.message };
+    return { bytes, next_ms, complete: last.message, shown };
   }
 
   #failed(error: unknown): void {
