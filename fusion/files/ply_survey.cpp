@@ -106,7 +106,7 @@ class FaceSums {
         std::array<double, 3> means{};
         std::array<std::span<const double>, 3> values;
         for (std::size_t channel = 0; channel < 3; ++channel) {
-          means[channel] = static_cast<double>(colours_[v].sums[channel]) / static_cast<double>(colours_[v].count);
+          means[channel] = mean(static_cast<double>(colours_[v].sums[channel]), colours_[v].count);
           values[channel] = {&means[channel], 1};
         }
         std::uint64_t ignored = 0;
@@ -117,13 +117,17 @@ class FaceSums {
     }
     survey.face_temperature_celsius.reserve(temperatures_.size());
     for (const Temperature& temperature : temperatures_) {
-      survey.face_temperature_celsius.push_back(
-          static_cast<float>(temperature.sum / static_cast<double>(temperature.count)));
+      survey.face_temperature_celsius.push_back(static_cast<float>(mean(temperature.sum, temperature.count)));
     }
     return base::success();
   }
 
  private:
+  /// NaN for what has no face.
+  static double mean(double sum, std::uint32_t count) {
+    return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+  }
+
   void add_colour(std::span<const std::uint32_t> corners, const std::array<double, kSlotCount>& values,
                   PlySurvey& survey) {
     std::array<double, 3> channels = {values[kRed], values[kGreen], values[kBlue]};

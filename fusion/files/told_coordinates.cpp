@@ -24,8 +24,11 @@ bool is_whole_unit(const std::vector<std::string>& words, std::size_t at) {
 
 /// "Not in metres", and "1000 units per metre" or "points per square metre".
 bool is_denied(const std::vector<std::string>& words, std::size_t at) {
-  const std::string_view before = at > 0 ? words[at - 1] : "";
-  const std::string_view second = at > 1 ? words[at - 2] : "";
+  const auto word_before = [&words, at](std::size_t count) {
+    return at >= count ? std::string_view(words[at - count]) : std::string_view();
+  };
+  const std::string_view before = word_before(1);
+  const std::string_view second = word_before(2);
   return before == "not" || before == "per" || (before == "in" && second == "not") ||
          ((before == "square" || before == "cubic") && second == "per");
 }
