@@ -11,7 +11,7 @@ namespace spectra::files {
 
 namespace {
 
-constexpr std::size_t kBufferBytes = std::size_t{256} * 1024;
+constexpr std::size_t kMaxBufferBytes = std::size_t{256} * 1024;
 /// No entry is longer: three doubles, a colour, a temperature, its sigma and time.
 constexpr std::size_t kMaxEntryBytes = 3 * 8 + 3 + 4 + 4 + 8;
 
@@ -32,11 +32,18 @@ std::string header_text(const PlyLayout& layout) {
   return text + "end_header\n";
 }
 
+/// Room for all of a small file, and for at least one entry beside the header.
+std::size_t buffer_bytes(const PlyLayout& layout, std::size_t header_bytes) {
+  const std::uint64_t entries = std::min<std::uint64_t>(layout.vertex_count, kMaxBufferBytes) +
+                                std::min<std::uint64_t>(layout.triangle_count, kMaxBufferBytes) + 1;
+  return header_bytes + static_cast<std::size_t>(std::min<std::uint64_t>(entries * kMaxEntryBytes, kMaxBufferBytes));
+}
+
 }  // namespace
 
-PlyEncoder::PlyEncoder(const PlyLayout& layout, Sink sink)
-    : layout_(layout), sink_(std::move(sink)), buffer_(kBufferBytes) {
+PlyEncoder::PlyEncoder(const PlyLayout& layout, Sink sink) : layout_(layout), sink_(std::move(sink)) {
   const std::string header = header_text(layout);
+  buffer_.resize(buffer_bytes(layout, header.size()));
   std::memcpy(buffer_.data(), header.data(), header.size());
   size_ = header.size();
 }

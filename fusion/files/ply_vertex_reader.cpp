@@ -9,7 +9,7 @@ namespace spectra::files {
 
 namespace {
 
-constexpr std::size_t kBlockVertices = 1024;
+constexpr std::uint64_t kMaxBlockVertices = 1024;
 
 }  // namespace
 
@@ -17,7 +17,8 @@ PlyVertexReader::PlyVertexReader(PlyCursor& cursor, const PlyElement& element, c
     : cursor_(cursor),
       element_(element),
       has_fixed_size_(!cursor.is_text() && has_no_list(element)),
-      positions_(kBlockVertices) {
+      block_vertices_(static_cast<std::size_t>(std::clamp<std::uint64_t>(element.count, 1, kMaxBlockVertices))),
+      positions_(block_vertices_) {
   std::vector<std::size_t> offsets;
   for (const PlyProperty& property : element.properties) {
     offsets.push_back(entry_bytes_);
@@ -33,7 +34,7 @@ PlyVertexReader::PlyVertexReader(PlyCursor& cursor, const PlyElement& element, c
   if (schema.has_vertex_colours()) {
     const bool is_packed = schema.colour_coding == ColourCoding::Packed;
     for (std::size_t channel = 0; channel < (is_packed ? 1U : 3U); ++channel) {
-      colours_[channel].resize(kBlockVertices);
+      colours_[channel].resize(block_vertices_);
       add(static_cast<PlySlot>(kRed + channel), colours_[channel].data(), 1);
     }
     // A packed colour in a float is its bits; as a number a signalling NaN among them would change.
@@ -41,18 +42,18 @@ PlyVertexReader::PlyVertexReader(PlyCursor& cursor, const PlyElement& element, c
     if (is_packed && !cursor.is_text() && type == PlyScalar::Float32) type = PlyScalar::UInt32;
   }
   if (schema.has_vertex_temperature()) {
-    temperatures_.resize(kBlockVertices);
+    temperatures_.resize(block_vertices_);
     add(kTemperature, temperatures_.data(), 1);
   }
   for (const auto& [slot, values] : {std::pair(kSigma, &sigmas_), std::pair(kSeen, &seen_)}) {
     if (!schema.vertex[slot]) continue;
-    values->resize(kBlockVertices);
+    values->resize(block_vertices_);
     add(slot, values->data(), 1);
   }
 }
 
 base::Result<PlyRawVertices> PlyVertexReader::next() {
-  auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kBlockVertices, element_.count - cursor_.entry));
+  auto count = static_cast<std::size_t>(std::min<std::uint64_t>(block_vertices_, element_.count - cursor_.entry));
   PlyRawVertices block;
   block.first_vertex = cursor_.entry;
   if (count > 0) {

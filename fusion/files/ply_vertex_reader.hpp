@@ -45,6 +45,7 @@ class PlyVertexReader {
   PlyCursor& cursor_;
   const PlyElement& element_;
   const bool has_fixed_size_;
+  const std::size_t block_vertices_;
   std::size_t entry_bytes_ = 0;  ///< When they all have the same.
   std::vector<Column> columns_;
   std::vector<base::Vec3d> positions_;
