@@ -34,6 +34,8 @@ namespace {
 /// Answers that one viewer may have computing at once, and changes it may have waiting.
 constexpr std::size_t kMaxComputing = 16;
 constexpr std::size_t kMaxWaiting = 512;
+/// The same of requests to begin or end a stream, which may be long.
+constexpr std::size_t kMaxBehindChanges = 4;
 
 /// What settings are prepared with.
 fusion::SceneTemperature temperature_of(const std::shared_ptr<const map::SceneSnapshot>& scene) {
@@ -190,6 +192,24 @@ void ViewerSession::answered(const Id& id, const json& params) {
   answer(id, (this->*function)(params));
 }
 
+template <auto function>
+void ViewerSession::behind_changes(const Id& id, const json& params) {
+  if (changes_answered_ == changes_asked_) return answer(id, (this->*function)(params));
+  if (behind_changes_.size() >= kMaxBehindChanges) {
+    return answer(id, refusal(RpcErrorCode::Busy, "too many requests wait for a change of the settings", "",
+                              std::to_string(kMaxBehindChanges) + " at once"));
+  }
+  behind_changes_.push_back({changes_asked_, [this, id, params] { answer(id, (this->*function)(params)); }});
+}
+
+void ViewerSession::go_on_behind_changes() {
+  while (!behind_changes_.empty() && behind_changes_.front().changes <= changes_answered_) {
+    const BehindChanges request = std::move(behind_changes_.front());
+    behind_changes_.pop_front();
+    request.carry_out();
+  }
+}
+
 std::span<const ViewerSession::Request> ViewerSession::requests() {
   using Self = ViewerSession;
   static constexpr Request kRequests[] = {
@@ -199,8 +219,8 @@ std::span<const ViewerSession::Request> ViewerSession::requests() {
       {"fusion.get", access::Right::Watch, Cost::Request, &Self::answered<&Self::fusion_get>},
       {"quality.set", access::Right::Watch, Cost::Request, &Self::answered<&Self::set_quality>},
       {"scene.get", access::Right::Watch, Cost::Request, &Self::answered<&Self::scene_get>},
-      {"scene.subscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::subscribe>},
-      {"scene.unsubscribe", access::Right::Watch, Cost::Request, &Self::answered<&Self::unsubscribe>},
+      {"scene.subscribe", access::Right::Watch, Cost::Request, &Self::behind_changes<&Self::subscribe>},
+      {"scene.unsubscribe", access::Right::Watch, Cost::Request, &Self::behind_changes<&Self::unsubscribe>},
       {"scene.histogram", access::Right::Watch, Cost::Request, &Self::asked<&histogram_question>},
       {"scene.probe", access::Right::Watch, Cost::Request, &Self::asked<&probe_question>},
       {"fusion.facts", access::Right::Watch, Cost::Request, &Self::asked<&facts_question>},
@@ -365,6 +385,7 @@ void ViewerSession::fusion_set(const Id& id, const json& params) {
   } else {
     waiting_.push_back({id, refused(message.error())});
   }
+  ++changes_asked_;
   start_preparation();
 }
 
@@ -511,6 +532,8 @@ void ViewerSession::finish_preparation(const std::shared_ptr<PlanPreparation>& p
       answer(id, refused(outcome.error()));
     }
   }
+  changes_answered_ += preparation->requests.size();
+  go_on_behind_changes();
   start_preparation();
 }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <deque>
+#include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -64,6 +67,11 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   void notify(std::string_view method, const nlohmann::json& params);
 
   Answer scene_get(const nlohmann::json& params);
+  /// What begins or ends a stream, behind all changes of the settings that were asked for before it.
+  template <auto function>
+  void behind_changes(const Id& id, const nlohmann::json& params);
+  /// Carries out what has waited for changes that have been answered.
+  void go_on_behind_changes();
   Answer subscribe(const nlohmann::json& params);
   /// What need not be sent again.
   protocol::SubscribeReply resume(const protocol::ResumeRequest& request);
@@ -121,6 +129,14 @@ class ViewerSession final : public net::ViewerClient, public std::enable_shared_
   std::shared_ptr<stream::ViewerStream> stream_;
   std::optional<fusion::FusionPlan> plan_;
   std::vector<FusionRequest> waiting_;
+  std::uint64_t changes_asked_ = 0;
+  std::uint64_t changes_answered_ = 0;
+  /// A request that waits until so many changes have been answered.
+  struct BehindChanges {
+    std::uint64_t changes = 0;
+    std::function<void()> carry_out;
+  };
+  std::deque<BehindChanges> behind_changes_;
   bool is_preparing_ = false;
   bool is_first_view_ = true;  ///< The viewer has changed nothing yet: a new scene brings its own first view.
   const std::shared_ptr<Computing> computing_;

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <limits>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -16,6 +18,7 @@
 #include "protocol/codec/draco_codec.hpp"
 #include "protocol/tile_frame.hpp"
 #include "server/api/http_api.hpp"
+#include "server/jobs/priority.hpp"
 #include "tests/integration/raw_client.hpp"
 #include "tests/integration/test_server.hpp"
 
@@ -113,6 +116,7 @@ class Viewer {
   const std::map<protocol::TileId, std::vector<protocol::codec::ColourBytes>>& colours() const { return colours_; }
   std::size_t geometry_frames() const { return geometry_frames_; }
   std::uint32_t newest_generation() const { return newest_generation_; }
+  std::uint32_t oldest_generation() const { return oldest_generation_; }
 
  private:
   void take_frame(const std::string& bytes) {
@@ -122,6 +126,7 @@ class Viewer {
       colours_[frame.header.tile] = protocol::codec::decoded_colours(frame.payload).value();
       EXPECT_GE(frame.header.generation, newest_generation_);
       newest_generation_ = frame.header.generation;
+      oldest_generation_ = std::min(oldest_generation_, frame.header.generation);
     }
     EXPECT_EQ(frame.header.sequence, ++last_sequence_);
     send({{"jsonrpc", "2.0"}, {"method", "stream.ack"}, {"params", {{"sequence", frame.header.sequence}}}});
@@ -132,14 +137,17 @@ class Viewer {
   std::uint32_t last_sequence_ = 0;
   std::size_t geometry_frames_ = 0;
   std::uint32_t newest_generation_ = 0;
+  std::uint32_t oldest_generation_ = std::numeric_limits<std::uint32_t>::max();
   std::map<protocol::TileId, std::vector<protocol::codec::ColourBytes>> colours_;
   std::map<std::string, json> notifications_;
 };
 
 class ViewerSessionTest : public testing::Test {
  protected:
+  static constexpr int kThreads = 2;
+
   explicit ViewerSessionTest()
-      : served_(2, 64U << 20U), map_(served_.scenes, served_.pool, nullptr), api_(served_, map_) {
+      : served_(kThreads, 64U << 20U), map_(served_.scenes, served_.pool, nullptr), api_(served_, map_) {
     served_.mark_baseline = [this](sources::BaselineDone done) { map_.mark_baseline(std::move(done)); };
     start(quick_options());
   }
@@ -163,6 +171,12 @@ class ViewerSessionTest : public testing::Test {
     auto options = quick_options();
     change(options.limits);
     start(std::move(options));
+  }
+
+  /// Nothing is prepared, made or encoded until `go` is set.
+  void hold_pool(std::promise<void>& go) {
+    const std::shared_future<void> gate = go.get_future().share();
+    for (int thread = 0; thread < kThreads; ++thread) served_.pool.post([gate] { gate.wait(); }, jobs::kAnswerPriority);
   }
 
   void serve(mesh::MultispectralMesh mesh) { served_.scenes.replace(std::move(mesh), served_.pool); }
@@ -512,6 +526,46 @@ TEST_F(ViewerSessionTest, SendsGeometryOnceAndColoursAfterEachChange) {
   EXPECT_EQ((*complete)["generation"], generation);
   EXPECT_EQ(viewer.newest_generation(), generation);
   EXPECT_EQ(viewer.geometry_frames(), geometry_frames);
+}
+
+TEST_F(ViewerSessionTest, AStreamThatIsAskedForBehindChangesBeginsInTheirColours) {
+  serve(sheet(120));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  std::promise<void> go;
+  hold_pool(go);
+  const int first = viewer.request("fusion.set", {{"method", "thermal_only"}});
+  const int second = viewer.request("fusion.set", {{"palette", "turbo"}});
+  const int begun = viewer.request("scene.subscribe", {{"channels", {"fused"}}});
+  const int ended = viewer.request("scene.unsubscribe");
+  const int begun_again = viewer.request("scene.subscribe", {{"channels", {"fused"}}});
+  EXPECT_TRUE(viewer.call("scene.get").contains("result")) << "what has nothing to do with it does not wait";
+  go.set_value();
+  std::vector<int> answered;
+  json generation;
+  for (auto message = viewer.receive(); message; message = viewer.receive()) {
+    if (message->contains("id")) answered.push_back((*message)["id"]);
+    if (message->contains("id") && (*message)["id"] == second) generation = (*message)["result"]["generation"];
+    if (message->value("method", "") == "stream.complete") break;
+  }
+  EXPECT_EQ(answered, (std::vector<int>{first, second, begun, ended, begun_again}));
+  EXPECT_EQ(viewer.oldest_generation(), generation);
+}
+
+TEST_F(ViewerSessionTest, FewRequestsForAStreamWaitBehindAChange) {
+  serve(sheet(20));
+  Viewer viewer(server_->port());
+  ASSERT_TRUE(viewer.wait_for("hello"));
+  std::promise<void> go;
+  hold_pool(go);
+  const int change = viewer.request("fusion.set", {{"method", "thermal_only"}});
+  int last = 0;
+  for (int i = 0; i < 5; ++i) last = viewer.request("scene.unsubscribe");
+  EXPECT_EQ(viewer.response(last)["error"]["code"], -32003);
+  go.set_value();
+  EXPECT_TRUE(viewer.response(change).contains("result"));
+  EXPECT_TRUE(viewer.response(last - 1).contains("result"));
+  EXPECT_TRUE(viewer.subscribe_and_complete().contains("generation"));
 }
 
 TEST_F(ViewerSessionTest, GivesEachViewerItsOwnSettings) {

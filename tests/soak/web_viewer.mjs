@@ -1,5 +1,5 @@
 // A viewer whose connections are the web client's own: it notices a dead link, opens the next connection and goes on there as the web client
-// does, which has its settings put in force before it asks for the stream, with the tiles that it still has and the frames that coloured them.
+// does, which asks for its settings and, right behind them, for the stream, with the tiles that it still has and the frames that coloured them.
 import { createRequire } from "node:module";
 import { fileURLToPath } from "node:url";
 import { isColours, KIND, readFrame } from "../integration/node/spectra_client.mjs";
@@ -20,6 +20,7 @@ export class WebViewer {
   #alpha = null;
   #isComplete = true;
   #generation = 0;
+  #completed = -1; // the newest generation of this connection that is all there
   #resolve = () => {};
 
   constructor(url) {
@@ -62,11 +63,13 @@ export class WebViewer {
     this.#generation = Infinity;
     const { generation } = await this.#connection.request("fusion.set", { method: "thermal_visible_blend", params: { alpha: this.#alpha } });
     this.#generation = generation;
+    this.#look();
   }
 
   async #greeted({ session_id }) {
     this.greeted_at = performance.now();
-    await this.#ask();
+    this.#completed = -1;
+    void this.#ask().catch(() => {});
     const claimed = [...this.#held].filter(([, { colourSequence }]) => colourSequence !== null);
     const resume = {
       session_id: this.#session,
@@ -77,13 +80,21 @@ export class WebViewer {
     this.#held = new Map(claimed.map(([tile, { claim }]) => [tile, { claim, colourSequence: 0 }]));
     const before = [...this.#held];
     const isClaiming = this.#session !== null && claimed.length > 0;
-    const { resumed_tiles } = await this.#connection.request("scene.subscribe", { channels: ["fused"], ...(isClaiming ? { resume } : {}) });
+    const asked = { channels: ["fused"], colour_transform: "subtract_green", ...(isClaiming ? { resume } : {}) };
+    const { resumed_tiles } = await this.#connection.request("scene.subscribe", asked);
     if (!resumed_tiles) for (const [tile, held] of before) if (this.#held.get(tile) === held) this.#held.delete(tile);
     this.#session = session_id;
   }
 
   #notified(method, params) {
-    if (method !== "stream.complete" || params.generation < this.#generation) return;
+    if (method !== "stream.complete") return;
+    this.#completed = params.generation;
+    this.#look();
+  }
+
+  /** Several messages may come at once: which generation is waited for may be known after it is complete. */
+  #look() {
+    if (this.#completed < this.#generation) return;
     this.#isComplete = true;
     this.#resolve();
   }

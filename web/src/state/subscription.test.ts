@@ -39,7 +39,10 @@ function setUp() {
     intake: { beginConnection: note('intake begins', undefined) },
     settings: {
       greeted: () => before.fusion as never,
-      send: () => (sent.wait ? new Promise<void>((resolve) => (settle = resolve)) : Promise.resolve()),
+      send: () => {
+        diary.push('settings sent');
+        return sent.wait ? new Promise<void>((resolve) => (settle = resolve)) : Promise.resolve();
+      },
       busy: false,
       reconsiderMissing: vi.fn(),
     },
@@ -76,7 +79,19 @@ function setUp() {
     invalidate: () => undefined,
     onProblem: (error) => diary.push(String(error)),
   });
-  return { store, subscription, concerned, claims, layers, diary, asked, before, sent, settle: () => settle() };
+  return {
+    store,
+    subscription,
+    concerned,
+    claims,
+    layers,
+    diary,
+    asked,
+    before,
+    sent,
+    settle: () => settle(),
+    lastSettle: () => settle,
+  };
 }
 
 beforeEach(() => vi.restoreAllMocks());
@@ -205,26 +220,33 @@ describe('a subscription', () => {
     expect(concerned.tiles.layersOf).toHaveBeenLastCalledWith(claims, 9900 - 6 * 900, 0.002);
   });
 
-  it("asks for nothing before the user's settings are in force again, and not at all when that connection is gone", async () => {
-    const { subscription, diary, asked, before, sent, settle } = setUp();
+  it("asks for the stream right behind the user's settings, and not at all when that connection is gone", async () => {
+    const { subscription, diary, asked, before, sent, settle, lastSettle, store } = setUp();
     subscription.greeted(HELLO);
     await later();
     before.fusion = { method: 'blend' };
-    sent.wait = true;
-    subscription.greeted(HELLO);
-    await later();
-    expect(asked).toHaveLength(1);
-    const settleOfSecond = settle;
-    sent.wait = false;
-    before.fusion = null;
     before.quality = {};
+    sent.wait = true;
+    store.wanted = { method: 'blend' };
+    diary.length = 0;
+    subscription.greeted(HELLO);
+    expect(diary.slice(-3)).toEqual(['settings sent', 'quality sent', 'marks asked']);
+    await later();
+    expect(diary.at(-1)).toBe('scene.subscribe');
+    expect(asked).toHaveLength(2);
+    expect(store.wanted).not.toBeNull();
+    const settleOfSecond = lastSettle();
+    subscription.greeted(HELLO);
     subscription.greeted(HELLO);
     await later();
-    expect(asked).toHaveLength(2);
-    expect(diary.indexOf('quality sent')).toBeLessThan(diary.lastIndexOf('scene.subscribe'));
+    expect(asked).toHaveLength(3);
     settleOfSecond();
     await later();
-    expect(asked).toHaveLength(2);
+    expect(store.wanted).not.toBeNull();
+    settle();
+    await later();
+    expect(store.wanted).toBeNull();
+    expect(asked).toHaveLength(3);
   });
 
   it('keeps tiles of the same scene on a new connection, and none of another one', () => {

@@ -121,13 +121,17 @@ export class Subscription {
     if (address !== null) this.concerned.catalogue.want(address);
   }
 
-  /** Asks for the stream once the user's settings are in force again: nothing in other colours, or of another accuracy, is sent first. */
+  /** Asks for the stream right behind the user's settings: it begins when they are in force again, in their colours and accuracy. */
   async #subscribe(greeting: Hello, fusion: FusionChange | null, quality: Quality | null): Promise<void> {
     const { settings, tiles } = this.concerned;
     const connectionNumber = this.#connectionNumber;
-    await Promise.all([fusion && settings.send(fusion), quality && this.concerned.quality.send(quality)]);
-    if (connectionNumber !== this.#connectionNumber) return;
-    if (!settings.busy) this.store.wanted = null;
+    const isOver = () => connectionNumber !== this.#connectionNumber;
+    const told = Promise.all([fusion && settings.send(fusion), quality && this.concerned.quality.send(quality)]);
+    void told.then(() => {
+      if (!isOver() && !settings.busy) this.store.wanted = null;
+    });
+    await Promise.resolve();
+    if (isOver()) return;
     const session_id = this.#claimableSession;
     const claims = session_id !== null && greeting.capabilities.includes('resume') ? tiles.claims(MOST_CLAIMED, MOST_VALUES) : [];
     const layers = tiles.layersOf(claims, MOST_VALUES - CLAIM_VALUES * claims.length, this.concerned.fusing.step_celsius);
@@ -138,7 +142,7 @@ export class Subscription {
         ...this.#params(greeting.capabilities),
         ...(claims.length > 0 ? { resume: { session_id, tiles: claims, ...layers } } : {}),
       });
-      if (connectionNumber !== this.#connectionNumber) return;
+      if (isOver()) return;
       const { resumed_tiles = 0, current_colours = [], generation = 0 } = subscribed(answer, 'scene.subscribe');
       tiles.resume(claims, resumed_tiles > 0, layers, { places: current_colours, generation });
       this.#claimableSession = greeting.session_id;

@@ -211,22 +211,53 @@ describe('Connection', () => {
     for (let i = 1; i < delays.length; i += 1) expect(delays[i]).toBeGreaterThanOrEqual(delays[i - 1] ?? 0);
   });
 
-  it('asks a silent link anew every two seconds or so once it was there, and gives every fourth attempt more time', async () => {
-    const { link, sockets, last } = setUp();
+  it('asks a silent link anew as soon as a socket would have opened once it was there, and gives every fifth attempt more time', async () => {
+    const { connection, link, sockets, last } = setUp();
     last().receive(helloText);
+    for (const round_trip_ms of [150, 250]) {
+      const answer = connection.request('fusion.get', {});
+      await vi.advanceTimersByTimeAsync(round_trip_ms);
+      last().answer({});
+      await answer;
+    }
     link.isSilent = true;
     const begun: number[] = [];
-    for (let passed = 0; passed < 25_000; passed += 50) {
+    for (let passed = 0; passed < 35_000; passed += 10) {
       const before = sockets.length;
-      await vi.advanceTimersByTimeAsync(50);
+      await vi.advanceTimersByTimeAsync(10);
       if (sockets.length > before) begun.push(passed);
     }
-    expect(begun.length).toBeGreaterThanOrEqual(7);
+    expect(begun.length).toBeGreaterThanOrEqual(15);
     for (let attempt = 1; attempt < begun.length; attempt += 1) {
       const apart = (begun[attempt] ?? 0) - (begun[attempt - 1] ?? 0);
-      expect(apart).toBeGreaterThanOrEqual(openPatience(attempt, true) + 150);
-      expect(apart).toBeLessThanOrEqual(openPatience(attempt, true) + 400);
+      expect(apart).toBeGreaterThanOrEqual(openPatience(attempt, 150) + 65);
+      expect(apart).toBeLessThanOrEqual(openPatience(attempt, 150) + 135);
     }
+  });
+
+  it('knows the round trip of a link by how long its socket took to open', async () => {
+    const { link, sockets, last } = setUp();
+    link.isSilent = true;
+    const untilThereAre = async (count: number) => {
+      const begin = performance.now();
+      while (sockets.length < count) await vi.advanceTimersByTimeAsync(10);
+      return performance.now() - begin;
+    };
+    await untilThereAre(2);
+    await vi.advanceTimersByTimeAsync(400);
+    last().onopen?.({} as Event);
+    last().receive(helloText);
+    await untilThereAre(3);
+    const apart_ms = await untilThereAre(4);
+    expect(apart_ms).toBeGreaterThan(5 * 200 + 50);
+    expect(apart_ms).toBeLessThan(5 * 210 + 150);
+  });
+
+  it('has what a browser lets it try within a few minutes for half of a minute without a link', () => {
+    const until = (attempts: number) =>
+      Array.from({ length: attempts }, (_, i) => openPatience(i + 1, 120) + 100).reduce((sum, wait) => sum + wait, 0);
+    expect(until(10)).toBeGreaterThan(8_000);
+    expect(until(14)).toBeGreaterThan(25_000);
   });
 
   it('gives a socket that has opened time to say hello', async () => {
@@ -244,9 +275,12 @@ describe('Connection', () => {
   });
 
   it('is patient with a link that it has never had, and with one that has long been gone', () => {
-    expect(openPatience(1, false)).toBe(6_000);
-    expect([1, 2, 3, 4, 8].map((attempt) => openPatience(attempt, true))).toEqual([2_000, 2_000, 2_000, 4_500, 4_500]);
-    expect(openPatience(9, true)).toBe(6_000);
+    expect(openPatience(1, null)).toBe(6_000);
+    expect([1, 2, 4, 5, 9, 10].map((attempt) => openPatience(attempt, 5))).toEqual([600, 600, 600, 2_000, 600, 2_000]);
+    expect([1, 5].map((attempt) => openPatience(attempt, 300))).toEqual([1_500, 2_000]);
+    expect(openPatience(1, 900)).toBe(2_000);
+    expect([11, 12, 14].map((attempt) => openPatience(attempt, 5))).toEqual([4_500, 4_500, 4_500]);
+    expect(openPatience(15, 5)).toBe(6_000);
   });
 
   it('opens nothing after stop', async () => {

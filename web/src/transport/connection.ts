@@ -51,12 +51,21 @@ export type SocketLike = Pick<WebSocket, 'binaryType' | 'readyState' | 'send' | 
 
 const OPEN = 1;
 const HELLO_TIMEOUT_MS = 6_000;
-/** Of a link that was there a moment ago, for a socket to open. In a silent one TCP asks again after 1, 3 and 7 s: a new socket asks sooner. */
-const RETURN_PATIENCE_MS = 2_000;
-/** The same for every fourth attempt, for a link that has become slow. */
-const LONG_RETURN_PATIENCE_MS = 4_500;
+/**
+ * Of a link that was there a moment ago, so many round trips for a socket to open, in which one lost packet is sent again. In a silent link TCP
+ * asks again after 1, 3 and 7 s: a new socket asks sooner.
+ */
+const RETURN_ROUND_TRIPS = 5;
+/** A socket opens in so many, and in one more with TLS. */
+const OPENING_ROUND_TRIPS = 2;
+const RETURN_PATIENCE_MS = 600;
+/** The same for every fifth attempt, for a link that has become slow; no attempt of the first ones has more. */
+const LONG_RETURN_PATIENCE_MS = 2_000;
 /** Attempts with that patience. Browsers hold sockets back after a dozen that came to nothing, for longer than it. */
-const HASTY_ATTEMPTS = 8;
+const HASTY_ATTEMPTS = 10;
+/** Those up to here are given this. */
+const PATIENT_ATTEMPTS = 14;
+const PATIENCE_MS = 4_500;
 const CHECK_INTERVAL_MS = 250;
 /** A page that has not checked for so long has slept, or stalled; in a hidden one timers run once a second. */
 const SLEPT_MS = 2_000;
@@ -67,6 +76,8 @@ const ANSWER_MS = 1_500;
 /** The same while much may be on its way before it. */
 const ANSWER_BEHIND_MUCH_MS = 3_000;
 const BACKOFF_FIRST_MS = 250;
+/** Wait after an attempt that nobody answered, which has been a wait itself. */
+const AFTER_SILENCE_MS = 100;
 const BACKOFF_LAST_MS = 5_000;
 
 /** Wait before the next attempt after attempt `attempt` (from 1) was refused or cut, without jitter. */
@@ -74,10 +85,12 @@ export function backoffDelay(attempt: number): number {
   return Math.min(BACKOFF_LAST_MS, BACKOFF_FIRST_MS * 2 ** (attempt - 1));
 }
 
-/** How long attempt `attempt` (from 1) may take to open a socket, on a link that was there a moment ago or not. */
-export function openPatience(attempt: number, wasThere: boolean): number {
-  if (!wasThere || attempt > HASTY_ATTEMPTS) return HELLO_TIMEOUT_MS;
-  return attempt % 4 === 0 ? LONG_RETURN_PATIENCE_MS : RETURN_PATIENCE_MS;
+/** How long attempt `attempt` (from 1) may take to open a socket; `round_trip_ms` is that of the link that was there a moment ago, null: none was. */
+export function openPatience(attempt: number, round_trip_ms: number | null): number {
+  if (round_trip_ms === null || attempt > PATIENT_ATTEMPTS) return HELLO_TIMEOUT_MS;
+  if (attempt > HASTY_ATTEMPTS) return PATIENCE_MS;
+  if (attempt % 5 === 0) return LONG_RETURN_PATIENCE_MS;
+  return Math.min(LONG_RETURN_PATIENCE_MS, Math.max(RETURN_PATIENCE_MS, RETURN_ROUND_TRIPS * round_trip_ms));
 }
 
 interface OpenRequest {
@@ -91,7 +104,10 @@ export class Connection {
   #socket: SocketLike | null = null;
   #attempt = 0;
   #attemptAt = 0;
-  #wasGreeted = false;
+  /** What the newest socket took to open. */
+  #opening_ms = Infinity;
+  /** Of the last connection that was greeted, the shortest that is known; null: there was none. */
+  #roundTrip_ms: number | null = null;
   #greeted = false;
   #nextId = 1;
   #requests = new Map<number, OpenRequest>();
@@ -167,13 +183,17 @@ export class Connection {
     socket.onmessage = (event) => this.#receive(event.data);
     socket.onclose = () => this.#lost();
     socket.onerror = null;
-    socket.onopen = () => this.#expectHello(HELLO_TIMEOUT_MS);
-    this.#expectHello(socket.readyState === OPEN ? HELLO_TIMEOUT_MS : openPatience(this.#attempt, this.#wasGreeted));
+    this.#opening_ms = Infinity;
+    socket.onopen = () => {
+      this.#opening_ms = performance.now() - this.#attemptAt;
+      this.#expectHello(HELLO_TIMEOUT_MS);
+    };
+    this.#expectHello(socket.readyState === OPEN ? HELLO_TIMEOUT_MS : openPatience(this.#attempt, this.#roundTrip_ms));
   }
 
   #expectHello(patience_ms: number): void {
     clearTimeout(this.#helloTimer);
-    if (!this.#greeted) this.#helloTimer = setTimeout(() => this.#lost(), patience_ms);
+    if (!this.#greeted) this.#helloTimer = setTimeout(() => this.#lost(true), patience_ms);
   }
 
   #receive(data: unknown): void {
@@ -197,7 +217,9 @@ export class Connection {
         return;
       }
       this.#requests.delete(id);
-      this.events.onRoundTrip(performance.now() - request.sent_at);
+      const roundTrip_ms = performance.now() - request.sent_at;
+      this.#roundTrip_ms = Math.min(this.#roundTrip_ms ?? Infinity, roundTrip_ms);
+      this.events.onRoundTrip(roundTrip_ms);
       if (message.type === 'result') request.resolve(message.result);
       else request.reject(new RpcError(message.error));
     } catch (error) {
@@ -208,7 +230,7 @@ export class Connection {
   #greet(message: Hello): void {
     clearTimeout(this.#helloTimer);
     this.#greeted = true;
-    this.#wasGreeted = true;
+    this.#roundTrip_ms = Math.min(LONG_RETURN_PATIENCE_MS, this.#opening_ms / OPENING_ROUND_TRIPS);
     this.#attempt = 0;
     this.#lastCheckAt = performance.now();
     clearInterval(this.#checkTimer);
@@ -236,9 +258,9 @@ export class Connection {
     }
   }
 
-  #lost(): void {
+  #lost(wasSilent = false): void {
     this.#drop();
-    if (!this.#closed) this.#retryLater();
+    if (!this.#closed) this.#retryLater(wasSilent);
   }
 
   #drop(): void {
@@ -259,11 +281,10 @@ export class Connection {
     for (const request of requests) request.reject(new ConnectionLost());
   }
 
-  #retryLater(): void {
+  #retryLater(wasSilent = false): void {
     const attempt = Math.max(1, this.#attempt);
-    // An attempt that nobody answered has been a wait itself.
-    const hasWaited = this.#attempt > 0 && performance.now() - this.#attemptAt >= RETURN_PATIENCE_MS;
-    const delay = (hasWaited ? BACKOFF_FIRST_MS : backoffDelay(attempt)) * (0.75 + 0.5 * Math.random());
+    const hasWaited = wasSilent || (this.#attempt > 0 && performance.now() - this.#attemptAt >= LONG_RETURN_PATIENCE_MS);
+    const delay = (hasWaited ? AFTER_SILENCE_MS : backoffDelay(attempt)) * (0.75 + 0.5 * Math.random());
     this.events.onState({ phase: 'waiting', attempt, retry_at: performance.now() + delay });
     this.#retryTimer = setTimeout(() => this.#open(), delay);
   }
