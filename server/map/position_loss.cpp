@@ -24,7 +24,7 @@ constexpr double kMostChange = 0.1;
 /// A tile reaches beyond its cell with triangles of it.
 constexpr double kStepsOfCell = kStepsOfTile / 2;
 /// Points that fall together are told apart in pieces of so many.
-constexpr std::size_t kMostCompared = 64;
+constexpr std::size_t kMostCompared = 256;
 constexpr int kCoarserHalvings = 12;
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -26,7 +27,7 @@ constexpr double kReach = 0.2;
 constexpr double kTouch = 0.05;
 
 /// Pieces of more vertices are as many cells.
-constexpr std::uint32_t kSmallPieceVertexCount = 64;
+constexpr std::uint32_t kSmallPieceVertexCount = 256;
 
 /// Pieces that touch others, sharing no vertices with them, have a form of their own from so many vertices on: triangles and what is
 /// drawn of triangles that share none have not.
@@ -255,7 +256,7 @@ void PositionSteps::ask_pieces_of(std::span<const Member> members, std::size_t f
 }
 
 void PositionSteps::keep_pieces_apart(std::vector<StepHalvings>& wanted, bool are_all_new) const {
-  std::vector<std::array<double, 3>> rounded;
+  std::map<std::array<double, 3>, std::uint32_t> first_at;
   std::vector<std::uint32_t> merged;
   for (const std::vector<std::uint32_t>& piece : small_pieces_) {
     if (!are_all_new &&
@@ -264,15 +265,14 @@ void PositionSteps::keep_pieces_apart(std::vector<StepHalvings>& wanted, bool ar
     }
     for (bool is_finer = true; is_finer;) {
       is_finer = false;
-      rounded.clear();
+      first_at.clear();
       merged.clear();
       std::size_t merged_count = 0;
       for (const std::uint32_t p : piece) {
-        rounded.push_back(rounded_at(p, wanted[p]));
-        const auto twin = std::find(rounded.begin(), rounded.end() - 1, rounded.back());
-        if (twin == rounded.end() - 1) continue;
+        const auto [twin, is_new] = first_at.try_emplace(rounded_at(p, wanted[p]), p);
+        if (is_new) continue;
         ++merged_count;
-        merged.insert(merged.end(), {p, piece[static_cast<std::size_t>(twin - rounded.begin())]});
+        merged.insert(merged.end(), {p, twin->second});
       }
       if (merged_count * kVerticesToMerged <= piece.size()) break;
       for (const std::uint32_t p : merged) {

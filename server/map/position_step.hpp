@@ -35,7 +35,7 @@ struct LostForm {
 /// - four fifths of a few dozen neighbouring vertices stay apart,
 /// - what they span along an axis is at least four steps (what is thinner than eight times what floats tell apart there counts as flat; and
 ///   of what is thinner than a 4,096th of its breadth, what floats on any axis do not tell apart, or is thinner than a millionth),
-/// - four fifths of every connected piece stay apart, and each side of its box is at least ten steps (the same, from a 32,768th on); pieces are connected by vertices in the same place, and what is connected by shared vertices alone
+/// - four fifths of every connected piece of up to 256 vertices stay apart (larger ones by their neighbourhoods), and each side of its box is at least ten steps (the same, from a 32,768th on); pieces are connected by vertices in the same place, and what is connected by shared vertices alone
 ///   is one too, unless it is a triangle.
 /// Neighbours get the finer of their steps. Where a ball of neighbours would still have a side off by more than a tenth, the few
 /// vertices that its box stands on are rounded finer by themselves. A scene of few vertices is rounded finer everywhere, for bytes that do not count.

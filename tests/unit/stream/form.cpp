@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <set>
 #include <vector>
@@ -146,9 +147,16 @@ FormReport form_of(const map::SceneSnapshot& scene, std::size_t seed_count) {
     return v;
   };
   std::set<std::uint32_t> torn;
-  for (const auto& tile : scene.tiles()) {
-    // The first one is drawn alone.
-    if (tile == scene.tiles().front() && scene.tiles().size() > 1) continue;
+  // The form is that of the leaves. Coarser tiles are drawn beside them, where they must not be torn off, but not in their place: what
+  // they leave out is told by their error. The first one is drawn alone.
+  std::vector<std::shared_ptr<const map::Tile>> tiles;
+  for (const bool is_leaf : {true, false}) {
+    for (const auto& tile : scene.tiles()) {
+      const bool is_alone = tile == scene.tiles().front() && scene.tiles().size() > 1;
+      if (!is_alone && (tile->child_mask == 0) == is_leaf) tiles.push_back(tile);
+    }
+  }
+  for (const auto& tile : tiles) {
     std::vector<bool> is_drawn(tile->positions.size(), tile->triangles.empty());
     for (const auto& triangle : tile->triangles) {
       for (const std::uint32_t v : triangle) is_drawn[v] = true;

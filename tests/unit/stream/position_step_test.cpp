@@ -372,6 +372,23 @@ TEST(PositionSteps, KeepTheReliefOfAFlatCountry) {
   for (const auto& tile : scene->tiles()) EXPECT_TRUE(tile->step_halvings.empty());
 }
 
+TEST(PositionSteps, KeepAPieceApartAmongOthers) {
+  // A winding ribbon of a millimetre, of as many vertices as are left to cells of neighbours where a floor is around them.
+  for (const int pair_count : {30, 40, 100}) {
+    Parts parts;
+    parts.grid(60, 60, {0, 0, 0}, {0.05F, 0, 0}, {0, 0.05F, 0},
+               [](int x, int y) { return 0.02 * std::sin(x * 1.3 + y * 0.7); });
+    const auto first = static_cast<std::uint32_t>(parts.positions.size());
+    for (int i = 0; i < pair_count; ++i) {
+      const double y = 1.5 + 0.6 * std::sin(i * 0.2);
+      parts.add(0.1 + 0.028 * i, y, 0.05);
+      parts.add(0.1 + 0.028 * i, y + 0.001, 0.05);
+    }
+    for (std::uint32_t v = first; v + 2 < parts.positions.size(); ++v) parts.triangles.push_back({v, v + 1, v + 2});
+    expect_kept(parts.mesh());
+  }
+}
+
 /// As a server has it.
 std::shared_ptr<const map::SceneSnapshot> served(const Parts& parts) {
   files::LoadedScene loaded;
@@ -380,6 +397,26 @@ std::shared_ptr<const map::SceneSnapshot> served(const Parts& parts) {
   jobs::WorkerPool pool(2);
   map::SceneStore scenes;
   return scenes.replace(std::move(loaded), pool, map::LevelsOfDetail::All);
+}
+
+TEST(PositionSteps, OfARoomAmongManyFarTrianglesKeepItsWall) {
+  Parts parts;
+  parts.box({0, 0, 0}, {8, 6, 3});
+  parts.box({4, 0, 0}, {4.1F, 6, 3});
+  parts.grid(60, 50, {0, 0, 1}, {0.136F, 0, 0}, {0, 0.122F, 0}, [](int, int) { return 0.0; });
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-2e6, 2e6);
+  for (int i = 0; i < 600; ++i) {
+    const auto first = static_cast<std::uint32_t>(parts.positions.size());
+    const double x = place(random), y = place(random);
+    parts.add(x, y, 5);
+    parts.add(x + 2, y, 5);
+    parts.add(x, y + 2, 5);
+    parts.triangles.push_back({first, first + 1, first + 2});
+  }
+  const FormReport form = form_of(*served(parts), 60);
+  EXPECT_EQ(form.flattened_piece_count, 0U) << described(form);
+  EXPECT_EQ(form.merged_piece_count, 0U) << described(form);
 }
 
 TEST(PositionSteps, KeepTheFormOfHousesFarFromEachOther) {
