@@ -187,6 +187,7 @@ base::Result<FusedFile> fuse_file(const std::filesystem::path& in, const std::fi
   BOOST_OUTCOME_TRY(fuse_and_write(stream, pass.facts, plan.value(), options,
                                    [&file](std::span<const std::byte> bytes) { return file.write(bytes); }));
   BOOST_OUTCOME_TRY(file.commit());
+  base::report(options.progress, phase, 1);
   return FusedFile{plan.value(), pass.temperature, stream.vertex_count(), pass.facts.faces.triangle_count,
                    stream.notes(pass.facts)};
 }

@@ -41,6 +41,7 @@ TopologyFacts topology_facts(const MultispectralMesh& mesh, const base::Progress
   std::vector<std::uint32_t>& cut = sides.source_vertex;
   std::sort(cut.begin(), cut.end());
   facts.non_manifold_vertex_count = static_cast<std::uint64_t>(std::unique(cut.begin(), cut.end()) - cut.begin());
+  base::report(progress, base::kTopologyPhase, 1);
   return facts;
 }
 

@@ -53,8 +53,9 @@ base::Result<FusedFacts> fused_in_memory(const FuseOptions& options, const fusio
 /// To a Draco file on the lattice of the scene.
 base::Result<FusedFacts> fused_on_lattice(const FuseOptions& options, const fusion::FusionSettings& settings,
                                           exports::SceneFileOptions file) {
+  const double weight_of_writing = options.keeping == protocol::codec::DracoKeeping::Shape ? 4 : 2;
   ProgressLine line(with_loading(options.input, options.thermal,
-                                 {{map::kTilingPhase, "cutting into tiles", 16}, writing(options, 9)}));
+                                 {{map::kTilingPhase, "cutting into tiles", 40}, writing(options, weight_of_writing)}));
   BOOST_OUTCOME_TRY(auto loaded, load_scene(options.input, options.thermal, watched(options.read, line)));
   auto notes = loaded.notes;
   jobs::WorkerPool pool(std::max(1U, std::thread::hardware_concurrency()));

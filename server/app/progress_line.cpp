@@ -118,6 +118,8 @@ void ProgressLine::end() {
   {
     const std::lock_guard lock(mutex_);
     is_over_ = true;
+    const bool is_complete = stage_ + 1 == stages_.size() && share_of_stage_ >= 1;
+    if (drawn_columns_ > 0 && is_complete) draw();
     erase();
   }
   ended_.notify_all();

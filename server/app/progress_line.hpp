@@ -52,7 +52,7 @@ class ProgressLine {
   /// Where the jobs report; phases that are not among the stages are not shown. Not to be used after end().
   base::Progress sink();
 
-  /// Erases the line, for good.
+  /// Erases the line, for good; where all was done it has told so.
   void end();
 
   /// Erases the line of the process, if there is one, so that something else can be written; it comes back by itself unless

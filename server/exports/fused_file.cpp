@@ -168,6 +168,7 @@ base::Result<std::vector<files::Note>> write_scene_file(const std::filesystem::p
   base::report(progress, base::kWritingPhase, 0.9);
   BOOST_OUTCOME_TRYV(output.write(std::as_bytes(std::span(file.bytes))));
   BOOST_OUTCOME_TRYV(output.commit());
+  base::report(progress, base::kWritingPhase, 1);
   return std::move(file.losses);
 }
 

@@ -101,6 +101,7 @@ base::Result<TradeoffMeasurement> measured_tradeoff(const map::SceneSnapshot& sc
     if (level != levels.back() || scene.temperature().summary.finite_count == 0) continue;
     BOOST_OUTCOME_TRY(result.raw, raw_costs(tiles, suggested_m, samples.look(), options.temperature_steps_celsius));
   }
+  base::report(progress, kMeasuringPhase, 1);
   return result;
 }
 

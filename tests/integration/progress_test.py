@@ -122,9 +122,9 @@ class Progress(unittest.TestCase):
     def output(self, name):
         return os.path.join(self.folder.name, name)
 
-    def check(self, *args, words, run_s=0.04):
+    def check(self, *args, words, run_s=0.04, least_before_end=0):
         """The line is there, tells of each of `words` (of what takes longest: the rest may be over between two looks), is redrawn at
-        most ten times a second, and is gone at the end."""
+        most ten times a second, comes to 100 %, and is gone at the end."""
         status, chunks, out = on_terminal(*args, run_s=run_s)
         seen = b"".join(data for _, data in chunks)
         self.assertEqual(status, 0, seen)
@@ -136,6 +136,9 @@ class Progress(unittest.TestCase):
         self.assertLessEqual(len(draws), 10 * (draws[-1] - draws[0]) + 2)
         shares = [int(share) for share in re.findall(rb"(\d+) %", seen)]
         self.assertEqual(shares, sorted(shares), "only ahead")
+        self.assertEqual(shares[-1], 100, "to the end")
+        # What is shown just before the end is not far from it: the estimate is worth something.
+        self.assertGreaterEqual(shares[-2] if len(shares) > 1 else 100, least_before_end)
         for line in shown(seen):
             self.assertTrue(line == "" or line.startswith("spectra: note: "), line)
         return out
@@ -150,7 +153,7 @@ class Progress(unittest.TestCase):
 
     def test_fuse_to_drc(self):
         self.check("fuse", self.scene, self.output("o.drc"), "--method", "thermal_only",
-                   words=[b"cutting into tiles", b"writing o.drc"])
+                   words=[b"cutting into tiles", b"writing o.drc"], least_before_end=85)
 
     def test_info(self):
         out = self.check("info", self.large_mesh, words=[b"examining the topology"], run_s=0.01)
