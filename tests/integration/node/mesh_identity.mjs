@@ -103,34 +103,38 @@ export function misplacedVertices(tiles, ply, origin) {
   const slots = 1 << 21;
   const slotOf = (x, y, z) => mixed(mixed(x | 0, y | 0), z | 0) & (slots - 1);
   const cellOf = (value) => Math.floor(value / cell);
-  const at = (i) => [ply.x[i] - origin[0], ply.y[i] - origin[1], ply.z[i] - origin[2]];
   const first = new Int32Array(slots).fill(-1);
   const next = new Int32Array(ply.vertexCount);
   for (let i = 0; i < ply.vertexCount; ++i) {
-    const slot = slotOf(...at(i).map(cellOf));
+    const slot = slotOf(cellOf(ply.x[i] - origin[0]), cellOf(ply.y[i] - origin[1]), cellOf(ply.z[i] - origin[2]));
     next[i] = first[slot];
     first[slot] = i;
   }
   const misplaced = [];
   for (const tile of tiles) {
     const reach = tile.frame.step * 0.500001;
-    for (let v = 0; v < tile.geometry.positions.length / 3; ++v) {
-      const place = placeOf(tile, v);
-      const [red, green, blue] = tile.colours.subarray(3 * v, 3 * v + 3);
+    const { positions } = tile.geometry;
+    for (let v = 0; v < positions.length / 3; ++v) {
+      const px = positions[3 * v] + tile.frame.origin[0];
+      const py = positions[3 * v + 1] + tile.frame.origin[1];
+      const pz = positions[3 * v + 2] + tile.frame.origin[2];
       const isNear = (i) =>
-        ply.red[i] === red && ply.green[i] === green && ply.blue[i] === blue &&
-        at(i).every((value, axis) => Math.abs(value - place[axis]) <= reach);
-      const low = place.map((value) => cellOf(value - reach));
-      const high = place.map((value) => cellOf(value + reach));
+        Math.abs(ply.x[i] - origin[0] - px) <= reach &&
+        Math.abs(ply.y[i] - origin[1] - py) <= reach &&
+        Math.abs(ply.z[i] - origin[2] - pz) <= reach &&
+        ply.red[i] === tile.colours[3 * v] &&
+        ply.green[i] === tile.colours[3 * v + 1] &&
+        ply.blue[i] === tile.colours[3 * v + 2];
+      const [highX, highY, highZ] = [cellOf(px + reach), cellOf(py + reach), cellOf(pz + reach)];
       let isFound = false;
-      for (let x = low[0]; x <= high[0] && !isFound; ++x) {
-        for (let y = low[1]; y <= high[1] && !isFound; ++y) {
-          for (let z = low[2]; z <= high[2] && !isFound; ++z) {
+      for (let x = cellOf(px - reach); x <= highX && !isFound; ++x) {
+        for (let y = cellOf(py - reach); y <= highY && !isFound; ++y) {
+          for (let z = cellOf(pz - reach); z <= highZ && !isFound; ++z) {
             for (let i = first[slotOf(x, y, z)]; i >= 0 && !isFound; i = next[i]) isFound = isNear(i);
           }
         }
       }
-      if (!isFound) misplaced.push(`${tile.frame.tile}: ${place}`);
+      if (!isFound) misplaced.push(`${tile.frame.tile}: ${px}, ${py}, ${pz}`);
     }
   }
   return misplaced;
