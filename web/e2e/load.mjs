@@ -292,6 +292,10 @@ export function addLoadTests(browser, scratch) {
     await settled(page);
     await page.mouse.move(20, 890);
     const after = await screenshot(page, 'pace-after');
+    // What the server says every second is no reason for another picture.
+    const drawnCount = await page.evaluate(() => globalThis.spectra.viewport.pictures);
+    await page.waitForTimeout(2500);
+    assert.equal(await page.evaluate(() => globalThis.spectra.viewport.pictures), drawnCount, 'pictures of what has not changed');
     assert.equal(await page.evaluate(() => globalThis.spectra.viewport.gpuObjects.triangles), triangles);
     for (let x = 200; x < 1100; x += 25) {
       for (let y = 60; y < 840; y += 25) assert.deepEqual(after.at(x, y), before.at(x, y), `pixel ${x}, ${y}`);

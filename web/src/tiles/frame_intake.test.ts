@@ -16,6 +16,7 @@ const results: Record<DecodeResult['kind'], DecodeResult> = {
 };
 
 let decodings: { finish: () => Promise<void>; fail: () => Promise<void> }[];
+let arrivalCount = 0;
 let acknowledged: number[];
 let problems: unknown[];
 let rawProblems: string[];
@@ -66,7 +67,9 @@ beforeEach(() => {
     },
     {
       onDecoded: (last) => acknowledged.push(last),
-      onArrival: () => undefined,
+      onArrival: () => {
+        arrivalCount += 1;
+      },
       onWholeColours: (rgba) => wholes.push(rgba),
       onProblem: (error) => problems.push(error),
       onRawProblem: (message) => rawProblems.push(message),
@@ -114,7 +117,10 @@ describe('FrameIntake', () => {
 
   it('shows a revision once everything before is in the picture, whatever comes after', async () => {
     receive(FrameKind.geometry);
+    const before = arrivalCount;
     intake.shownAfterAll({ generation: 1, scene_revision: 4 });
+    // That alone is no reason for another picture.
+    expect(arrivalCount).toBe(before);
     receive(FrameKind.colours);
     intake.shownAfterAll({ generation: 1, scene_revision: 5 });
     receive(FrameKind.colours);

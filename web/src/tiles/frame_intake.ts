@@ -107,10 +107,11 @@ export class FrameIntake {
     this.events.onArrival();
   }
 
-  /** The server has sent all that had changed by a revision; bringIn() says when that is in the picture. */
+  /** The server has sent all that had changed by a revision; bringIn() says, with the next picture, when that is in it. */
   shownAfterAll(shown: Shown): void {
+    const last = this.#shownAfter.at(-1)?.shown;
+    if (last?.generation === shown.generation && last.scene_revision === shown.scene_revision) return;
     this.#shownAfter.push({ sequence: this.#lastSequence, shown });
-    this.events.onArrival();
   }
 
   /**
