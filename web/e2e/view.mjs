@@ -293,6 +293,7 @@ export function addViewTests(browser, scratch) {
         const box = await page.locator(part).boundingBox();
         assert.ok(box.x >= 0 && box.x + box.width <= 200 && box.y + box.height <= 150, `${part}: ${JSON.stringify(box)}`);
       }
+      await page.locator('footer').getByText('up to date', { exact: true }).waitFor({ timeout: 10_000 });
       assert.equal((await page.locator('footer').innerText()).trim(), 'up to date');
       await look('in a tiny window');
       if (name === 'two vertices') {
