@@ -5,7 +5,7 @@ import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { assertAccessible } from './axe.mjs';
-import { openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
+import { openClient, PROGRAM, screenshot, settled, smallDemoScene, startServer, test } from './harness.mjs';
 
 export function addAccessTests(browser) {
   test('Somebody without a token gets a page to log in, and nothing else; with one, by keyboard alone, the scene', async () => {
@@ -14,7 +14,7 @@ export function addAccessTests(browser) {
     const token = (...args) => spawnSync(PROGRAM, ['token', '--file', file, ...args], { encoding: 'utf8' }).stdout.trim();
     const operator = token('--role', 'operator', '--name', 'bridge');
     token('--role', 'admin');
-    const server = await startServer(['--demo', '--tokens', file, '--invite', 'viewer']);
+    const server = await startServer([smallDemoScene(scratch), '--tokens', file, '--invite', 'viewer']);
     const { page, problems } = await openClient(browser, server.url);
     assert.equal(new URL(page.url()).pathname, '/login');
     const requests = [];

@@ -1,7 +1,8 @@
 // What the end-to-end tests share: the server program, Chromium, and pixels of screenshots.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync } from 'node:fs';
+import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { inflateSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
@@ -58,6 +59,19 @@ let demo = null;
 export function demoServer() {
   demo ??= startServer(['--demo']);
   return demo;
+}
+
+let small = null;
+/** The demo scene of few vertices, for what is about words, boxes and keys: a machine without a GPU draws it in half the time. */
+export function smallDemoServer(scratch) {
+  small ??= startServer([smallDemoScene(scratch)]);
+  return small;
+}
+
+export function smallDemoScene(scratch) {
+  const file = join(scratch, 'small-demo.ply');
+  if (!existsSync(file)) execFileSync(PROGRAM, ['demo-scene', file, '--vertices', '40000', '--quiet']);
+  return file;
 }
 
 export function startBrowser() {
@@ -207,6 +221,6 @@ export async function runTests() {
     }
     for (const page of opened) await page.close();
   }
-  if (demo !== null) await (await demo).stop();
+  for (const server of [demo, small]) if (server !== null) await (await server).stop();
   return { passed: wanted.length - failed, failed };
 }

@@ -4,7 +4,7 @@ import { execFileSync } from 'node:child_process';
 import { cpSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { PROGRAM, settled, startServer, test } from './harness.mjs';
+import { PROGRAM, settled, smallDemoScene, startServer, test } from './harness.mjs';
 import { linkProxy } from '../../tests/integration/node/link_proxy.mjs';
 
 const DIST = process.env.SPECTRA_WEB ?? fileURLToPath(new URL('../dist', import.meta.url));
@@ -42,7 +42,7 @@ function nextClient(scratch, name) {
 
 export function addKeptTests(browser, scratch) {
   test('A tablet keeps the client, never the scene, and no old client is there after an upgrade', async () => {
-    let server = await startServer(['--demo']);
+    let server = await startServer([smallDemoScene(scratch)]);
     const { port } = server;
     const proxy = await linkProxy(server.url);
     const context = await browser.newContext();
@@ -63,14 +63,14 @@ export function addKeptTests(browser, scratch) {
     await page.locator('[data-state-notice], .notice, [role=alert], [role=status]').first().waitFor();
 
     // It comes back upgraded: the next page is the new one, at once.
-    server = await startServer(['--demo', '--web', nextClient(scratch, 'second')], port);
+    server = await startServer([smallDemoScene(scratch), '--web', nextClient(scratch, 'second')], port);
     await page.reload();
     assert.equal(await build(page), 'second');
     await settled(page);
 
     // Upgraded again, behind a link on which nothing comes for longer than anybody waits: the kept one is there first, and gives way.
     await server.stop();
-    server = await startServer(['--demo', '--web', nextClient(scratch, 'third')], port);
+    server = await startServer([smallDemoScene(scratch), '--web', nextClient(scratch, 'third')], port);
     proxy.stall(8000);
     await page.reload();
     assert.equal(await build(page), 'second', 'what is kept, as long as nothing else comes');
@@ -82,7 +82,7 @@ export function addKeptTests(browser, scratch) {
     await server.stop();
     const tokens = join(scratch, 'kept.tokens');
     execFileSync(PROGRAM, ['token', '--file', tokens, '--role', 'viewer']);
-    server = await startServer(['--demo', '--tokens', tokens], port);
+    server = await startServer([smallDemoScene(scratch), '--tokens', tokens], port);
     await page.reload();
     assert.equal(new URL(page.url()).pathname, '/login');
     assert.deepEqual(await kept(page), []);

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { demoServer, drawn, openClient, PROGRAM, screenshot, settled, startServer, test } from './harness.mjs';
+import { demoServer, drawn, openClient, PROGRAM, screenshot, settled, smallDemoServer, startServer, test } from './harness.mjs';
 import { startLink } from './link.mjs';
 
 /** Width and height in CSS pixels; `touch` screens have no mouse. */
@@ -188,7 +188,7 @@ function boxes(page) {
 export function addLayoutTests(browser, scratch) {
   for (const { width, height, touch } of SCREENS) {
     test(`Nothing is cut and nothing lies over something else at ${width} x ${height}`, async () => {
-      const link = await startLink((await demoServer()).port);
+      const link = await startLink((await smallDemoServer(scratch)).port);
       const context = await browser.newContext({
         viewport: { width, height },
         hasTouch: touch === true,
@@ -456,7 +456,7 @@ export function addLayoutTests(browser, scratch) {
   });
 
   test('On a phone too, the marks tell the hottest of all that is seen', async () => {
-    const server = await demoServer();
+    const server = await smallDemoServer(scratch);
     const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
     const { page } = await openClient(context, server.url, null);
     await settled(page, 180_000);
@@ -515,7 +515,7 @@ export function addLayoutTests(browser, scratch) {
   });
 
   test('Nothing is cut and nothing lies over something else with two device pixels a pixel', async () => {
-    const server = await demoServer();
+    const server = await smallDemoServer(scratch);
     const context = await browser.newContext({ viewport: SCREENS[0], deviceScaleFactor: 2 });
     const { page, problems } = await openClient(context, server.url, null);
     await settled(page, 180_000);
@@ -589,7 +589,7 @@ export function addLayoutTests(browser, scratch) {
   });
 
   test('Single keys can be switched off, and act on the scene even then', async () => {
-    const server = await demoServer();
+    const server = await smallDemoServer(scratch);
     const { page } = await openClient(browser, server.url);
     await settled(page, 180_000);
     const method = () => page.evaluate(() => globalThis.spectra.store.fusion.method);
@@ -616,7 +616,7 @@ export function addLayoutTests(browser, scratch) {
   });
 
   test('Forced colours leave every number and every slider readable', async () => {
-    const server = await demoServer();
+    const server = await smallDemoServer(scratch);
     const context = await browser.newContext({
       viewport: { width: 1280, height: 720 },
       forcedColors: 'active',
