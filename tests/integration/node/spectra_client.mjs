@@ -177,16 +177,16 @@ export class SpectraClient {
     const hello = client.notification("hello", 30_000);
     client.socket.on("message", (data, isBinary) => client.#receive(data, isBinary));
     hello.catch(() => {});
-    await new Promise((resolve, reject) => {
-      client.socket.once("open", resolve);
-      client.socket.once("error", reject);
-    });
     client.closed = new Promise((resolve) =>
       client.socket.once("close", (code, reason) => {
         client.#end(new Error(`the connection was closed: ${code} ${reason}`));
         resolve(code);
       }),
     );
+    await new Promise((resolve, reject) => {
+      client.socket.once("open", resolve);
+      client.socket.once("error", reject);
+    });
     client.hello = await hello;
     return client;
   }
