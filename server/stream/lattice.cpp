@@ -46,6 +46,8 @@ class Rounding {
     }
     double extent = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, double{high[axis]} - double{low[axis]});
+    // Vertices of coarser steps than others may be rounded beyond the box, by half of theirs at each end.
+    if (const auto asked = fewest_and_most_asked(); asked[0] < asked[1]) extent += this->step_m(asked[0]);
     constexpr int kSmallestExponent = -124;
     most_halvings_ =
         halvings_within(extent, std::ilogb(step_m) - kSmallestExponent, std::min(most_steps_, map::kStepsOfTile));
@@ -68,6 +70,18 @@ class Rounding {
   double step_m(int halvings) const { return std::ldexp(step_m_, -halvings); }
 
  private:
+  // Halvings of drawn vertices.
+  std::array<int, 2> fewest_and_most_asked() const {
+    std::array<int, 2> asked{tile_.step_halvings.empty() ? 0 : std::numeric_limits<int>::max(), 0};
+    for (std::size_t v = 0; v < tile_.step_halvings.size(); ++v) {
+      if (!drawn_[v]) continue;
+      for (const std::uint8_t halvings : tile_.step_halvings[v]) {
+        asked = {std::min(asked[0], int{halvings}), std::max(asked[1], int{halvings})};
+      }
+    }
+    return asked;
+  }
+
   // As many, and few enough for so many metres.
   int halvings_within(double length_m, int wanted, double most_steps) const {
     while (std::isfinite(length_m) && length_m > step_m(wanted) * (most_steps - 2)) {

@@ -129,6 +129,21 @@ TEST(TileLattice, RoundsEachVertexToItsOwnStep) {
   }
 }
 
+TEST(TileLattice, HoldsVerticesOfCoarserStepsThatAreRoundedBeyondTheOthers) {
+  // Its ends ask for steps of 8 m, what lies between for the finest that so many metres leave.
+  map::Tile tile;
+  tile.positions = {{203.5F, 0, 0}, {250, 10, 0}, {250, 10.001F, 0}, {324.5F, 0, 0}};
+  tile.triangles = {{0, 1, 2}, {1, 2, 3}};
+  tile.step_halvings = {{0, 0, 0}, {24, 24, 24}, {24, 24, 24}, {0, 0, 0}};
+  const auto lattice = tile_lattice(tile, 8);
+  ASSERT_TRUE(lattice.has_value());
+  for (const auto& point : lattice.value().points) {
+    for (const std::int32_t steps : point) EXPECT_LT(steps, std::int32_t{1} << 23);
+  }
+  EXPECT_EQ(lattice.value().coarsest_step_m, 8);
+  EXPECT_EQ(lattice.value().step_m, 0x1p-15F);
+}
+
 TEST(TileLattice, DoublesAStepThatFloatsDoNotTellApart) {
   auto tile = testing::patch_tile({}, 12, 0, 20);
   const auto decoded_x = [&](const TileLattice& lattice, std::size_t v) {
