@@ -38,6 +38,24 @@ describe('nearestHit', () => {
     }
   });
 
+  it('loses no ray that goes through a vertex or an edge between triangles', () => {
+    const around = Array.from({ length: 6 }, (_, i) => [0.013 * Math.cos(i * 1.1), 0.011 * Math.sin(i * 1.1), 0.001 * (i % 2)]);
+    const middle = Array.from(Float32Array.from([12.513, -7.251, 1.487]));
+    const fan = {
+      ...square(0, true),
+      positions: Float32Array.from([...middle, ...around.flatMap((p) => p.map((value, axis) => value + middle[axis]!))]),
+      indices: Uint16Array.from(around.flatMap((_, i) => [0, 1 + i, 1 + ((i + 1) % 6)])),
+      centre: middle as [number, number, number],
+    };
+    for (let i = 0; i < 2000; i += 1) {
+      const eye = [middle[0]! + 40 * Math.sin(i), middle[1]! + 40 * Math.cos(i), middle[2]! + 30 + (i % 7)];
+      const way = middle.map((value, axis) => value - eye[axis]!);
+      const length = Math.hypot(...way);
+      const direction = way.map((value) => value / length) as [number, number, number];
+      expect(nearestHit([fan], { origin: eye as [number, number, number], direction }, 0), `from ${eye}`).toBeCloseTo(length, 3);
+    }
+  });
+
   it('finds a point of a cloud within the cone alone', () => {
     expect(nearestHit([square(0, false)], downwards(0.98, 0.98), 0.01)).toBeCloseTo(10, 6);
     expect(nearestHit([square(0, false)], downwards(0.5, 0.5), 0.01)).toBeNull();

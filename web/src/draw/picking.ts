@@ -38,6 +38,9 @@ function meetsSphere(ray: Ray, centre: Vec3, radius: number, cone: number, neare
   return x * x + y * y + z * z - along * along <= reach * reach;
 }
 
+/** In parts of an edge: a ray through one that two triangles share is not lost between them by rounding. */
+const EDGE_SLACK = 1e-6;
+
 /** Both sides of a triangle count: scans have holes through which backs are seen. */
 function nearestTriangle(positions: Float32Array, indices: Uint16Array | Uint32Array, ray: Ray, limit: number): number {
   const [ox, oy, oz] = ray.origin;
@@ -65,12 +68,12 @@ function nearestTriangle(positions: Float32Array, indices: Uint16Array | Uint32A
     const ty = oy - ay;
     const tz = oz - az;
     const u = (tx * px + ty * py + tz * pz) / determinant;
-    if (u < 0 || u > 1) continue;
+    if (u < -EDGE_SLACK || u > 1 + EDGE_SLACK) continue;
     const qx = ty * e1z - tz * e1y;
     const qy = tz * e1x - tx * e1z;
     const qz = tx * e1y - ty * e1x;
     const v = (dx * qx + dy * qy + dz * qz) / determinant;
-    if (v < 0 || u + v > 1) continue;
+    if (v < -EDGE_SLACK || u + v > 1 + EDGE_SLACK) continue;
     const distance = (e2x * qx + e2y * qy + e2z * qz) / determinant;
     if (distance > 0 && distance < nearest) nearest = distance;
   }
