@@ -39,8 +39,8 @@ int halvings_of_tile(const Tile& tile, double step_m) {
   }
   const double reach = longest_side(box);
   constexpr int kAnyHalvings = 2 * kMostHalvings;
-  // What is rounded to the usual step in it may come to lie half of one beyond it.
   if (!(reach > 0)) return kAnyHalvings;
+  // What is rounded to the usual step in it may come to lie half of one beyond it, at either end.
   return static_cast<int>(
       std::clamp(std::floor(std::log2(step_m * (kStepsOfTile - 2) / (reach + step_m))), -100.0, double{kAnyHalvings}));
 }

@@ -131,7 +131,16 @@ describe('FrameIntake', () => {
     expect(picture().shown).toBeNull();
     await decodings[1]?.finish();
     expect(picture().shown?.scene_revision).toBe(5);
-    intake.shownAfterAll({ generation: 1, scene_revision: 6 });
+    // Of what nothing has been drawn in between, the oldest and the newest count.
+    for (const scene_revision of [6, 7, 8, 9]) {
+      intake.shownAfterAll({ generation: 1, scene_revision });
+      receive(FrameKind.colours);
+    }
+    await decodings[3]?.finish();
+    expect(picture().shown?.scene_revision).toBe(6);
+    for (const decoding of decodings.slice(4)) await decoding?.finish();
+    expect(picture().shown?.scene_revision).toBe(9);
+    intake.shownAfterAll({ generation: 1, scene_revision: 10 });
     intake.beginConnection();
     expect(picture().shown).toBeNull();
   });

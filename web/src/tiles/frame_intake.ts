@@ -36,6 +36,7 @@ export class FrameIntake {
   #topLevel = Infinity;
   #lastSequence = 0;
   #completeAfter: { sequence: number; message: StreamComplete } | null = null;
+  /** The oldest that is waited for, and the newest: a hidden page draws nothing, and hears all the same. */
   #shownAfter: { sequence: number; shown: Shown }[] = [];
 
   constructor(
@@ -111,7 +112,7 @@ export class FrameIntake {
   shownAfterAll(shown: Shown): void {
     const last = this.#shownAfter.at(-1)?.shown;
     if (last?.generation === shown.generation && last.scene_revision === shown.scene_revision) return;
-    this.#shownAfter.push({ sequence: this.#lastSequence, shown });
+    this.#shownAfter = [...this.#shownAfter.slice(0, 1), { sequence: this.#lastSequence, shown }];
   }
 
   /**
