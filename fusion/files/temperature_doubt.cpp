@@ -27,6 +27,8 @@ constexpr float kFull = 65'535;
 constexpr std::uint64_t kFewestShared = 12;
 constexpr std::uint64_t kSharedOneIn = 1000;
 constexpr float kFewestCelsius = 5;
+/// No scene has nothing colder.
+constexpr float kNothingColder = 1000;
 
 bool are_many(std::uint64_t count, const TemperatureFacts& facts) {
   return count >= kFewestShared && kSharedOneIn * count >= facts.finite_count && count < facts.finite_count;
@@ -151,9 +153,13 @@ class Doubt {
     if (hot_count_ > measured_count_ / 2) {
       return of_all(std::string("look like counts of a sensor or another quantity: ") + kOwnScale + no_data());
     }
-    if (are_whole() && facts_.too_hot_count == 0 && are_mostly_large()) {
+    if (are_mostly_large() && are_whole()) {
       return of_all("are whole numbers that are hard to believe: they may be " + reading("tenths of a degree", 0.1) +
-                    ", or " + reading("hundredths", 0.01));
+                    ", or " + reading("hundredths", 0.01) + no_data() + highest_as_no_data());
+    }
+    if (are_mostly_large() && lowest_measured() >= kNothingColder) {
+      return of_all("are hard to believe: they may be " + reading("hundredths of a degree", 0.01) + no_data() +
+                    highest_as_no_data());
     }
     return of_some();
   }
@@ -164,10 +170,9 @@ class Doubt {
   std::optional<TemperatureDoubt> of_some() const {
     TemperatureDoubt doubt;
     const auto ask = [&](std::uint64_t count, const std::string& what, float value) {
-      const std::string text = value_text(static_cast<double>(value), PlyScalar::Float32);
       doubt.count += count;
-      doubt.message += (doubt.message.empty() ? range() : "; ") + counted(count, "is", "are") + what + ": if " + text +
-                       " stands for no data, --no-data " + text;
+      doubt.message +=
+          (doubt.message.empty() ? range() : "; ") + counted(count, "is", "are") + what + ": " + if_none(value);
     };
     if (facts_.too_hot_count > 0) ask(facts_.too_hot_count, " above 3000", highest());
     if (facts_.too_cold_count > 0) ask(facts_.too_cold_count, " below -100", lowest());
@@ -189,6 +194,16 @@ class Doubt {
       return of_all(std::string("look like shares of a range: ") + kOwnScale);
     }
     return std::nullopt;
+  }
+
+  /// Where a number alone, or a few of it, is above what there can be.
+  std::string highest_as_no_data() const {
+    if (facts_.too_hot_count == 0 || is_shared(highest()) || highest() == kFull) return "";
+    return "; " + if_none(highest());
+  }
+  static std::string if_none(float celsius) {
+    const std::string number = value_text(static_cast<double>(celsius), PlyScalar::Float32);
+    return "if " + number + " stands for no data, --no-data " + number;
   }
 
   bool are_most(std::uint64_t count) const {
@@ -233,13 +248,9 @@ class Doubt {
   }
   std::string no_data() const {
     std::string text;
-    const auto ask = [&text](float celsius) {
-      const std::string number = value_text(static_cast<double>(celsius), PlyScalar::Float32);
-      text += "; if " + number + " stands for no data, --no-data " + number;
-    };
-    if (facts_.full_count > 0) ask(kFull);
+    if (facts_.full_count > 0) text += "; " + if_none(kFull);
     for (const SharedNumber& shared : shared_) {
-      if (shared.celsius != 0 && shared.celsius != kFull) ask(shared.celsius);
+      if (shared.celsius != 0 && shared.celsius != kFull) text += "; " + if_none(shared.celsius);
     }
     return text;
   }

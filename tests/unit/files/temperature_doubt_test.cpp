@@ -47,6 +47,22 @@ TEST(TemperatureDoubt, SeveralJustAboveWhatCanBeAreHundredthsAndNoMissingOnes) {
   expect_in("hundredths of a degree", said("float", 1800.5, 6.25, 100, {"3601.5", "3644.25"}));
   expect_in("hundredths of a degree (5 to 59.45 degC): --temperature-scale 0.01, or like counts of a sensor",
             said("int", 500, 55, 100));
+  // One of them may be above what can be, and none.
+  for (const char* type : {"short", "float", "double"}) {
+    for (const double step : {7.0, 7.25}) {
+      if (step != 7 && type == std::string_view("short")) continue;
+      const std::string all = said(type, 1800, step, 150);
+      expect_in("hundredths", all);
+      expect_in("--temperature-scale 0.01", all);
+      EXPECT_EQ(all.find("no-data"), std::string::npos) << all;
+      const std::string one = said(type, 1800, step, 150, {"3168"});
+      expect_in("--temperature-scale 0.01", one);
+      expect_in("; if 3168 stands for no data, --no-data 3168", one);
+    }
+  }
+  // A fire is none, nor a kiln with something colder beside it.
+  EXPECT_EQ(said("float", 151.5, 3.25, 100), "");
+  EXPECT_EQ(said("float", 900.5, 3.25, 100), "");
   // One value that stands alone, beside degrees or hundredths.
   expect_in("--no-data 9999", said("int", 18, 1, 30, {"9999", "9999"}));
   expect_in("--no-data 9999", said("int", 18, 1, 30, {"9999", "9000"}));
